@@ -1,9 +1,9 @@
-//! romc, the reduced-order model compiler: from recordings of a legged robot to a small symbolic model
-//! of its jump, and from the model to equations, code and joint torques.
+//! romc, the reduced-order model compiler: from recordings of a legged robot to a small symbolic model of its jump, and
+//! from the model to equations, code and joint torques.
 //!
-//! A model has an encoder and a decoder between the robot's state `x` and a few latent coordinates
-//! `z`, and per phase (contact, flight) sparse accelerations `ddz = Xi^T Theta(z, dz, u_lat)` over a
-//! library of candidate terms. The stages, each a module that can be used alone:
+//! A model has an encoder and a decoder between the robot's state `x` and a few latent coordinates `z`, and per phase
+//! (contact, flight) sparse accelerations `ddz = Xi^T Theta(z, dz, u_lat)` over a library of candidate terms. The
+//! stages, each a module that can be used alone:
 //!
 //! | stage | in | out |
 //! |---|---|---|
@@ -41,8 +41,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `examples/train_model.rs` trains one, `examples/latent_mpc.rs` runs the controller. `ARCHITECTURE.md`
-//! has the rooms and who may import whom, `docs/mathematics.md` the equations.
+//! `examples/train_model.rs` trains one, `examples/latent_mpc.rs` runs the controller. `ARCHITECTURE.md` has the rooms
+//! and who may import whom, `docs/mathematics.md` the equations.
 
 pub mod check;
 pub mod cli;

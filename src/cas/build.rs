@@ -4,8 +4,8 @@ use super::number::exact_sum;
 use super::power::half_integer;
 use crate::{Exponent, ExprId, ExprPool, Node, Number};
 
-/// Passes over operands that become flat only after collecting (each pass removes a level, so
-/// two or three suffice in practice; the bound keeps termination obvious).
+/// Passes over operands that become flat only after collecting (each pass removes a level, so two or three suffice in
+/// practice; the bound keeps termination obvious).
 const MAX_PASSES: usize = 64;
 
 impl ExprPool {
@@ -71,8 +71,8 @@ impl ExprPool {
 
     /// The sum of all operands: flat, like terms collected, sorted.
     ///
-    /// Coefficients of like terms are added exactly and rounded once, so the result does not
-    /// depend on the order of `operands`. Other coefficients keep their bits.
+    /// Coefficients of like terms are added exactly and rounded once, so the result does not depend on the order of
+    /// `operands`. Other coefficients keep their bits.
     pub fn sum(&mut self, operands: &[ExprId]) -> ExprId {
         let mut terms = Vec::with_capacity(operands.len());
         for &operand in operands {
@@ -269,8 +269,7 @@ impl ExprPool {
         }
     }
 
-    /// Adds the exponents of equal bases. What is no longer a power of its base (`sqrt(2)^2`)
-    /// goes to `again`.
+    /// Adds the exponents of equal bases. What is no longer a power of its base (`sqrt(2)^2`) goes to `again`.
     fn collect_powers(
         &mut self,
         mut powers: Vec<(ExprId, Exponent)>,
@@ -341,15 +340,15 @@ impl ExprPool {
         self.intern(Node::Product(numbers.into_iter().chain(factors).collect()))
     }
 
-    /// Factors of a product are sorted by base alone: bases are distinct, and `x` keeps its
-    /// place whatever its exponent.
+    /// Factors of a product are sorted by base alone: bases are distinct, and `x` keeps its place whatever its
+    /// exponent.
     fn compare_bases(&self, a: ExprId, b: ExprId) -> std::cmp::Ordering {
         self.compare(self.base_and_exponent(a).0, self.base_and_exponent(b).0)
     }
 }
 
-/// Folds numbers in an order that depends on their values alone: exact ones first, then floats
-/// from both ends, against the side the result so far is on, which avoids needless overflow.
+/// Folds numbers in an order that depends on their values alone: exact ones first, then floats from both ends, against
+/// the side the result so far is on, which avoids needless overflow.
 ///
 /// Numbers whose combination would overflow all the same are left beside each other.
 fn fold(

@@ -5,8 +5,8 @@ use crate::{ExprId, ExprPool, Function, IdSet, Node, Number, SymbolId};
 impl ExprPool {
     /// The derivative of `expr` by `symbol`.
     ///
-    /// `d|x| = sign(x) dx` and `d sign(x) = 0`, which hold except at zero. Results are kept in
-    /// the pool: asking again, or for an expression with common parts, costs little.
+    /// `d|x| = sign(x) dx` and `d sign(x) = 0`, which hold except at zero. Results are kept in the pool: asking again,
+    /// or for an expression with common parts, costs little.
     pub fn derivative(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
         if let Some(known) = self.known_derivative(expr, symbol) {
             return known;
@@ -18,8 +18,8 @@ impl ExprPool {
         self.derivatives[&(expr, symbol)]
     }
 
-    /// What has to be differentiated before and with `expr`, operands first. A product with a
-    /// numeric factor needs only the rest, which other terms share.
+    /// What has to be differentiated before and with `expr`, operands first. A product with a numeric factor needs only
+    /// the rest, which other terms share.
     fn to_differentiate(&self, expr: ExprId, symbol: SymbolId) -> Vec<ExprId> {
         let mut seen = IdSet::default();
         let mut stack = vec![expr];

@@ -11,15 +11,15 @@ pub struct Display<'p> {
 }
 
 impl ExprPool {
-    /// The text of `expr` in the grammar of [`parse`](ExprPool::parse), which reads it back to
-    /// the same id: terms and factors in canonical order, signs folded, floats in full.
+    /// The text of `expr` in the grammar of [`parse`](ExprPool::parse), which reads it back to the same id: terms and
+    /// factors in canonical order, signs folded, floats in full.
     pub fn display(&self, expr: ExprId) -> Display<'_> {
         Display { pool: self, expr }
     }
 }
 
-/// A piece of text still to be written. The printer keeps its own stack of these, so that deep
-/// expressions need no deep recursion.
+/// A piece of text still to be written. The printer keeps its own stack of these, so that deep expressions need no deep
+/// recursion.
 enum Piece<'p> {
     Text(&'p str),
     Number(Number),
@@ -133,8 +133,8 @@ impl<'p> Display<'p> {
         };
         pieces.extend(match number.as_rational() {
             Some((1, 1)) => return vec![Piece::Operand(base)],
-            // `sqrt(36)` would read as 6, though the power itself is beyond every float;
-            // `sqrt(0)` as zero, though its negative powers are not.
+            // `sqrt(36)` would read as 6, though the power itself is beyond every float; `sqrt(0)` as zero, though its
+            // negative powers are not.
             Some((halves, 2)) if !self.has_exact_root(base) => {
                 let mut root = vec![Piece::Text("sqrt("), Piece::Expr(base), Piece::Text(")")];
                 if halves != 1 {

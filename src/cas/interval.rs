@@ -154,8 +154,7 @@ impl Interval {
         Interval::between(down(base.lo), up(base.hi))
     }
 
-    /// `x^exponent`, for all pairs of points for which that is real: exponents of a negative base
-    /// are integers.
+    /// `x^exponent`, for all pairs of points for which that is real: exponents of a negative base are integers.
     pub(crate) fn pow(self, exponent: Interval) -> Interval {
         if self.is_empty() || exponent.is_empty() {
             return Interval::EMPTY;

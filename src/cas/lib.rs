@@ -1,9 +1,9 @@
 //! The computer algebra system: hash-consed expressions and what can be asked of them.
 //!
-//! Texts and coefficients enter, canonical expressions ([`ExprId`]) live in an [`ExprPool`], and
-//! derivatives, rewritten forms, values, bounds and texts leave. Nothing of the crate is imported
-//! here. Read the docs of [`ExprPool`] first for the invariants, then `build.rs` and `power.rs`,
-//! the constructors that keep them; `order.rs` says why equal sums print alike.
+//! Texts and coefficients enter, canonical expressions ([`ExprId`]) live in an [`ExprPool`], and derivatives, rewritten
+//! forms, values, bounds and texts leave. Nothing of the crate is imported here. Read the docs of [`ExprPool`] first
+//! for the invariants, then `build.rs` and `power.rs`, the constructors that keep them; `order.rs` says why equal sums
+//! print alike.
 //!
 //! | files | |
 //! |---|---|

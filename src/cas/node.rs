@@ -8,9 +8,9 @@ use crate::{Function, Number};
 
 /// A canonical expression of one [`ExprPool`](super::ExprPool).
 ///
-/// Two expressions of a pool are structurally equal exactly if their ids are equal. Children
-/// always have smaller ids than their parents. The order of ids is the order of creation and
-/// means nothing else: use [`ExprPool::compare`](super::ExprPool::compare) to sort.
+/// Two expressions of a pool are structurally equal exactly if their ids are equal. Children always have smaller ids
+/// than their parents. The order of ids is the order of creation and means nothing else: use
+/// [`ExprPool::compare`](super::ExprPool::compare) to sort.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ExprId(pub(super) u32);
 
@@ -69,8 +69,8 @@ impl Node {
 pub(super) type IdMap<V> = HashMap<ExprId, V, BuildIdHasher>;
 pub(super) type IdSet = HashSet<ExprId, BuildIdHasher>;
 
-/// A multiplicative hasher for short keys of small integers (ids, numbers): such keys are the
-/// pool's own, so resistance to chosen collisions is not needed, only speed.
+/// A multiplicative hasher for short keys of small integers (ids, numbers): such keys are the pool's own, so resistance
+/// to chosen collisions is not needed, only speed.
 #[derive(Clone, Copy, Default)]
 pub(super) struct IdHasher(u64);
 

@@ -1,8 +1,8 @@
 //! Numbers of the algebra: exact rationals, and floats where exactness has ended.
 //!
 //! A learned coefficient is a float and keeps its bits; an integer exponent or the `1/2` of a derivative is exact. One
-//! float makes a sum or product a float, and so does a rational that outgrows `i64`. A float of at most 15 digits stands
-//! for the decimal fraction that is written for it, so that `0.1 + 0.2` is `0.3`.
+//! float makes a sum or product a float, and so does a rational that outgrows `i64`. A float of at most 15 digits
+//! stands for the decimal fraction that is written for it, so that `0.1 + 0.2` is `0.3`.
 //!
 //! Only correctly rounded operations are folded (`+ - * /`, square roots, integer powers as multiplication chains), so
 //! that results are the same on every machine. An operation whose result would be infinite, undefined or denormal is
@@ -20,8 +20,8 @@ const MAX_DECIMALS: usize = 15;
 
 /// A finite real constant: exact, or a float with its bits.
 ///
-/// Integral floats up to `2^53` are stored as exact integers, and there is no negative zero:
-/// equal values of that range have one representation.
+/// Integral floats up to `2^53` are stored as exact integers, and there is no negative zero: equal values of that range
+/// have one representation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Number(Repr);
 
@@ -63,8 +63,8 @@ impl Number {
         }
     }
 
-    /// Reduces a ratio; what does not fit becomes a float. `None` for a zero denominator, and for what
-    /// only rounding would make whole: whole numbers are exact.
+    /// Reduces a ratio; what does not fit becomes a float. `None` for a zero denominator, and for what only rounding
+    /// would make whole: whole numbers are exact.
     fn from_ratio(numerator: i128, denominator: i128) -> Option<Number> {
         if denominator == 0 {
             return None;
@@ -80,8 +80,8 @@ impl Number {
         }
     }
 
-    /// The value as a float: the nearest one for an exact integer, the quotient of numerator and
-    /// denominator for an exact fraction.
+    /// The value as a float: the nearest one for an exact integer, the quotient of numerator and denominator for an
+    /// exact fraction.
     pub fn to_f64(self) -> f64 {
         match self.0 {
             Repr::Rational(numerator, denominator) => numerator as f64 / denominator as f64,
@@ -209,8 +209,8 @@ impl Number {
         self.combined(other, quotient, |a, b| normal(a / b))
     }
 
-    /// `self ^ exponent` as a multiplication chain (`0^0 = 1`); `None` for zero to a negative
-    /// power, overflow or underflow.
+    /// `self ^ exponent` as a multiplication chain (`0^0 = 1`); `None` for zero to a negative power, overflow or
+    /// underflow.
     pub(crate) fn checked_powi(self, exponent: i64) -> Option<Number> {
         if self.abs().is_one() {
             return Some(if exponent % 2 == 0 { Number::ONE } else { self });
@@ -223,8 +223,7 @@ impl Number {
         }
     }
 
-    /// The non-negative `root`-th root if it is exact, or correctly rounded (square root of a
-    /// float); `None` otherwise.
+    /// The non-negative `root`-th root if it is exact, or correctly rounded (square root of a float); `None` otherwise.
     pub(crate) fn checked_root(self, root: u32) -> Option<Number> {
         if self.is_negative() || root == 0 {
             return None;
@@ -256,8 +255,8 @@ pub(super) fn exact_sum(numbers: &[Number]) -> Option<Number> {
     })
 }
 
-/// The sum of floats, rounded once (Shewchuk, Adaptive precision floating-point arithmetic, 1997): what is lost by
-/// each addition is kept.
+/// The sum of floats, rounded once (Shewchuk, Adaptive precision floating-point arithmetic, 1997): what is lost by each
+/// addition is kept.
 pub fn sum_of_floats(values: &[f64]) -> f64 {
     let plain = values.iter().fold(0.0, |sum, value| sum + value);
     if values.len() < 3 || !plain.is_finite() {

@@ -8,9 +8,9 @@
 //! atom       = number | name | function "(" expression ")" | "(" expression ")"
 //! ```
 //!
-//! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. Each rule is a function; nesting is
-//! limited by [`ParseLimits`]. Chains of sums and products are handed over whole, so time is near linear in
-//! the length of the text.
+//! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. Each rule is a function; nesting is limited by
+//! [`ParseLimits`]. Chains of sums and products are handed over whole, so time is near linear in the length of the
+//! text.
 
 use super::defined::{Guards, Reading};
 use crate::{Exponent, ExprId, ExprPool, Function, Number};
@@ -105,8 +105,7 @@ fn short(token: &str) -> String {
 impl ExprPool {
     /// Reads an expression over the names that `allowed` accepts, within the default limits.
     ///
-    /// Function names are never variables. What [`display`](ExprPool::display) prints reads back
-    /// to the same id.
+    /// Function names are never variables. What [`display`](ExprPool::display) prints reads back to the same id.
     ///
     /// # Errors
     /// [`ParseError`] with the position, what was found and what was expected.
@@ -118,8 +117,8 @@ impl ExprPool {
         self.parse_within(text, allowed, &|_, _| None, ParseLimits::default())
     }
 
-    /// As [`parse`](ExprPool::parse), within given limits and with the expressions that `literal` gives for the
-    /// texts of numbers, such as their [`decimal`](ExprPool::decimal).
+    /// As [`parse`](ExprPool::parse), within given limits and with the expressions that `literal` gives for the texts
+    /// of numbers, such as their [`decimal`](ExprPool::decimal).
     ///
     /// # Errors
     /// As [`parse`](ExprPool::parse).
@@ -379,8 +378,8 @@ enum TokenKind {
     End,
 }
 
-/// All tokens of `text`, with [`TokenKind::End`] last. Characters outside the grammar are found
-/// here, before anything is built.
+/// All tokens of `text`, with [`TokenKind::End`] last. Characters outside the grammar are found here, before anything
+/// is built.
 fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
     let mut tokens = Vec::new();
     let mut start = 0;

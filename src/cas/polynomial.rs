@@ -19,8 +19,7 @@ const MAX_POWER_TERMS: usize = 35;
 /// Exact coefficients by the exponents of common [`Bases`], in their units.
 type Monomials = BTreeMap<Vec<i64>, Number>;
 
-/// What polynomials are in: `x` of `x^2 + x`, `x` with the unit 1/2 of `x + sqrt(x)`, `exp(x)` of
-/// `exp(2*x) + exp(-x)`.
+/// What polynomials are in: `x` of `x^2 + x`, `x` with the unit 1/2 of `x + sqrt(x)`, `exp(x)` of `exp(2*x) + exp(-x)`.
 struct Bases {
     /// In canonical order; all exponents of a base are multiples of its unit.
     units: Vec<(ExprId, Number)>,
@@ -39,12 +38,11 @@ impl Bases {
 }
 
 impl ExprPool {
-    /// The terms of a sum over one common denominator, with the numerator multiplied out and
-    /// divided by parts of the denominator where that leaves no remainder:
-    /// `x/(x + y) + y/(x + y)` becomes `1`, `(x^2 - 1)/(x - 1)` becomes `1 + x`.
+    /// The terms of a sum over one common denominator, with the numerator multiplied out and divided by parts of the
+    /// denominator where that leaves no remainder: `x/(x + y) + y/(x + y)` becomes `1`, `(x^2 - 1)/(x - 1)` becomes `1
+    /// + x`.
     ///
-    /// Nothing changes unless a sum or a function occurs in a denominator, or if there are too
-    /// many different ones.
+    /// Nothing changes unless a sum or a function occurs in a denominator, or if there are too many different ones.
     pub(super) fn together(&mut self, expr: ExprId) -> ExprId {
         let terms = self.terms_of(expr);
         let mut denominators: Vec<(ExprId, Number)> = Vec::new();
@@ -120,8 +118,8 @@ impl ExprPool {
         self.product(&factors)
     }
 
-    /// Both sums divided by their greatest common divisor, if that is not a number: found by exact
-    /// division of the lower one, or by Euclid's algorithm if both are in one base.
+    /// Both sums divided by their greatest common divisor, if that is not a number: found by exact division of the
+    /// lower one, or by Euclid's algorithm if both are in one base.
     fn without_common_divisor(&mut self, above: ExprId, below: ExprId) -> Option<(ExprId, ExprId)> {
         let is_sum = |expr| matches!(self.node(expr), Node::Sum(_));
         if !is_sum(above) || !is_sum(below) {
@@ -155,8 +153,8 @@ impl ExprPool {
         ))
     }
 
-    /// `dividend / divisor` if both are sums of products of powers with exact or decimal coefficients,
-    /// and the division leaves no remainder.
+    /// `dividend / divisor` if both are sums of products of powers with exact or decimal coefficients, and the division
+    /// leaves no remainder.
     fn divide_exactly(&mut self, dividend: ExprId, divisor: ExprId) -> Option<ExprId> {
         let (dividend, divisor) = (self.terms_of(dividend), self.terms_of(divisor));
         let bases = self.bases_of(dividend.iter().chain(&divisor))?;
@@ -185,8 +183,7 @@ impl ExprPool {
         self.spend(n_steps).then(|| divided(dividend, divisor))?
     }
 
-    /// The bases of the powers in some terms; `None` for roots of numbers and for exponents without
-    /// a common unit.
+    /// The bases of the powers in some terms; `None` for roots of numbers and for exponents without a common unit.
     fn bases_of<'t>(
         &mut self,
         terms: impl IntoIterator<Item = &'t (Number, ExprId)>,
@@ -212,8 +209,8 @@ impl ExprPool {
         Some(Bases { units, has_floats })
     }
 
-    /// The factors of a term as powers with constant exponents, where `exp(2*a - b)` is
-    /// `exp(a)^2*exp(b)^-1`; `None` for roots of numbers.
+    /// The factors of a term as powers with constant exponents, where `exp(2*a - b)` is `exp(a)^2*exp(b)^-1`; `None`
+    /// for roots of numbers.
     fn powers_of(&mut self, rest: ExprId) -> Option<Vec<(ExprId, Number)>> {
         let mut powers = Vec::new();
         for factor in self.factors_of(rest).to_vec() {
@@ -305,8 +302,8 @@ impl ExprPool {
     }
 }
 
-/// A polynomial divided by the highest product of powers that leaves no negative exponent, and the
-/// exponents of that product.
+/// A polynomial divided by the highest product of powers that leaves no negative exponent, and the exponents of that
+/// product.
 fn lowered(polynomial: Monomials) -> (Monomials, Vec<i64>) {
     let least = (polynomial.keys().cloned())
         .reduce(|a, b| a.iter().zip(&b).map(|(a, b)| *a.min(b)).collect());
@@ -316,8 +313,8 @@ fn lowered(polynomial: Monomials) -> (Monomials, Vec<i64>) {
     (lowered.collect(), least)
 }
 
-/// The quotient of two polynomials, and what is left once the highest monomial of the divisor is no
-/// part of that of the dividend; nothing if a coefficient is no longer exact.
+/// The quotient of two polynomials, and what is left once the highest monomial of the divisor is no part of that of the
+/// dividend; nothing if a coefficient is no longer exact.
 fn divided(dividend: Monomials, divisor: &Monomials) -> Option<(Monomials, Monomials)> {
     let (lowest, leading) = divisor.last_key_value()?;
     let (mut quotient, mut left) = (Monomials::new(), dividend);

@@ -11,9 +11,8 @@ use crate::{Coefficient, ExprId, Function, IdSet, Node, Number, SymbolId};
 
 /// Owner of hash-consed, canonical expressions.
 ///
-/// Expressions are made only by constructors ([`sum`](ExprPool::sum),
-/// [`product`](ExprPool::product), [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and what is
-/// built on them), which keep these invariants:
+/// Expressions are made only by constructors ([`sum`](ExprPool::sum), [`product`](ExprPool::product),
+/// [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and what is built on them), which keep these invariants:
 ///
 /// - sums and products are flat and sorted by [`compare`](ExprPool::compare), whatever the order
 ///   of the operands given; constants are folded, like terms and like factors collected;
@@ -24,11 +23,10 @@ use crate::{Coefficient, ExprId, Function, IdSet, Node, Number, SymbolId};
 ///
 /// # Which rewritings are allowed
 ///
-/// Wherever the expression as written has a finite real value, the canonical one has the same
-/// value up to rounding. The reverse need not hold: a rewriting may remove singularities, as in
-/// `x/x = 1`, `0 * log(x) = 0`, `sqrt(x)^2 = x` or `exp(log(x)) = x`, but never adds one. Constants
-/// without a value (`1/0`, `log(0)`, `sqrt(-1)`) are kept as they are; folding never produces an
-/// infinity or NaN.
+/// Wherever the expression as written has a finite real value, the canonical one has the same value up to rounding. The
+/// reverse need not hold: a rewriting may remove singularities, as in `x/x = 1`, `0 * log(x) = 0`, `sqrt(x)^2 = x` or
+/// `exp(log(x)) = x`, but never adds one. Constants without a value (`1/0`, `log(0)`, `sqrt(-1)`) are kept as they are;
+/// folding never produces an infinity or NaN.
 #[derive(Clone, Debug)]
 pub struct ExprPool {
     nodes: Vec<Node>,
@@ -108,8 +106,8 @@ impl ExprPool {
         pool
     }
 
-    /// An empty pool that folds numbers only where the result is exact, so that equal expressions are
-    /// equal to the last digit: `10^20 + 1` stays a sum.
+    /// An empty pool that folds numbers only where the result is exact, so that equal expressions are equal to the last
+    /// digit: `10^20 + 1` stays a sum.
     pub fn exact() -> ExprPool {
         ExprPool {
             is_exact: true,
@@ -169,8 +167,8 @@ impl ExprPool {
         self.symbol_id(&format!(" {kind} {number}"))
     }
 
-    /// The symbol of a selection: no variable, but `[test, zero, other]`, the value of `zero` where `test` is zero
-    /// and that of `other` elsewhere.
+    /// The symbol of a selection: no variable, but `[test, zero, other]`, the value of `zero` where `test` is zero and
+    /// that of `other` elsewhere.
     pub(super) fn selection_symbol(&mut self, parts: [ExprId; 3]) -> ExprId {
         let name = format!("selection {:?}", parts.map(ExprId::index));
         let id = self.symbol_for(&name, Meaning::Selection(parts));
@@ -195,8 +193,8 @@ impl ExprPool {
         }
     }
 
-    /// The parts of a symbol that stands for a selection of [`ExprPool::slope`]: test, value where the
-    /// test is zero, value elsewhere.
+    /// The parts of a symbol that stands for a selection of [`ExprPool::slope`]: test, value where the test is zero,
+    /// value elsewhere.
     pub fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
         match self.symbols[symbol.index()].meaning {
             Meaning::Selection(parts) => Some(parts),
@@ -286,8 +284,8 @@ impl ExprPool {
         }
     }
 
-    /// The terms of a sum in canonical order, each as `(coefficient, rest)`; anything else is a
-    /// sum of one term, and zero of none.
+    /// The terms of a sum in canonical order, each as `(coefficient, rest)`; anything else is a sum of one term, and
+    /// zero of none.
     pub fn terms_of(&self, expr: ExprId) -> Vec<(Number, ExprId)> {
         if expr == ExprId::ZERO {
             return Vec::new();

@@ -1,8 +1,8 @@
-//! Substitution, multiplying out within limits, and rewriting level by level: sums, products and integer powers on one side, what is inside
-//! functions and other powers on the other.
+//! Substitution, multiplying out within limits, and rewriting level by level: sums, products and integer powers on one
+//! side, what is inside functions and other powers on the other.
 //!
-//! A *region* is what can be reached from an expression through sums, products and integer powers.
-//! Function calls and other powers are its atoms; their arguments are regions of their own.
+//! A *region* is what can be reached from an expression through sums, products and integer powers. Function calls and
+//! other powers are its atoms; their arguments are regions of their own.
 
 use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number, SymbolId};
 
@@ -136,9 +136,8 @@ impl ExprPool {
         self.pow_number(value, Number::integer(exponent))
     }
 
-    /// `expr` with every symbol of `replacements` replaced, all at once: replacements are not
-    /// searched for symbols again, so `x` and `y` can be exchanged. The first entry of a symbol
-    /// counts.
+    /// `expr` with every symbol of `replacements` replaced, all at once: replacements are not searched for symbols
+    /// again, so `x` and `y` can be exchanged. The first entry of a symbol counts.
     pub fn substitute(&mut self, expr: ExprId, replacements: &[(SymbolId, ExprId)]) -> ExprId {
         self.substitute_all(&[expr], replacements)[0]
     }

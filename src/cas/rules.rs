@@ -1,8 +1,8 @@
-//! Identities of exponentials, logarithms and roots, and where each is applied; those of tangents,
-//! magnitudes and signs are in `factors`.
+//! Identities of exponentials, logarithms and roots, and where each is applied; those of tangents, magnitudes and signs
+//! are in `factors`.
 //!
-//! Rules come in two directions: towards a normal form in which equal expressions coincide, and
-//! towards fewer function calls. Each is an identity wherever its left side has a value:
+//! Rules come in two directions: towards a normal form in which equal expressions coincide, and towards fewer function
+//! calls. Each is an identity wherever its left side has a value:
 //!
 //! | normal form | |
 //! |---|---|

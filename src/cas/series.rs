@@ -240,8 +240,7 @@ impl Germs<'_> {
         Ok(Some(coefficient.unwrap_or(ExprId::ZERO)))
     }
 
-    /// The value at `t = 0` and the terms that vanish there; the leading coefficient as an error where there is
-    /// a pole.
+    /// The value at `t = 0` and the terms that vanish there; the leading coefficient as an error where there is a pole.
     pub(super) fn split(
         &mut self,
         mut series: Series,

@@ -179,8 +179,8 @@ impl ExprPool {
         form
     }
 
-    /// Whether a symbol went when fractions in a divisor were put together, and did not without rounding:
-    /// `0.3/(0.7 + 0.3/(0.7 + x))`, nested deep, would become 0.3, which it is not where `x` is -1. Without a proof up to
+    /// Whether a symbol went when fractions in a divisor were put together, and did not without rounding: `0.3/(0.7 +
+    /// 0.3/(0.7 + x))`, nested deep, would become 0.3, which it is not where `x` is -1. Without a proof up to
     /// [`PROVEN_LEVELS`] it counts as rounding.
     fn is_lost_by_rounding(&self, before: ExprId, form: ExprId) -> bool {
         if self.have_same_symbols(before, form) {

@@ -1,12 +1,12 @@
 //! Derivatives that have values wherever the function has slopes.
 //!
-//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish. The slope of
-//! an expression is the derivative, where it exists; otherwise the limit of slopes from above, or from below where there
-//! are no values above, which may be infinite. A jump itself adds nothing.
+//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish. The slope
+//! of an expression is the derivative, where it exists; otherwise the limit of slopes from above, or from below where
+//! there are no values above, which may be infinite. A jump itself adds nothing.
 //!
-//! Selections decide at run time which applies: the derivative by the rules where no argument of a root, magnitude, sign
-//! or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a difference of
-//! values replaces a derivative that is not a number.
+//! Selections decide at run time which applies: the derivative by the rules where no argument of a root, magnitude,
+//! sign or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a
+//! difference of values replaces a derivative that is not a number.
 
 use std::cmp::Ordering;
 
@@ -198,8 +198,8 @@ enum Outcome {
 }
 
 impl ExprPool {
-    /// The slope of `expr` by `symbol`: its derivative, with selections where that has no value although
-    /// `expr` has; see the module. To be evaluated, not to be differentiated or rewritten.
+    /// The slope of `expr` by `symbol`: its derivative, with selections where that has no value although `expr` has;
+    /// see the module. To be evaluated, not to be differentiated or rewritten.
     pub fn slope(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
         self.full_slope(expr, symbol).expr
     }

@@ -43,8 +43,8 @@ pub struct EquationComparison {
 pub enum Verdict {
     /// Proven equal wherever both have a value.
     Equal,
-    /// Proven equal but for the rounding of printed decimals, which moves coefficients of the
-    /// normal form by at most this.
+    /// Proven equal but for the rounding of printed decimals, which moves coefficients of the normal form by at most
+    /// this.
     EqualAsPrinted(f64),
     /// Different at a point.
     Different(Difference),
@@ -61,8 +61,8 @@ pub struct Difference {
     pub gap: Gap,
     /// Terms with different coefficients as the files write them, largest difference first.
     pub terms: Vec<TermDifference>,
-    /// Whether the terms differ by more than the rounding of their own coefficients, but not by
-    /// more than that of all coefficients at any one point that was tried.
+    /// Whether the terms differ by more than the rounding of their own coefficients, but not by more than that of all
+    /// coefficients at any one point that was tried.
     pub beside_rounding: bool,
 }
 

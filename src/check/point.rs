@@ -8,8 +8,7 @@ use chacha20::rand_core::{Rng, SeedableRng};
 use super::domain::CheckDomain;
 use crate::symbolic::{ExprId, ExprPool, Interval, SymbolId};
 
-/// Points that are tried without a proof of equality, and with one, where they only show where
-/// both sides have values.
+/// Points that are tried without a proof of equality, and with one, where they only show where both sides have values.
 const POINTS: usize = 3_000;
 const POINTS_OF_EQUALS: usize = 64;
 const ENOUGH: usize = 200;
@@ -86,8 +85,8 @@ pub(super) struct Sides<'s> {
     pub(super) guards: [&'s [ExprId]; 2],
 }
 
-/// Tries points of a fixed sequence: all variables at once, and single groups of them with the
-/// others zero, so that one small term can be seen beside large ones. The last point has zeros alone.
+/// Tries points of a fixed sequence: all variables at once, and single groups of them with the others zero, so that one
+/// small term can be seen beside large ones. The last point has zeros alone.
 pub(super) fn search(
     sides: &Sides<'_>,
     phase: &str,

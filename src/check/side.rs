@@ -93,8 +93,8 @@ pub(crate) fn read_sides(
 }
 
 impl Side {
-    /// Reads a file in memory; the ending of its name says what it is. `known` are names of phases
-    /// that labels of LaTeX may end in, besides `contact` and `flight`.
+    /// Reads a file in memory; the ending of its name says what it is. `known` are names of phases that labels of LaTeX
+    /// may end in, besides `contact` and `flight`.
     ///
     /// # Errors
     /// [`CheckError`].
@@ -188,8 +188,8 @@ impl Side {
         pool.parse_defined(text, &known, &literal, ParseLimits::default())
     }
 
-    /// A decimal as it is written. Integers are numbers of the pool, and multiples of 1/2 of exact
-    /// files, which floats hold exactly. Decimals of 17 digits or more are the shortest one of the same float.
+    /// A decimal as it is written. Integers are numbers of the pool, and multiples of 1/2 of exact files, which floats
+    /// hold exactly. Decimals of 17 digits or more are the shortest one of the same float.
     fn decimal(&self, pool: &mut ExprPool, number: &str) -> Option<ExprId> {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
             return None;
@@ -209,8 +209,8 @@ impl Side {
         pool.decimal(&text, is_rounded)
     }
 
-    /// Builds a right side, with symbols for decimals, and its guards; where a model's `floats` count as rounded, those of as many digits
-    /// as floats have stand for all numbers near them.
+    /// Builds a right side, with symbols for decimals, and its guards; where a model's `floats` count as rounded, those
+    /// of as many digits as floats have stand for all numbers near them.
     pub(super) fn build(
         &self,
         right_side: &RightSide,

@@ -1,4 +1,5 @@
-//! Where a command may write: its output says its format by its ending, and is none of the files that the command reads.
+//! Where a command may write: its output says its format by its ending, and is none of the files that the command
+//! reads.
 
 use super::args::ReadingArguments;
 use super::*;
@@ -17,8 +18,8 @@ impl Format {
     pub(super) const PAGE: Self = Self(&[".html", ".htm"]);
 }
 
-/// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as it
-/// is when the command begins.
+/// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as
+/// it is when the command begins.
 #[derive(Debug, Default)]
 pub(super) struct Inputs<'a>(Vec<&'a Path>, Option<Emitted>);
 

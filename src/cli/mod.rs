@@ -1,9 +1,8 @@
 //! The command line: arguments come in, text or one JSON object leaves.
 //!
-//! Each command is a file with one function from its arguments to an [`Answer`]; [`run`] prints the
-//! answer and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
-//! to stdout; progress, warnings and errors go to stderr. Start with [`args`]. What this file
-//! imports is what every command imports with `use super::*`.
+//! Each command is a file with one function from its arguments to an [`Answer`]; [`run`] prints the answer and picks
+//! the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go to stdout; progress, warnings and
+//! errors go to stderr. Start with [`args`]. What this file imports is what every command imports with `use super::*`.
 
 pub mod args;
 mod check;
@@ -81,8 +80,8 @@ pub fn run() -> ExitCode {
     ExitCode::from(run_with(std::env::args_os()))
 }
 
-/// The same with the arguments of another program that has the command line in it, the first of them its name;
-/// returns the exit code.
+/// The same with the arguments of another program that has the command line in it, the first of them its name; returns
+/// the exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,

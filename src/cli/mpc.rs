@@ -13,8 +13,8 @@ use crate::report::{
 };
 use crate::robot::{JOINT_DIM, Robot};
 
-/// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there, or
-/// if most steps along one of them have no plan.
+/// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there,
+/// or if most steps along one of them have no plan.
 pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
@@ -138,8 +138,8 @@ pub(super) fn runs_json(runs: &[NamedRun]) -> Vec<Value> {
 
 /// One run: figures that depend on the dynamics, and what happened.
 ///
-/// `steps` to `prepare_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded inputs:
-/// none of these depends on whether the dynamics are right.
+/// `steps` to `prepare_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded
+/// inputs: none of these depends on whether the dynamics are right.
 fn run_json((path, run): &NamedRun) -> Value {
     let summary = &run.summary;
     let mut value = json!({

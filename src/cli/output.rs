@@ -123,8 +123,8 @@ pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
     (mismatch::notes(recording, robot).iter()).for_each(|found| note(found));
 }
 
-/// Prints on stderr which recordings are given twice, under whatever name: a jump in two sets judges nothing, and one that
-/// counts twice says less than two.
+/// Prints on stderr which recordings are given twice, under whatever name: a jump in two sets judges nothing, and one
+/// that counts twice says less than two.
 pub(super) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
     let of_set = |(set, paths): &(_, Vec<_>)| paths.iter().map(|path| (*set, *path)).collect();

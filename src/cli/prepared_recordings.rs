@@ -124,8 +124,8 @@ impl RecordedSets {
         })
     }
 
-    /// Reports on stderr which files have implausible samples, or legs on the ground near a singularity, and what became
-    /// of them.
+    /// Reports on stderr which files have implausible samples, or legs on the ground near a singularity, and what
+    /// became of them.
     pub(super) fn report_findings(&self) {
         self.sets[0]
             .reading

@@ -27,8 +27,8 @@ pub(super) struct Outcome {
     domain_files: Vec<String>,
 }
 
-/// Simplifies a model as typed, over the ranges of one TOML file or the box around all samples of recordings; nothing if
-/// no domain was given.
+/// Simplifies a model as typed, over the ranges of one TOML file or the box around all samples of recordings; nothing
+/// if no domain was given.
 pub(super) fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
@@ -117,8 +117,7 @@ impl Outcome {
         Ok(())
     }
 
-    /// How coefficients are printed unless digits are given: in full if simplification has already
-    /// chosen their digits.
+    /// How coefficients are printed unless digits are given: in full if simplification has already chosen their digits.
     pub(super) fn rounding(&self) -> Rounding {
         match self.certificate.n_changes() {
             0 => Rounding::default(),

@@ -91,9 +91,9 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
 
 /// One row per sample: time, phase, recorded and predicted latent state and coordinates.
 ///
-/// Columns: `segment, time, phase`, then `z_i, z_i_full, z_i_restarted` for each latent coordinate, the same
-/// three of its velocity `dz_i`, the latent input `u_lat_i`, then the three of every robot coordinate
-/// in SI units. A prediction that diverged leaves its cell empty.
+/// Columns: `segment, time, phase`, then `z_i, z_i_full, z_i_restarted` for each latent coordinate, the same three of
+/// its velocity `dz_i`, the latent input `u_lat_i`, then the three of every robot coordinate in SI units. A prediction
+/// that diverged leaves its cell empty.
 fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Table, Error> {
     let thrice = |name: String| ["", "_full", "_restarted"].map(|kind| format!("{name}{kind}"));
     let latent = |name: &'static str| numbered(name, model.latent_dim());

@@ -225,8 +225,8 @@ fn seed_table(report: &TrainReport) -> String {
     format!("\n{table}")
 }
 
-/// A note if rollouts of whole jumps end up further off than a body would be that stays where each jump starts: root mean
-/// squares over all samples of the body's error forwards and upwards, and of its way from the start.
+/// A note if rollouts of whole jumps end up further off than a body would be that stays where each jump starts: root
+/// mean squares over all samples of the body's error forwards and upwards, and of its way from the start.
 fn whole_jump_note(metrics: &SetMetrics, set: &str, recordings: &[Recording]) -> Option<String> {
     let (mut squares, mut samples) = (0.0, 0);
     for segment in recordings.iter().flat_map(|recording| &recording.segments) {

@@ -106,8 +106,8 @@ impl TrainSettings {
         Ok(options)
     }
 
-    /// Sets the actuators that are identified from the first training recordings, if the settings want those; where there
-    /// are none, a note on stderr says so.
+    /// Sets the actuators that are identified from the first training recordings, if the settings want those; where
+    /// there are none, a note on stderr says so.
     ///
     /// # Errors
     /// [`IdentifyError::Contradiction`] for recordings that are not of one robot, also where no actuators are wanted.
@@ -231,8 +231,8 @@ impl TrainSettings {
         self.given().into_iter().map(flag).collect()
     }
 
-    /// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a filter,
-    /// and named coordinates where a method learns others.
+    /// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a
+    /// filter, and named coordinates where a method learns others.
     pub(super) fn check_pairs(&self) -> Result<(), Error> {
         let (method, is_linear) = (self.method(), self.maps().is_linear());
         let given = |names, when: bool| self.first(names).filter(|_| when);
@@ -291,8 +291,8 @@ impl TrainSettings {
         fault.map_or(Ok(()), |fault| Err(fault.into()))
     }
 
-    /// The first setting that this training does not depend on, in words: two named coordinates are those of the
-    /// centre of mass, which nothing searches, and the search of the closed form ends in one model from every start.
+    /// The first setting that this training does not depend on, in words: two named coordinates are those of the centre
+    /// of mass, which nothing searches, and the search of the closed form ends in one model from every start.
     pub(super) fn without_effect(&self, options: &TrainOptions) -> Option<String> {
         let is_held = options.coordinates() == Coordinates::Named && options.latent_dim == 2;
         let searched = self.first("lift-weight body-weight no-rotation");

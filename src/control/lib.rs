@@ -1,6 +1,8 @@
-//! Latent-space model-predictive control: the stage problem, its solvers, and the controller from a measured state to torques.
+//! Latent-space model-predictive control: the stage problem, its solvers, and the controller from a measured state to
+//! torques.
 //!
-//! Generated controllers hold these very sources and those of `romc-robot`. `romc` re-exports every module; depend on that.
+//! Generated controllers hold these very sources and those of `romc-robot`. `romc` re-exports every module; depend on
+//! that.
 
 use romc_robot as robot;
 

@@ -70,8 +70,8 @@ pub struct EmitOptions {
     pub plan: Option<PlannedJump>,
 }
 
-/// The files of the chosen targets, each with its path below the output folder; a target that is chosen
-/// twice gives them once.
+/// The files of the chosen targets, each with its path below the output folder; a target that is chosen twice gives
+/// them once.
 ///
 /// Equal equations and options give equal bytes. Controllers compute in the scaled units of the model's maps, whatever
 /// the units of the equations.

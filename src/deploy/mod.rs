@@ -1,11 +1,11 @@
 //! A model to files: the targets of `romc compile`, and the controller as a crate.
 //!
-//! [`Equations`](crate::equations::Equations) enter [`emit()`]; files in memory leave, which [`write_files`](crate::files::write_files) puts
-//! into a folder. Equations come from `typeset`, code from `codegen`; `controller` adds the sources of
-//! `mpc/online` and `robot` and the model's numbers. Read `emit` first.
+//! [`Equations`](crate::equations::Equations) enter [`emit()`]; files in memory leave, which
+//! [`write_files`](crate::files::write_files) puts into a folder. Equations come from `typeset`, code from `codegen`;
+//! `controller` adds the sources of `mpc/online` and `robot` and the model's numbers. Read `emit` first.
 
-/// Templates of whole files, each a struct of its first line and the `Facts` of its module. The caller
-/// writes the derive: askama looks for files from where it stands.
+/// Templates of whole files, each a struct of its first line and the `Facts` of its module. The caller writes the
+/// derive: askama looks for files from where it stands.
 macro_rules! templates {
     (#[$derive:meta] $($template:ident: $path:tt),* $(,)?) => {
         templates! { @each [#[$derive]] $($template: $path),* }

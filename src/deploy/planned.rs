@@ -72,8 +72,8 @@ impl PlannedJump {
         self.select(&samples)
     }
 
-    /// The longest part for which a model has phases; all of it where there is no such part, which the
-    /// controller then refuses.
+    /// The longest part for which a model has phases; all of it where there is no such part, which the controller then
+    /// refuses.
     pub(super) fn within(self, model: &ReducedModel) -> Self {
         let all: Vec<usize> = (0..self.time_s.len()).collect();
         let parts = all.split(|&k| model.phase_for(self.feet[k]).is_none());

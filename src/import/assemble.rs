@@ -199,8 +199,8 @@ impl<'a> Assembly<'a, '_> {
         Ok((library, phases))
     }
 
-    /// Brings the rows of coefficients over a standard library from the file's order into romc's;
-    /// returns the terms in the file's order.
+    /// Brings the rows of coefficients over a standard library from the file's order into romc's; returns the terms in
+    /// the file's order.
     fn sort_terms(
         &mut self,
         library: &Library,

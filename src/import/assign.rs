@@ -54,8 +54,8 @@ pub(super) fn assign<'f>(
     })
 }
 
-/// The tensors with names of parts that `--map` does not settle: it settles all weights of a map at once. Factors beside
-/// `--scaling` are not settled: they are refused.
+/// The tensors with names of parts that `--map` does not settle: it settles all weights of a map at once. Factors
+/// beside `--scaling` are not settled: they are refused.
 fn named<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
@@ -187,8 +187,8 @@ fn phases(
     used: &[Assigned<'_>],
 ) -> Result<Vec<PhaseRule>, ImportError> {
     let mut rules = options.phases.clone();
-    // Sorted by name; the rule `any` takes every pattern with a foot down, so that the order of the
-    // two known phases is free.
+    // Sorted by name; the rule `any` takes every pattern with a foot down, so that the order of the two known phases is
+    // free.
     for assigned in used {
         if let Role::Xi(name) = &assigned.role
             && options.given(name).is_none()

@@ -10,8 +10,8 @@
 //! ...
 //! ```
 //!
-//! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase,
-//! which `--phase` names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
+//! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase, which `--phase`
+//! names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
 
 use super::ImportError;
 use super::pysindy::tokens;

@@ -80,8 +80,8 @@ pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String
     fitting.map(standard_text).collect()
 }
 
-/// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or
-/// one term per line (`#` starts a comment).
+/// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or one term per line
+/// (`#` starts a comment).
 ///
 /// # Errors
 /// [`ImportError`] with line and column.

@@ -1,9 +1,9 @@
 //! NumPy's `.npz`: a zip file of `.npy` arrays.
 //!
-//! Only headers are read until an array is asked for, and then no more bytes are unpacked than its
-//! header announces: a small file cannot fill the memory. An array is `\x93NUMPY`, two bytes of the
-//! version (1 to 3), the length of the rest (2 or 4 bytes, little endian), and a Python dictionary:
-//! `{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }`.
+//! Only headers are read until an array is asked for, and then no more bytes are unpacked than its header announces: a
+//! small file cannot fill the memory. An array is `\x93NUMPY`, two bytes of the version (1 to 3), the length of the
+//! rest (2 or 4 bytes, little endian), and a Python dictionary: `{'descr': '<f8', 'fortran_order': False, 'shape': (18,
+//! 4), }`.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -79,8 +79,8 @@ fn numbers(
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, e))?;
     let member = (archive.by_index(info.member)).map_err(|error| refused(error.to_string()))?;
     let mut unpacked = Vec::new();
-    // One byte more than needed reveals an array that is too long; it also reaches the end of the
-    // member, where the checksum is compared.
+    // One byte more than needed reveals an array that is too long; it also reaches the end of the member, where the
+    // checksum is compared.
     (member.take((info.start + length + 1) as u64))
         .read_to_end(&mut unpacked)
         .map_err(|error| refused(error.to_string()))?;

@@ -226,16 +226,16 @@ pub struct ImportOptions {
     pub robot: Option<&'static Robot>,
     /// Axes of the force and moment in the inputs that the model was trained with; needs the robot.
     pub wrench_frame: WrenchFrame,
-    /// What the joints take of the motors' torques in the inputs that the model was trained with, `None`
-    /// for the motors' torques as they are; needs the robot.
+    /// What the joints take of the motors' torques in the inputs that the model was trained with, `None` for the
+    /// motors' torques as they are; needs the robot.
     pub actuators: Option<Actuators>,
     /// Sampling period of the training recordings, s.
     pub sample_time_s: Option<f64>,
 }
 
 impl ImportOptions {
-    /// Options with the scale factors of states and of inputs, each none, one, or one per coordinate;
-    /// inputs have those of the states where tensors bring neither.
+    /// Options with the scale factors of states and of inputs, each none, one, or one per coordinate; inputs have those
+    /// of the states where tensors bring neither.
     pub fn of_factors(state: &[f64], input: &[f64]) -> Self {
         let factors = |given: &[f64]| match given {
             [factor] => ScaleFactors::Uniform(*factor),
@@ -272,8 +272,8 @@ impl ImportOptions {
         self.phases.iter().position(|rule| rule.name == phase)
     }
 
-    /// The rule of a phase: as given, or for `contact` and `flight` as usual. `found` is what of
-    /// the file belongs to it.
+    /// The rule of a phase: as given, or for `contact` and `flight` as usual. `found` is what of the file belongs to
+    /// it.
     pub(super) fn feet_of(
         &self,
         file: &str,

@@ -5,9 +5,9 @@ use crate::symbolic::Function;
 
 /// A list of terms in romc's grammar; terms that are in it already stay as they are.
 ///
-/// Operands with a space between them are multiplied. Where a list has names `x0`, `x1`, ..., as
-/// PySINDy has, these are the latent coordinates and then their velocities, and `u0` is `u1`; where
-/// they end in `x{2d}`, they and `u1` are counted from one. Else what was found and expected.
+/// Operands with a space between them are multiplied. Where a list has names `x0`, `x1`, ..., as PySINDy has, these are
+/// the latent coordinates and then their velocities, and `u0` is `u1`; where they end in `x{2d}`, they and `u1` are
+/// counted from one. Else what was found and expected.
 pub(super) fn readable(
     terms: &[String],
     latent_dim: usize,

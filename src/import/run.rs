@@ -138,8 +138,8 @@ fn sections(
     Err(ImportError::option("--symbols", found, expected))
 }
 
-/// Reads the equations of a file in memory. `symbols` are LaTeX's names of variables, `known`
-/// names of phases that its labels may end in.
+/// Reads the equations of a file in memory. `symbols` are LaTeX's names of variables, `known` names of phases that its
+/// labels may end in.
 ///
 /// # Errors
 /// [`ImportError`] with the place of what cannot be read.

@@ -136,8 +136,8 @@ impl<'b> TensorFile<'b> {
         self.refused(Place::Whole, found, expected)
     }
 
-    /// The numbers of a tensor for one use, which `place` names in errors; all are finite, and as
-    /// many as the matrix has.
+    /// The numbers of a tensor for one use, which `place` names in errors; all are finite, and as many as the matrix
+    /// has.
     pub(super) fn read(
         &self,
         info: &TensorInfo,

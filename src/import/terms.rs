@@ -1,8 +1,7 @@
 //! Separates equations into candidate terms and their coefficients.
 //!
-//! A coefficient is the number in front of a term, bit for bit as it is written; sums inside a
-//! product with a number are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums
-//! stay one term (`z1*(1 + dz1)`).
+//! A coefficient is the number in front of a term, bit for bit as it is written; sums inside a product with a number
+//! are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums stay one term (`z1*(1 + dz1)`).
 
 use std::collections::HashMap;
 
@@ -48,8 +47,8 @@ fn multiply(a: Number, b: Number) -> Option<Number> {
     }
 }
 
-/// Sorts terms as the standard library does: constant, z, dz, monomials by degree, sin z, sin dz,
-/// cos z, cos dz, anything else, u.
+/// Sorts terms as the standard library does: constant, z, dz, monomials by degree, sin z, sin dz, cos z, cos dz,
+/// anything else, u.
 pub(super) fn sort(pool: &ExprPool, latent_dim: usize, terms: &mut [ExprId]) {
     let key = |expr: &ExprId| Key::of(pool, latent_dim, *expr);
     terms.sort_by(|a, b| key(a).cmp(&key(b)).then_with(|| pool.compare(*a, *b)));

@@ -1,4 +1,5 @@
-//! Reduced-order models of legged robots as data: robots, maps, candidate terms, coefficients, and the files that hold them.
+//! Reduced-order models of legged robots as data: robots, maps, candidate terms, coefficients, and the files that hold
+//! them.
 //!
 //! `romc` re-exports every module; depend on that.
 

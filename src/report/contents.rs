@@ -38,8 +38,8 @@ pub(crate) struct JumpFigures {
     /// The robot recorded and predicted, as a strip for paper and animated.
     pub motion: Option<(Figure, Film)>,
     pub body: Figure,
-    /// Figures to fold away, each with a title: accelerations, template models, joints, and the controller's run if this
-    /// is the first jump of a recording.
+    /// Figures to fold away, each with a title: accelerations, template models, joints, and the controller's run if
+    /// this is the first jump of a recording.
     pub folded: Vec<(&'static str, Figure)>,
 }
 
@@ -124,8 +124,8 @@ fn encoder(
     Ok(figure.in_columns(1, (120.0 + 40.0 * d.min(18) as f64, 330.0)))
 }
 
-/// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard deviation
-/// over the seeds to either side.
+/// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard
+/// deviation over the seeds to either side.
 pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
     let legend = [
         (Role::Recorded, "mean over seeds"),

@@ -1,5 +1,5 @@
-//! Figures of the controller's runs: torques beside the recorded ones and the limits, latent inputs,
-//! latent tracking, solve times.
+//! Figures of the controller's runs: torques beside the recorded ones and the limits, latent inputs, latent tracking,
+//! solve times.
 
 use super::jump::JumpName;
 use super::*;

@@ -1,4 +1,5 @@
-//! A report's first words: what the model is fit for, which robot and recordings, whether its training saw them, errors.
+//! A report's first words: what the model is fit for, which robot and recordings, whether its training saw them,
+//! errors.
 
 use std::collections::BTreeSet;
 

@@ -101,8 +101,8 @@ impl<'a> Jump<'a> {
             .collect()
     }
 
-    /// The robot as it moved and as the model predicts it over the whole jump, as a strip and as an animation; none for a
-    /// model without a robot.
+    /// The robot as it moved and as the model predicts it over the whole jump, as a strip and as an animation; none for
+    /// a model without a robot.
     pub(crate) fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
         let robot = self.model.robot().ok()?;
         let segment = self.run.segment;

@@ -1,9 +1,9 @@
 //! A one-page assessment of a model, its tables and its figures.
 //!
-//! An assessment and controller runs come in; a self-contained HTML page and figures leave.
-//! `introduction.rs` has the first words, `tables.rs` holds the tables, `json.rs` the same numbers for programs, `contents.rs` and
-//! `jump.rs` pick what is drawn, `figures/` draws it, `sections.rs` and `page.rs` place all. Start with `page.rs`. What this
-//! file imports is what its files import with `use super::*`.
+//! An assessment and controller runs come in; a self-contained HTML page and figures leave. `introduction.rs` has the
+//! first words, `tables.rs` holds the tables, `json.rs` the same numbers for programs, `contents.rs` and `jump.rs` pick
+//! what is drawn, `figures/` draws it, `sections.rs` and `page.rs` place all. Start with `page.rs`. What this file
+//! imports is what its files import with `use super::*`.
 
 mod contents;
 mod control;

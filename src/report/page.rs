@@ -18,8 +18,8 @@ const WIDTH_EM: f64 = 44.0;
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PageOptions {
-    /// Effects of simplification within several tolerances, and every change of the chosen one; tables without rows
-    /// are left out.
+    /// Effects of simplification within several tolerances, and every change of the chosen one; tables without rows are
+    /// left out.
     pub simplification: Vec<Table>,
     pub commands: Vec<String>,
 }

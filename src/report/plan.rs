@@ -1,5 +1,5 @@
-//! Figures of a planned jump: posture over time, path of the body, torques within their limits,
-//! phases; and of all the jumps that can be planned.
+//! Figures of a planned jump: posture over time, path of the body, torques within their limits, phases; and of all the
+//! jumps that can be planned.
 
 use super::*;
 use crate::model::JumpPrior;

@@ -1,9 +1,8 @@
 //! What the joints take from a motor's torque before it moves a leg.
 //!
-//! A motor that commands `tau` turns a link with the net torque
-//! `tau - b dq - c tanh(dq / v) - I ddq`: viscous friction, dry friction, and
-//! the rotor's inertia seen through the gear (the armature). The dry part is
-//! smooth around standstill, with `v` = [`DRY_SPEED_RAD_S`].
+//! A motor that commands `tau` turns a link with the net torque `tau - b dq - c tanh(dq / v) - I ddq`: viscous
+//! friction, dry friction, and the rotor's inertia seen through the gear (the armature). The dry part is smooth around
+//! standstill, with `v` = [`DRY_SPEED_RAD_S`].
 
 use super::joints::{JOINT_DIM, LEG_JOINT_DIM};
 
@@ -52,8 +51,8 @@ impl Actuators {
         })
     }
 
-    /// What the joints take at velocities `dq` (rad/s) and accelerations `ddq`
-    /// (rad/s^2), in N m: `b dq + c tanh(dq / v) + I ddq`.
+    /// What the joints take at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2), in N m: `b dq + c tanh(dq /
+    /// v) + I ddq`.
     #[must_use]
     pub fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         std::array::from_fn(|i| {

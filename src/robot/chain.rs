@@ -1,9 +1,9 @@
 //! One leg of three joints with any axes: a chain of rotations and links.
 //!
-//! At the zero posture the axes `a_0, a_1, a_2` and the links `l_1` (first to second joint), `l_2`
-//! (second to third) and `l_3` (third to foot) are given along the body's axes. With the turn
-//! `R_i = R(a_i, q_i)` of each joint the foot is at `p = R_0 (l_1 + R_1 (l_2 + R_2 l_3))` from the
-//! first joint. The last two axes are parallel: both joints move the foot in one plane.
+//! At the zero posture the axes `a_0, a_1, a_2` and the links `l_1` (first to second joint), `l_2` (second to third)
+//! and `l_3` (third to foot) are given along the body's axes. With the turn `R_i = R(a_i, q_i)` of each joint the foot
+//! is at `p = R_0 (l_1 + R_1 (l_2 + R_2 l_3))` from the first joint. The last two axes are parallel: both joints move
+//! the foot in one plane.
 
 use core::ops::{Add, Mul, Sub};
 
@@ -109,17 +109,16 @@ impl ChainLeg {
         [1, 2].map(|link: usize| axis.cross(&Vector3::from(self.links[link])).norm())
     }
 
-    /// Area that thigh and calf span, with its sign, in m^2, and lever of the first joint along the
-    /// normal of their plane, in m; their product is `det J`.
+    /// Area that thigh and calf span, with its sign, in m^2, and lever of the first joint along the normal of their
+    /// plane, in m; their product is `det J`.
     pub fn levers(&self, q: &[f64; 3]) -> [f64; 2] {
         self.moved(q).levers()
     }
 
-    /// `-J^-T` with levers that are never shorter than the damping lets them be, or none where
-    /// neither is that short.
+    /// `-J^-T` with levers that are never shorter than the damping lets them be, or none where neither is that short.
     ///
-    /// With the columns `c_j` of the Jacobian, the normal `n`, the area `A = (c_1 x c_2) . n` and the
-    /// lever `u = c_0 . n` the columns of `J^-T` are
+    /// With the columns `c_j` of the Jacobian, the normal `n`, the area `A = (c_1 x c_2) . n` and the lever `u = c_0 .
+    /// n` the columns of `J^-T` are
     ///
     /// ```text
     /// n / u

@@ -11,8 +11,8 @@ use super::joints::Leg;
 pub enum RobotError {
     #[error("unknown robot `{found}`; known: {known}")]
     UnknownRobot { found: String, known: String },
-    /// The leg is so close to full extension (or its foot so close to the axis
-    /// of hip abduction) that torques do not determine a foot force.
+    /// The leg is so close to full extension (or its foot so close to the axis of hip abduction) that torques do not
+    /// determine a foot force.
     #[error(
         "{robot}: leg {leg} is singular at hx {:.4}, hy {:.4}, kn {:.4} rad: \
          normalised determinant {determinant:.2e}, expected at least {bound:.0e}; \

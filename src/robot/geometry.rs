@@ -114,8 +114,7 @@ impl LegGeometry {
         kinematics::volume_m3(self.lengths())
     }
 
-    /// `|det J| / volume`: 0 at full extension or with the foot on the axis of the first joint, at
-    /// most about 1.
+    /// `|det J| / volume`: 0 at full extension or with the foot on the axis of the first joint, at most about 1.
     pub fn manipulability(&self, q: &[f64; 3]) -> f64 {
         match self {
             LegGeometry::Planar(leg) => leg.manipulability(q),
@@ -123,15 +122,14 @@ impl LegGeometry {
         }
     }
 
-    /// Below which the area that thigh and calf span (m^2) and the height of the foot in the plane
-    /// of the leg (m) are damped.
+    /// Below which the area that thigh and calf span (m^2) and the height of the foot in the plane of the leg (m) are
+    /// damped.
     pub fn least_levers(&self) -> [f64; 2] {
         kinematics::least_levers(self.lengths())
     }
 
-    /// Span of thigh and calf over the product of their lengths, and height of the foot over the
-    /// length of the stretched leg, as absolute values: what
-    /// [`LEAST_SPAN`](super::kinematics::LEAST_SPAN) and
+    /// Span of thigh and calf over the product of their lengths, and height of the foot over the length of the
+    /// stretched leg, as absolute values: what [`LEAST_SPAN`](super::kinematics::LEAST_SPAN) and
     /// [`LEAST_HEIGHT`](super::kinematics::LEAST_HEIGHT) are compared with.
     pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
         let [area, lever] = match self {
@@ -150,8 +148,7 @@ impl LegGeometry {
         }
     }
 
-    /// Directions and lengths at the zero posture. The foot's offset from a straight calf is left
-    /// out of a planar leg.
+    /// Directions and lengths at the zero posture. The foot's offset from a straight calf is left out of a planar leg.
     pub fn links(&self) -> LegLinks {
         let mut chain = self.chain();
         if let LegGeometry::Planar(_) = self {

@@ -1,9 +1,8 @@
 //! From a measured sample to the generalised input `u = [tau; F; M]`, the one definition.
 //!
-//! `tau` are the torques at the links: the motor torques less what the joints take
-//! ([`Actuators`]). `F` and `M` follow from them through the feet in contact, in one of two
-//! frames ([`WrenchFrame`]). A model states which rule its inputs were made by; training,
-//! simulation, control and generated code all follow it.
+//! `tau` are the torques at the links: the motor torques less what the joints take ([`Actuators`]). `F` and `M` follow
+//! from them through the feet in contact, in one of two frames ([`WrenchFrame`]). A model states which rule its inputs
+//! were made by; training, simulation, control and generated code all follow it.
 
 use nalgebra::{ArrayStorage, Matrix3, Rotation3, SMatrix, Vector6};
 
@@ -15,14 +14,12 @@ use super::registry::Robot;
 /// Axes of the force and moment in an input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum WrenchFrame {
-    /// As published: axes parallel to the body's, the arm of each moment is the foot in its own hip
-    /// frame.
+    /// As published: axes parallel to the body's, the arm of each moment is the foot in its own hip frame.
     #[default]
     Body,
-    /// The generalised forces of the body's recorded coordinates: the force in world axes, and the
-    /// moments about the body's origin that do work on the rates of roll, pitch and yaw. Their sum
-    /// `F . v + M . (d roll, d pitch, d yaw)` is the power of the feet on the body, which is what
-    /// `W_e^T u_lat` stands for.
+    /// The generalised forces of the body's recorded coordinates: the force in world axes, and the moments about the
+    /// body's origin that do work on the rates of roll, pitch and yaw. Their sum `F . v + M . (d roll, d pitch, d yaw)`
+    /// is the power of the feet on the body, which is what `W_e^T u_lat` stands for.
     World,
 }
 
@@ -87,8 +84,8 @@ impl InputRule {
         self.frame
     }
 
-    /// What the joints take at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2), in N m;
-    /// zero without actuators.
+    /// What the joints take at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2), in N m; zero without
+    /// actuators.
     pub fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         match &self.actuators {
             None => [0.0; JOINT_DIM],
@@ -96,8 +93,8 @@ impl InputRule {
         }
     }
 
-    /// Force and moment on the body `[F; M]`, in N and N m, of the torques at the links `net` (N m)
-    /// at a state `x` (joint angles and attitude count), by the feet in contact.
+    /// Force and moment on the body `[F; M]`, in N and N m, of the torques at the links `net` (N m) at a state `x`
+    /// (joint angles and attitude count), by the feet in contact.
     ///
     /// Near a singularity of a leg its force is damped, see [`Robot::damped_force_map`].
     pub fn wrench(
@@ -115,8 +112,8 @@ impl InputRule {
         })
     }
 
-    /// The 6 x 12 matrix `G` of `[F; M] = G net` at a posture (rad), an attitude (roll, pitch, yaw,
-    /// rad) and a contact; columns of legs in the air are zero.
+    /// The 6 x 12 matrix `G` of `[F; M] = G net` at a posture (rad), an attitude (roll, pitch, yaw, rad) and a contact;
+    /// columns of legs in the air are zero.
     pub fn wrench_map(
         &self,
         joints: &[f64; JOINT_DIM],
@@ -131,8 +128,8 @@ impl InputRule {
     }
 }
 
-/// The product, to the bit as nalgebra has it, which calls a function out of line for each column and factor:
-/// every entry is the sum of its products in their order.
+/// The product, to the bit as nalgebra has it, which calls a function out of line for each column and factor: every
+/// entry is the sum of its products in their order.
 fn product(
     left: &SMatrix<f64, BODY_DIM, BODY_DIM>,
     right: &SMatrix<f64, BODY_DIM, JOINT_DIM>,
@@ -156,9 +153,8 @@ pub fn rotation([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
     Rotation3::from_euler_angles(roll, pitch, yaw).into_inner()
 }
 
-/// From force and moment about the body's origin in the body's axes to the generalised forces of
-/// position and of roll, pitch and yaw: `[R F; E^T M]` with the angular velocity
-/// `E (d roll, d pitch, d yaw)` in the body's axes.
+/// From force and moment about the body's origin in the body's axes to the generalised forces of position and of roll,
+/// pitch and yaw: `[R F; E^T M]` with the angular velocity `E (d roll, d pitch, d yaw)` in the body's axes.
 fn generalised(attitude: [f64; 3]) -> SMatrix<f64, BODY_DIM, BODY_DIM> {
     let [(s_r, c_r), (s_p, c_p)] = [attitude[0].sin_cos(), attitude[1].sin_cos()];
     let rates = Matrix3::new(1.0, 0.0, 0.0, 0.0, c_r, -s_r, -s_p, c_p * s_r, c_p * c_r);

@@ -1,8 +1,7 @@
 //! Names and order of joints, legs and body coordinates.
 //!
-//! One order holds everywhere: legs front right, front left, rear right, rear
-//! left; in each leg hip abduction, hip flexion, knee; then the body's
-//! position and its roll, pitch and yaw.
+//! One order holds everywhere: legs front right, front left, rear right, rear left; in each leg hip abduction, hip
+//! flexion, knee; then the body's position and its roll, pitch and yaw.
 
 use std::fmt;
 

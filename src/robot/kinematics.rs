@@ -1,21 +1,20 @@
 //! One leg of the usual shape: hip abduction about x, hip flexion and knee about y.
 //!
-//! The hip frame has its origin in the leg's hip joint and axes parallel to
-//! the body's: x forward, y left, z up. A positive flexion swings the thigh
-//! backwards, a negative knee angle bends the leg.
+//! The hip frame has its origin in the leg's hip joint and axes parallel to the body's: x forward, y left, z up. A
+//! positive flexion swings the thigh backwards, a negative knee angle bends the leg.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Smallest `|det J|`, divided by [`LegGeometry::volume_m3`](super::LegGeometry::volume_m3), at which torques
-/// still give a foot force: a knee about 1e-3 rad from full extension.
+/// Smallest `|det J|`, divided by [`LegGeometry::volume_m3`](super::LegGeometry::volume_m3), at which torques still
+/// give a foot force: a knee about 1e-3 rad from full extension.
 pub const SINGULAR_BOUND: f64 = 1e-3;
 
-/// Smallest area that thigh and calf span, over the product of their lengths (about the sine of the
-/// knee), at which torques are turned into forces without damping.
+/// Smallest area that thigh and calf span, over the product of their lengths (about the sine of the knee), at which
+/// torques are turned into forces without damping.
 pub const LEAST_SPAN: f64 = 0.3;
 
-/// Smallest height of the foot above or below its hip in the plane of the leg, over the length of
-/// the stretched leg, at which torques are turned into forces without damping.
+/// Smallest height of the foot above or below its hip in the plane of the leg, over the length of the stretched leg, at
+/// which torques are turned into forces without damping.
 pub const LEAST_HEIGHT: f64 = 0.12;
 
 /// Link lengths of a leg.
@@ -34,8 +33,8 @@ pub struct PlanarLeg {
 impl PlanarLeg {
     /// Foot position in the hip frame, in m, at `q` = abduction, flexion, knee.
     ///
-    /// With `h` the hip offset and `r` the height of the foot in the
-    /// plane of the leg, `p = (p_x, h cos hx - r sin hx, h sin hx + r cos hx)`.
+    /// With `h` the hip offset and `r` the height of the foot in the plane of the leg, `p = (p_x, h cos hx - r sin hx,
+    /// h sin hx + r cos hx)`.
     pub fn foot_position(&self, q: &[f64; 3]) -> Vector3<f64> {
         let plane = self.in_plane(q);
         let hip = self.hip_m;
@@ -52,8 +51,7 @@ impl PlanarLeg {
         let plane = self.in_plane(q);
         let hip = self.hip_m;
         let (sin, cos) = q[0].sin_cos();
-        // d(forward)/d(flexion) = up, d(up)/d(flexion) = -forward; the knee
-        // moves only the calf's share of both.
+        // d(forward)/d(flexion) = up, d(up)/d(flexion) = -forward; the knee moves only the calf's share of both.
         Matrix3::new(
             0.0,
             plane.up,
@@ -67,31 +65,29 @@ impl PlanarLeg {
         )
     }
 
-    /// `|det J| / volume`: 0 at full extension or with the foot on the axis of
-    /// abduction, at most about 1.
+    /// `|det J| / volume`: 0 at full extension or with the foot on the axis of abduction, at most about 1.
     ///
-    /// `|det J|` is the area that thigh and calf span times the height of the
-    /// foot in the plane of the leg; the hip offset does not enter.
+    /// `|det J|` is the area that thigh and calf span times the height of the foot in the plane of the leg; the hip
+    /// offset does not enter.
     pub fn manipulability(&self, q: &[f64; 3]) -> f64 {
         let plane = self.in_plane(q);
         let area = plane.forward * plane.calf_up - plane.up * plane.calf_forward;
         (area * plane.up).abs() / volume_m3([self.thigh_m, self.calf_m])
     }
 
-    /// `-J^-T` with levers that are never shorter than the damping lets them be, or none where
-    /// neither knee nor foot is that near a singularity.
+    /// `-J^-T` with levers that are never shorter than the damping lets them be, or none where neither knee nor foot is
+    /// that near a singularity.
     ///
-    /// In the axes `x`, `e = (0, sin hx, -cos hx)`, `n = (0, cos hx, sin hx)` the Jacobian has the
-    /// columns `-h e - up n`, `up x + fwd e` and `c_up x + c_fwd e`, so that `J^T F = -tau` gives
+    /// In the axes `x`, `e = (0, sin hx, -cos hx)`, `n = (0, cos hx, sin hx)` the Jacobian has the columns `-h e - up
+    /// n`, `up x + fwd e` and `c_up x + c_fwd e`, so that `J^T F = -tau` gives
     ///
     /// ```text
     /// F_x = (fwd tau_2 - c_fwd tau_1) / det     F_e = (c_up tau_1 - up tau_2) / det
     /// F_n = (tau_0 - h F_e) / up                det = up c_fwd - fwd c_up
     /// ```
     ///
-    /// Of both divisors `1 / d` becomes `d / max(d^2, least^2)`: equal outside, continuous, and at
-    /// most `1 / least`, with [`LEAST_SPAN`] thigh calf for `det` and [`LEAST_HEIGHT`] (thigh + calf)
-    /// for `up`.
+    /// Of both divisors `1 / d` becomes `d / max(d^2, least^2)`: equal outside, continuous, and at most `1 / least`,
+    /// with [`LEAST_SPAN`] thigh calf for `det` and [`LEAST_HEIGHT`] (thigh + calf) for `up`.
     pub(super) fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
         let plane = self.in_plane(q);
         let det = plane.determinant();
@@ -115,8 +111,7 @@ impl PlanarLeg {
         ]))
     }
 
-    /// Area that thigh and calf span, with its sign, in m^2, and height of the foot in the plane of
-    /// the leg, in m.
+    /// Area that thigh and calf span, with its sign, in m^2, and height of the foot in the plane of the leg, in m.
     pub(super) fn levers(&self, q: &[f64; 3]) -> [f64; 2] {
         let plane = self.in_plane(q);
         [plane.determinant(), plane.up]

@@ -52,9 +52,8 @@ impl Robot {
         &self.joint_names
     }
 
-    /// How a joint's angle on the left, mirrored, reads on the right: 1 where both turn alike in a
-    /// mirrored motion (the usual flexions), -1 where they turn against each other (abductions
-    /// about the same axis).
+    /// How a joint's angle on the left, mirrored, reads on the right: 1 where both turn alike in a mirrored motion (the
+    /// usual flexions), -1 where they turn against each other (abductions about the same axis).
     pub fn mirror_sign(&self, joint: usize) -> f64 {
         let of_pair = |leg: Leg| self.geometry(leg).chain().axes[joint % LEG_JOINT_DIM];
         let (left, right) = match joint / LEG_JOINT_DIM < 2 {
@@ -110,8 +109,7 @@ impl Robot {
         self.geometry(leg).foot_jacobian(q)
     }
 
-    /// Names of the state: joints `fr.hx` to `rl.kn`, then `body.x` to
-    /// `body.yaw` (equation 1).
+    /// Names of the state: joints `fr.hx` to `rl.kn`, then `body.x` to `body.yaw` (equation 1).
     pub fn state_names() -> [String; STATE_DIM] {
         joined(&JOINT_NAMES, &BODY_NAMES)
     }
@@ -121,8 +119,7 @@ impl Robot {
         joined(&["rad"; JOINT_DIM], &["m", "m", "m", "rad", "rad", "rad"])
     }
 
-    /// Names of the input: joint torques under the joints' names, then
-    /// `force.x` to `moment.z` (equation 23).
+    /// Names of the input: joint torques under the joints' names, then `force.x` to `moment.z` (equation 23).
     pub fn input_names() -> [String; STATE_DIM] {
         joined(&JOINT_NAMES, &WRENCH_NAMES)
     }

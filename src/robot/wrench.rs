@@ -1,10 +1,9 @@
 //! From joint torques to the force and moment on the body.
 //!
-//! Equation 4 with the sign of a reaction: the feet push the ground with
-//! `J^-T tau`, the ground pushes the body with `F_k = -J_k^-T tau_k`. Forces are
-//! expressed in axes parallel to the body's, and the arm `x_k` of the moment is
-//! the foot in its own hip frame, as in the recordings the method was published
-//! with; the moment is `x_k x F_k` (the paper prints `F_k x x_k`).
+//! Equation 4 with the sign of a reaction: the feet push the ground with `J^-T tau`, the ground pushes the body with
+//! `F_k = -J_k^-T tau_k`. Forces are expressed in axes parallel to the body's, and the arm `x_k` of the moment is the
+//! foot in its own hip frame, as in the recordings the method was published with; the moment is `x_k x F_k` (the paper
+//! prints `F_k x x_k`).
 
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
 
@@ -20,9 +19,8 @@ impl Robot {
     /// `q` in rad, `tau` in N m: abduction, flexion, knee.
     ///
     /// # Errors
-    /// [`RobotError::SingularLeg`] at full extension (see
-    /// [`SINGULAR_BOUND`]),
-    /// [`RobotError::NotFinite`] for NaN or infinite arguments.
+    /// [`RobotError::SingularLeg`] at full extension (see [`SINGULAR_BOUND`]), [`RobotError::NotFinite`] for NaN or
+    /// infinite arguments.
     pub fn foot_force(
         &self,
         leg: Leg,
@@ -34,8 +32,7 @@ impl Robot {
         Ok(map * Vector3::from(*tau))
     }
 
-    /// The matrix `-J^-T` that takes a leg's torques (N m) to its force on the
-    /// body (N).
+    /// The matrix `-J^-T` that takes a leg's torques (N m) to its force on the body (N).
     pub fn foot_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
         let singular = |determinant| RobotError::SingularLeg {
@@ -57,11 +54,11 @@ impl Robot {
 
     /// As [`Robot::foot_force_map`], for any posture.
     ///
-    /// Near a singularity small torques would mean any force: a stretched knee, or a foot at the
-    /// height of its hip, where the abduction has no lever. There the levers are kept from getting
-    /// shorter than [`LEAST_SPAN`](super::kinematics::LEAST_SPAN) thigh calf over the distance of the
-    /// foot and [`LEAST_HEIGHT`](super::kinematics::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and
-    /// 5 cm; everywhere else the matrix is the exact one.
+    /// Near a singularity small torques would mean any force: a stretched knee, or a foot at the height of its hip,
+    /// where the abduction has no lever. There the levers are kept from getting shorter than
+    /// [`LEAST_SPAN`](super::kinematics::LEAST_SPAN) thigh calf over the distance of the foot and
+    /// [`LEAST_HEIGHT`](super::kinematics::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm; everywhere else the
+    /// matrix is the exact one.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
         match self.geometry(leg).damped_force_map(q) {
@@ -70,8 +67,8 @@ impl Robot {
         }
     }
 
-    /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5
-    /// to 7, 22): sums of `F_k` and of `x_k x F_k` over the feet in contact.
+    /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5 to 7, 22): sums of `F_k` and of `x_k x
+    /// F_k` over the feet in contact.
     pub fn body_wrench(
         &self,
         joints: &[f64; JOINT_DIM],

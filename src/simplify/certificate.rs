@@ -86,8 +86,8 @@ pub struct EquationCertificate {
     /// Root mean square of the model's `ddz` over the recorded samples.
     pub rms: Option<f64>,
     pub allowed: f64,
-    /// Contains `ddz` of the model minus `ddz` of the simplified model at every point of the domain;
-    /// found from the two models, not from the list of changes.
+    /// Contains `ddz` of the model minus `ddz` of the simplified model at every point of the domain; found from the two
+    /// models, not from the list of changes.
     #[serde(serialize_with = "ends")]
     pub bound: Interval,
     /// The sum of the changes' bounds, which contains the same difference.
@@ -104,8 +104,8 @@ pub struct EquationCertificate {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseCertificate {
     pub name: String,
-    /// The box: each variable's name and range. `None` if there is no sample of the phase, so that
-    /// its equations were kept.
+    /// The box: each variable's name and range. `None` if there is no sample of the phase, so that its equations were
+    /// kept.
     #[serde(serialize_with = "ranges")]
     pub domain: Option<Vec<(String, Interval)>>,
     /// Recorded samples in the box, at which errors were measured.
@@ -115,8 +115,8 @@ pub struct PhaseCertificate {
     pub samples_outside: usize,
     /// Operations of the straight-line code of `ddz`; a sine with its cosine counts as two.
     pub operations: BeforeAfter,
-    /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them
-    /// can no longer be used for control.
+    /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them can no longer be
+    /// used for control.
     #[serde(rename = "no_longer_depends_on")]
     pub lost: Vec<LatentVariable>,
     pub equations: Vec<EquationCertificate>,
@@ -124,10 +124,9 @@ pub struct PhaseCertificate {
 
 /// How far a simplified model can differ from the model it was made from, and why.
 ///
-/// For every phase with a domain, every point `(z, dz, u_lat)` of it at which the model is defined,
-/// and every latent coordinate `i`, in real numbers: `ddz_i - ddz_i,simplified` lies in
-/// `EquationCertificate::bound`. The rounding of the floating-point evaluation, about 1e-16 of the
-/// largest summand, comes on top for both models.
+/// For every phase with a domain, every point `(z, dz, u_lat)` of it at which the model is defined, and every latent
+/// coordinate `i`, in real numbers: `ddz_i - ddz_i,simplified` lies in `EquationCertificate::bound`. The rounding of
+/// the floating-point evaluation, about 1e-16 of the largest summand, comes on top for both models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
     /// The requested tolerance.

@@ -1,7 +1,7 @@
 //! Replacements of a term (nothing, a constant, a straight line), and which changes are made to one equation.
 //!
-//! Each change is made to the equation as the changes before it left it, and its error is enclosed
-//! over the box. The errors add, as intervals, to what all changes together may cost.
+//! Each change is made to the equation as the changes before it left it, and its error is enclosed over the box. The
+//! errors add, as intervals, to what all changes together may cost.
 
 use super::certificate::{Change, ChangeKind, Effect};
 use super::ranges::Ranges;
@@ -233,8 +233,7 @@ impl Equation {
         }
     }
 
-    /// Rounds coefficients: what costs least goes first, one digit after another, as long as all
-    /// together fit.
+    /// Rounds coefficients: what costs least goes first, one digit after another, as long as all together fit.
     fn round(&mut self, terms: &mut Terms<'_>, allowed: f64) {
         let mut chosen: Vec<Option<Change>> = vec![None; self.xi.len()];
         // sums of floats select candidates; accepted changes are checked with intervals

@@ -1,4 +1,5 @@
-//! Differences of equations, also of those in print, whose coefficients are rounded: bounds over a box, size at samples.
+//! Differences of equations, also of those in print, whose coefficients are rounded: bounds over a box, size at
+//! samples.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -70,8 +71,8 @@ pub struct PrintedEquation {
     pub phase: String,
     /// Index of the latent coordinate.
     pub output: usize,
-    /// Contains `ddz` of the model minus `ddz` as printed at every point of the domain; `None`
-    /// where the phase has none.
+    /// Contains `ddz` of the model minus `ddz` as printed at every point of the domain; `None` where the phase has
+    /// none.
     pub bound: Option<Interval>,
     /// The same at the recorded samples in the domain.
     pub measured: Option<Measured>,

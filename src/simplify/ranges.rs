@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
-/// Share of a coefficient's size by which constants of the algebra may be off, with room to spare:
-/// a merged or halved float is off by 2^-53.
+/// Share of a coefficient's size by which constants of the algebra may be off, with room to spare: a merged or halved
+/// float is off by 2^-53.
 const CONSTANT_ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
-/// A range counts as sharp when its ends are this close to values of the function, as a share of
-/// its width.
+/// A range counts as sharp when its ends are this close to values of the function, as a share of its width.
 const SHARP: f64 = 1e-3;
 const MAX_BOXES: usize = 64;
 const MAX_VISITS: usize = 50_000;
@@ -45,8 +44,8 @@ impl Ranges {
         self.terms[row]
     }
 
-    /// Centre and half width of each symbol's range that `expr` has, in floating point: where to
-    /// look, not what to prove.
+    /// Centre and half width of each symbol's range that `expr` has, in floating point: where to look, not what to
+    /// prove.
     pub(crate) fn sides(&self, expr: ExprId) -> Vec<(SymbolId, f64, f64)> {
         let sides = self.restricted(expr).into_iter();
         sides
@@ -65,10 +64,9 @@ impl Ranges {
 
     /// All values of `sum delta_j theta_j`, for every choice of the `delta_j` in their intervals.
     ///
-    /// Terms without common variables are independent: their ranges add. Those with common
-    /// variables are bounded together, with the middles of the intervals as coefficients. Where
-    /// those are many, it is sharper to bound together only what has the very same variables;
-    /// both are done.
+    /// Terms without common variables are independent: their ranges add. Those with common variables are bounded
+    /// together, with the middles of the intervals as coefficients. Where those are many, it is sharper to bound
+    /// together only what has the very same variables; both are done.
     pub(crate) fn combination(&mut self, parts: &[Part]) -> Interval {
         let connected = self.sum_of_groups(self.connected(parts));
         let alike = self.sum_of_groups(self.alike(parts));
@@ -133,8 +131,8 @@ impl Ranges {
             .collect()
     }
 
-    /// All values of an expression over the box: bounded over ever smaller parts of the box, the
-    /// parts that reach furthest first, until values of the function come close to the bounds.
+    /// All values of an expression over the box: bounded over ever smaller parts of the box, the parts that reach
+    /// furthest first, until values of the function come close to the bounds.
     pub(crate) fn range(&mut self, expr: ExprId) -> Interval {
         let domain = self.restricted(expr);
         if self.is_single_use(expr) {
@@ -211,8 +209,8 @@ impl Ranges {
             {
                 return false;
             }
-            // shared parts are walked again, which is what counts occurrences; a repeated
-            // symbol ends the walk before that can grow
+            // shared parts are walked again, which is what counts occurrences; a repeated symbol ends the walk before
+            // that can grow
             open.extend(self.pool.children(part));
         }
         true

@@ -19,8 +19,7 @@ pub struct RolloutErrors {
     pub rms: Vec<[Option<f64>; 2]>,
     /// Windows that diverged: whole jumps, restarted.
     pub diverged: [usize; 2],
-    /// Share of the predicted samples outside the domain, where no bound holds: whole jumps,
-    /// restarted.
+    /// Share of the predicted samples outside the domain, where no bound holds: whole jumps, restarted.
     pub outside: [Option<f64>; 2],
 }
 

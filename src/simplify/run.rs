@@ -19,8 +19,7 @@ use crate::model::{LatentVariable, ReducedModel};
 use crate::robot::{BODY_Z, GRAVITY_M_S2};
 use crate::symbolic::{Interval, SymbolId};
 
-/// What the search may use is lowered to this share of itself until the final evaluation confirms
-/// the tolerance.
+/// What the search may use is lowered to this share of itself until the final evaluation confirms the tolerance.
 const RETREAT: f64 = 0.8;
 const MAX_RETREATS: usize = 40;
 /// Relative error of evaluating a sample in floating point, with room to spare.
@@ -29,22 +28,22 @@ const EVALUATION: f64 = 1e-9;
 /// A simplified model and what is known about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simplified {
-    /// The model; equal to the one it was made from if nothing was changed. Its provenance tells
-    /// the tolerance, the digest of the original and the bounds.
+    /// The model; equal to the one it was made from if nothing was changed. Its provenance tells the tolerance, the
+    /// digest of the original and the bounds.
     pub model: ReducedModel,
     /// What was changed and how far that can make `ddz` differ.
     pub certificate: Certificate,
 }
 
-/// Simplifies each equation of each phase as far as `tolerance` allows over `domain`. What exact
-/// simplification did to the equations before is part of the result.
+/// Simplifies each equation of each phase as far as `tolerance` allows over `domain`. What exact simplification did to
+/// the equations before is part of the result.
 ///
-/// `samples` are needed for a tolerance that is a share, and give the measured errors. A zero
-/// tolerance changes nothing.
+/// `samples` are needed for a tolerance that is a share, and give the measured errors. A zero tolerance changes
+/// nothing.
 ///
 /// # Errors
-/// [`SimplifyError::NoSamples`], [`SimplifyError::Domain`] for samples of another model, and the
-/// internal error [`SimplifyError::Contradiction`] if a sample refutes the result.
+/// [`SimplifyError::NoSamples`], [`SimplifyError::Domain`] for samples of another model, and the internal error
+/// [`SimplifyError::Contradiction`] if a sample refutes the result.
 pub fn simplify(
     equations: &Equations<'_>,
     domain: &Domain,
@@ -203,9 +202,8 @@ impl<'a> PhaseProblem<'a> {
         self.xi.column(output).iter().copied().collect()
     }
 
-    /// Simplifies an equation, and encloses its difference from the original anew. Should that
-    /// exceed what is allowed, although the changes' own bounds do not, the search gets less, and in the end the
-    /// equation stays as it is.
+    /// Simplifies an equation, and encloses its difference from the original anew. Should that exceed what is allowed,
+    /// although the changes' own bounds do not, the search gets less, and in the end the equation stays as it is.
     fn search(&self, terms: &mut Terms<'_>, output: usize, allowed: f64) -> (Equation, Interval) {
         let mut budget = allowed;
         for _ in 0..MAX_RETREATS {

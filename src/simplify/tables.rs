@@ -114,8 +114,8 @@ pub(crate) fn lost_words(certificate: &Certificate) -> Vec<String> {
     phases.map(sentence).collect()
 }
 
-/// The certificate of a model and its simplification as a page: totals, changes, effect on rollouts,
-/// what printing rounds, domain.
+/// The certificate of a model and its simplification as a page: totals, changes, effect on rollouts, what printing
+/// rounds, domain.
 #[derive(Template)]
 #[template(path = "simplify/certificate.askama", config = "templates/askama.toml")]
 struct Page<'a> {

@@ -5,12 +5,11 @@ use std::str::FromStr;
 
 use crate::typeset::rounded;
 
-/// The largest |ddz of the model - ddz of the simplified model| at any point of the domain, each
-/// latent coordinate for itself.
+/// The largest |ddz of the model - ddz of the simplified model| at any point of the domain, each latent coordinate for
+/// itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
-    /// A share of the root mean square of that `ddz` over the recorded samples of the phase: 0.01
-    /// for `1%`.
+    /// A share of the root mean square of that `ddz` over the recorded samples of the phase: 0.01 for `1%`.
     ShareOfRms(f64),
     /// In scaled units per second squared.
     Absolute(f64),

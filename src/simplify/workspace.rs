@@ -19,8 +19,8 @@ pub(super) struct Workspace {
 }
 
 impl Workspace {
-    /// The terms of `equations`, extended by `1` and by every variable of those summands that are not affine.
-    /// Where these would be too many for a library, nothing is appended.
+    /// The terms of `equations`, extended by `1` and by every variable of those summands that are not affine. Where
+    /// these would be too many for a library, nothing is appended.
     pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, ModelError> {
         let own = equations.terms();
         let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
@@ -82,8 +82,8 @@ impl Workspace {
         own.insert_rows(self.original, added, 0.0)
     }
 
-    /// A model of these coefficients, one matrix per phase. Appended terms that no phase uses are
-    /// left out, so that a model keeps its library where it can.
+    /// A model of these coefficients, one matrix per phase. Appended terms that no phase uses are left out, so that a
+    /// model keeps its library where it can.
     pub(crate) fn finish(
         &self,
         model: ReducedModel,

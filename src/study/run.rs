@@ -11,8 +11,8 @@ use crate::train::{Method, Monitor, Origin, Recordings, TrainError, TrainOptions
 
 /// Trains the cells of a shard that the store misses; each is kept as soon as it is finished.
 ///
-/// Seeds of the joint method are random starts, as published. The closed form finds the same model from every start,
-/// so its seed `s` leaves out every fifth training jump, beginning with the `s`-th: its spread says how much the
+/// Seeds of the joint method are random starts, as published. The closed form finds the same model from every start, so
+/// its seed `s` leaves out every fifth training jump, beginning with the `s`-th: its spread says how much the
 /// recordings matter. Where the encoder may look at fewer coordinates than the latent space has, the mask is lifted.
 /// `[training, validation]` are the recordings, `options` the settings but for name, latent dimension and seed,
 /// `finished` is called for every cell. The result does not depend on the number of threads.

@@ -1,8 +1,8 @@
 /* @generated from src/control by `cargo run -p romc-translate`: the controller's own steps. Names that are defined
  * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
-/* Curvature of the cost as the solvers have it: CURVATURE / 2 ‖v‖². Inputs a few deviations beyond the
- * limits then have multipliers near those at which iterations begin. */
+/* Curvature of the cost as the solvers have it: CURVATURE / 2 ‖v‖². Inputs a few deviations beyond the limits then
+ * have multipliers near those at which iterations begin. */
 #define ONLINE_CURVATURE (real)0.01
 
 /* Smallest standard deviation against the largest of the same kind. */
@@ -31,19 +31,19 @@
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
 
-/* Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the
- * stage's end is ahead of the motion and adds to the thrust; that of the middle takes from it. */
+/* Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the stage's end is
+ * ahead of the motion and adds to the thrust; that of the middle takes from it. */
 #define ONLINE_POSTURE_SHARE 0.9
 
 /* Weight of the one from before the motion, in first steps. */
 #define ONLINE_PRIOR_WEIGHT (real)10.0
 
-/* Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all
- * multipliers near one and needs two iterations more if it has to bring them to 100. */
+/* Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all multipliers near one and
+ * needs two iterations more if it has to bring them to 100. */
 #define ONLINE_SLACK_PRICE (real)10.0
 
-/* Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
- * rows that were left out may hide. */
+/* Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the rows that were
+ * left out may hide. */
 #define ONLINE_SOFTENED_FROM (real)(1.05 * 0.02)
 
 /* Distance from the reference, in its standard deviations, within which joint limits matter. */
@@ -189,8 +189,8 @@ static inline MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *
     }
 }
 
-/* Writes the standard deviation of each of (z, dz), never below a hundredth of the largest of its kind; still if that
- * is a motion within which the trajectory stands still. */
+/* Writes the standard deviation of each of (z, dz), never below a hundredth of the largest of its kind; still
+ * if that is a motion within which the trajectory stands still. */
 static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajectory *self, const real *still,
         real *restrict deviation)
 {
@@ -229,7 +229,8 @@ static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajec
     }
 }
 
-/* Whether a state within STATE_REACH standard deviations of some state of the trajectory reaches row . z = bound. */
+/* Whether a state within STATE_REACH standard deviations of some state of the trajectory reaches row . z =
+ * bound. */
 static inline MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *self, const real *row, real bound,
         const real *deviation)
 {
@@ -443,8 +444,8 @@ static inline MAYBE_UNUSED void online_write_expected(const real *given, const r
     }
 }
 
-/* Lower Cholesky factor of a row-major symmetric matrix in place of its lower triangle; false if it
- * is not positive definite. */
+/* Lower Cholesky factor of a row-major symmetric matrix in place of its lower triangle; false if it is not positive
+ * definite. */
 static inline MAYBE_UNUSED bool online_factorise(real *matrix, int dim)
 {
     for (int i = 0; i < dim; ++i) {
@@ -487,8 +488,8 @@ static inline MAYBE_UNUSED void online_solve_upper(const real *factor, int dim, 
     }
 }
 
-/* Adds S B^T (B S B^T + R)^-1 y to an input, unless the sum in brackets is not positive definite. Matrices are row-major; y is
- * overwritten. */
+/* Adds S B^T (B S B^T + R)^-1 y to an input, unless the sum in brackets is not positive definite. Matrices are
+ * row-major; y is overwritten. */
 static inline MAYBE_UNUSED void online_add_correction(const real *gain, const real *covariance, const real *residual,
         int d, real *restrict unexplained, real *restrict input)
 {
@@ -540,7 +541,8 @@ static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const re
     }
 }
 
-/* Writes sigma^-1 A sigma and sigma^-1 B C_p of derivatives (A B), 2d x 3d; all row-major but C_p, lower triangular, column by column. */
+/* Writes sigma^-1 A sigma and sigma^-1 B C_p of derivatives (A B), 2d x 3d; all row-major but C_p, lower triangular,
+ * column by column. */
 static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *root, const real *deviation, int d,
         real *restrict a, real *restrict b)
 {
@@ -576,8 +578,8 @@ static inline MAYBE_UNUSED real online_scale_row(const real *row, const real *ro
     return at_reference;
 }
 
-/* Writes the friction pyramid of a force with rows (mu F_z, F_x, F_y), all zero without contact, where slacks are strictly
- * inside. */
+/* Writes the friction pyramid of a force with rows (mu F_z, F_x, F_y), all zero without contact, where slacks are
+ * strictly inside. */
 static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const real *root, const real *input, int d,
         real *restrict rows, real *restrict bounds)
 {
@@ -611,8 +613,8 @@ static inline MAYBE_UNUSED void online_unscale(const real *root, const real *dev
     }
 }
 
-/* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that goes to
- * end: next + A (state - x) + B (input - u) - end. */
+/* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that
+ * goes to end: next + A (state - x) + B (input - u) - end. */
 static inline MAYBE_UNUSED void online_write_defect(const real *next, const real *by, const real *x, const real *u,
         const real *state, const real *input, const real *end, int d, real *restrict defect)
 {
@@ -645,8 +647,8 @@ static inline MAYBE_UNUSED online_share online_share_unknown(void)
     return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
 }
 
-/* Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities at the
- * stage's start and end, its input, and the latent input of the drives at the command and now. */
+/* Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities
+ * at the stage's start and end, its input, and the latent input of the drives at the command and now. */
 static inline MAYBE_UNUSED void online_share_update(online_share *restrict self, real part, real kept,
         const real *by_input, const real *input, const real *start, const real *end, const real *velocity,
         const real *deviation, const real *at_command, const real *drives, int d)

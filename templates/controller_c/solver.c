@@ -1,8 +1,8 @@
 /* @generated from src/control by `cargo run -p romc-translate`: the structured solver. Names that are defined
  * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
-/* A guess is of quite another program if the optimum without rows moved further than this, in units of
- * the input's rows. */
+/* A guess is of quite another program if the optimum without rows moved further than this, in units of the input's
+ * rows. */
 #define SOLVER_FAR_CHANGE 3.0
 
 /* Least share of the way to the boundary that a step leaves. */
@@ -17,19 +17,18 @@
 /* Most of it. */
 #define SOLVER_MOST_MARGIN 5e-3
 
-/* Iterations after which slacks and multipliers are centred again: now and then the method goes round
- * in a circle. */
+/* Iterations after which slacks and multipliers are centred again: now and then the method goes round in a circle. */
 #define SOLVER_PATIENCE 16
 
-/* Numbers per row: bound, slack, multiplier, weight, target, residual, the change of slack and
- * multiplier, and the slack's inverse. */
+/* Numbers per row: bound, slack, multiplier, weight, target, residual, the change of slack and multiplier, and the
+ * slack's inverse. */
 #define SOLVER_ROW_NUMBERS 9
 
 /* A first step from a guess that is shorter than this shows that the guess is not near a solution. */
 #define SOLVER_SHORT_STEP 0.4
 
-/* Most inputs, and the width of rows of NU numbers that are filled up with zeros: vectors of four
- * then have no odd ends. */
+/* Most inputs, and the width of rows of NU numbers that are filled up with zeros: vectors of four then have no odd
+ * ends. */
 #define SOLVER_WIDE 12
 
 /* Cost of the input before a stage, from the stage on, but for a constant. */
@@ -50,8 +49,7 @@ typedef struct {
     double product;
 } solver_centring;
 
-/* The cost, the same at all stages but for the last one's states:
- * 1/2 v^T R v + 1/2 x^T Q x + price t. */
+/* The cost, the same at all stages but for the last one's states: 1/2 v^T R v + 1/2 x^T Q x + price t. */
 typedef struct {
     /* Diagonal of Q before the last stage. */
     real state[NX];
@@ -73,8 +71,8 @@ typedef struct {
     real softness;
 } solver_links;
 
-/* Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, and columns
- * 8 to 11 of the rows from the eighth on; what stands right of the diagonal is not read. */
+/* Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, and columns 8 to
+ * 11 of the rows from the eighth on; what stands right of the diagonal is not read. */
 typedef struct {
     real blocks[SOLVER_WIDE / 4][NU][4];
 } solver_lower;
@@ -130,8 +128,8 @@ typedef struct {
     int hard_offset;
     /* Rows that link the input to that of the stage before; none unless the program has Links. */
     int link;
-    /* How many pairs of opposite rows come first, the two sides of a limit: row, -row. Each takes the
-     * products and squares of one row. */
+    /* How many pairs of opposite rows come first, the two sides of a limit: row, -row. Each takes the products and
+     * squares of one row. */
     solver_pairs pairs;
 } solver_shape;
 
@@ -174,8 +172,7 @@ typedef struct {
     real second_largest;
 } solver_reach;
 
-/* Residuals of the optimality conditions, each relative to the size of the terms it is made of
- * (never less than one). */
+/* Residuals of the optimality conditions, each relative to the size of the terms it is made of (never less than one). */
 typedef struct {
     /* Largest violation of a row or cone, or error of the dynamics. */
     real primal;
@@ -217,8 +214,8 @@ typedef struct {
     int max_iterations;
     /* Violation of rows and largest product of slack and multiplier at which the iterations end. */
     real tolerance;
-    /* Sum of these products, in units of sum of v^T R v + x^T Q x or of one where that is less, at which the
-     * iterations end as well; zero for the largest product to decide. */
+    /* Sum of these products, in units of sum of v^T R v + x^T Q x or of one where that is less, at which the iterations end
+     * as well; zero for the largest product to decide. */
     real gap;
     /* Largest residual of the optimality conditions with which a point counts as solved. */
     real accepted_residual;
@@ -272,8 +269,8 @@ static inline real *solver_program_bounds_mut(solver_program *self, int stage)
     return self->rows + first;
 }
 
-/* Moves the horizon on by one stage: the second becomes the first, and the first the last, whose
- * data have to be written then. Inputs, slacks and multipliers stay as a guess at the next solution. */
+/* Moves the horizon on by one stage: the second becomes the first, and the first the last, whose data have to be
+ * written then. Inputs, slacks and multipliers stay as a guess at the next solution. */
 static inline void solver_program_shift(solver_program *self)
 {
     const int rows = solver_shape_rows(&self->shape);
@@ -426,8 +423,7 @@ static inline bool solver_is_finite_number(real self)
     return difference == 0;
 }
 
-/* L D L^T of a symmetric matrix, of which the lower triangle is read; false if it is not positive
- * definite. */
+/* L D L^T of a symmetric matrix, of which the lower triangle is read; false if it is not positive definite. */
 static inline bool solver_factorise(real matrix[NU][SOLVER_WIDE], real factor[restrict NU][NU])
 {
     for (int j = 0; j < NU; ++j) {
@@ -608,8 +604,8 @@ static inline void solver_solve_upper_rows_nx(real factor[NU][NU], real matrix[r
     }
 }
 
-/* P of one stage's end to P of its beginning, without the costs there; gain and factor of the
- * stage are overwritten. False if the whole Hessian of the input is not positive definite. */
+/* P of one stage's end to P of its beginning, without the costs there; gain and factor of the stage are
+ * overwritten. False if the whole Hessian of the input is not positive definite. */
 static inline bool solver_eliminate(solver_stage *restrict stage, real p[restrict NX][NX],
         solver_products *restrict products)
 {
@@ -677,9 +673,9 @@ static inline void solver_add_transposed_nx_nx(real matrix[NX][NX], const real *
     }
 }
 
-/* Gradient pass: from p at the stage's end, with the cost's gradient there added already, to
- * p at its beginning, and from the gradient h by the input to the whole one; the constant part of the
- * input is overwritten. */
+/* Gradient pass: from p at the stage's end, with the cost's gradient there added already, to p at its
+ * beginning, and from the gradient h by the input to the whole one; the constant part of the input is
+ * overwritten. */
 static inline void solver_stage_pull(solver_stage *restrict self, real p[restrict NX], real h[restrict NU])
 {
     solver_add_transposed_nx_nu(self->b, p, h);
@@ -697,8 +693,8 @@ static inline void solver_stage_pull(solver_stage *restrict self, real p[restric
     memcpy(p, next, sizeof(real[NX]));
 }
 
-/* Eliminates all stages without their rows: gains and constant parts of the linear-quadratic
- * optimum from any initial state. False if a Hessian is not positive definite. */
+/* Eliminates all stages without their rows: gains and constant parts of the linear-quadratic optimum from any
+ * initial state. False if a Hessian is not positive definite. */
 static inline bool solver_program_prepare(solver_program *self)
 {
     const int horizon = self->stages_len;
@@ -1124,8 +1120,8 @@ static inline real solver_point_infeasibility(solver_point *self)
     return self->kept * self->residual;
 }
 
-/* Whether the iterations may end here: gradient and rows hold, and each product, or the gap between primal
- * and dual cost, is small. */
+/* Whether the iterations may end here: gradient and rows hold, and each product, or the gap between primal and
+ * dual cost, is small. */
 static inline bool solver_point_is_optimal(solver_point *self, solver_settings *settings)
 {
     return self->left <= (real)SOLVER_LEFT && solver_point_infeasibility(self) <= settings->tolerance
@@ -1234,8 +1230,8 @@ static inline void solver_lower_add_to(solver_lower *self, int first, real matri
     }
 }
 
-/* Adds the count soft rows, with weights w and multipliers y, to gradient and Hessian by the state; the slack is
- * eliminated. */
+/* Adds the count soft rows, with weights w and multipliers y, to gradient and Hessian by the state; the
+ * slack is eliminated. */
 static inline void solver_stage_add_soft_rows(solver_stage *restrict self, const real *w, const real *y,
         real (*rows)[NU], int count, real price, real by_z[restrict NU], real p[restrict NX][NX])
 {
@@ -1386,8 +1382,8 @@ static inline void solver_before_write(solver_before *restrict self, solver_stag
     solver_take_answer(gain, h, self->linear);
 }
 
-/* Gains with the weights of the rows, and the constant parts of the inputs' changes for a step that
- * does not centre; left is the share of the rows' residuals that is left. */
+/* Gains with the weights of the rows, and the constant parts of the inputs' changes for a step that does not
+ * centre; left is the share of the rows' residuals that is left. */
 static inline bool solver_program_predict(solver_program *self, real left)
 {
     solver_shape shape = self->shape;
@@ -1484,8 +1480,8 @@ static inline void solver_rows_aim_softened(solver_rows *self, real softness, re
     }
 }
 
-/* Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of
- * the step that does not centre. */
+/* Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of the step
+ * that does not centre. */
 static inline void solver_rows_aim_at(solver_rows *self, real left, real aim)
 {
     for (int i = 0; i < self->count; ++i) {
@@ -1511,8 +1507,7 @@ static inline void solver_add_rows(const real *y, real (*rows)[NU], int pairs, i
     memcpy(sum, local, sizeof(real[NU]));
 }
 
-/* Adds the rows' share, with multipliers y, of the gradient by input and state; returns that by
- * the slack. */
+/* Adds the rows' share, with multipliers y, of the gradient by input and state; returns that by the slack. */
 static inline real solver_program_add_rows_pull(solver_program *self, int k, const real *y, real by_v[restrict NU],
         real by_x[restrict NX])
 {
@@ -1545,8 +1540,8 @@ static inline real solver_program_add_rows_pull(solver_program *self, int k, con
     return by_t;
 }
 
-/* Constant parts of the inputs' changes for a step that aims at this product of slacks and
- * multipliers, with the second order of the step that does not centre. */
+/* Constant parts of the inputs' changes for a step that aims at this product of slacks and multipliers, with the
+ * second order of the step that does not centre. */
 static inline void solver_program_pull_all(solver_program *self, real left, real aim)
 {
     solver_shape shape = self->shape;
@@ -1650,8 +1645,8 @@ static inline void solver_rows_change(solver_rows *self, real left)
     }
 }
 
-/* The changes of all unknowns. Before the correction the multipliers aimed at are those that make
- * every product zero to first order, so that their changes follow from those of the slacks. */
+/* The changes of all unknowns. Before the correction the multipliers aimed at are those that make every product
+ * zero to first order, so that their changes follow from those of the slacks. */
 static inline solver_reach solver_program_advance(solver_program *self, real left, bool is_corrected)
 {
     const int soft = self->shape.soft;
@@ -1764,8 +1759,8 @@ static inline real solver_program_step(solver_program *restrict self, solver_poi
     const real share = solver_boundary_share(complementarity);
     real longest = 0;
     real aim = 0;
-    /* A loop of two turns, so that the passes over the stages are compiled once: the first looks for
-     * the step that does not centre, the second takes the one that does. */
+    /* A loop of two turns, so that the passes over the stages are compiled once: the first looks for the step that
+     * does not centre, the second takes the one that does. */
     for (int turn = 0; turn < 2; ++turn) {
         const bool is_corrected = turn > 0;
         if (is_corrected) {
@@ -1774,8 +1769,7 @@ static inline real solver_program_step(solver_program *restrict self, solver_poi
         solver_reach reach = solver_program_advance(self, point->kept, is_corrected);
         longest = share / solver_or_larger(reach.times, share);
         if (!is_corrected) {
-            /* What is left of the products, exactly: a change that does not centre cancels their
-             * first order. */
+            /* What is left of the products, exactly: a change that does not centre cancels their first order. */
             const real rest = 1 - longest;
             const real square = longest * longest;
             solver_point predicted = {.left = rest * point->left, .kept = rest * point->kept,
@@ -1888,8 +1882,8 @@ static inline bool solver_residuals_within(solver_residuals *self, real limit)
 
 /* Solves the program from an initial state, with the gains of Program::prepare for the present stages.
  *
- * is_warm says that inputs and multipliers are a guess at the solution, such as the last one's,
- * shifted by a stage. */
+ * is_warm says that inputs and multipliers are a guess at the solution, such as the last one's, shifted by a
+ * stage. */
 static inline solver_report solver_program_solve(solver_program *restrict self, const real *x0, bool is_warm,
         solver_settings *settings)
 {

@@ -45,8 +45,8 @@ impl From<Number> for Coefficient {
 }
 
 impl Coefficient {
-    /// Reads a decimal as it is written: digits with at most one point and an exponent, such as `0.36`
-    /// or `1.2e-3`. Where it stands for a rounded number its radius is half a unit of its last digit.
+    /// Reads a decimal as it is written: digits with at most one point and an exponent, such as `0.36` or `1.2e-3`.
+    /// Where it stands for a rounded number its radius is half a unit of its last digit.
     ///
     /// `None` for other texts and for exponents beyond 400.
     pub fn parse(text: &str, is_rounded: bool) -> Option<Self> {

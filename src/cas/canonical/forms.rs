@@ -35,8 +35,8 @@ pub struct CanonicalForms<'p> {
 }
 
 impl<'p> CanonicalForms<'p> {
-    /// Forms of expressions that are compared where all of `exprs` have values: what stands under a
-    /// logarithm or root of one of these is taken as positive in all others.
+    /// Forms of expressions that are compared where all of `exprs` have values: what stands under a logarithm or root
+    /// of one of these is taken as positive in all others.
     pub fn new(pool: &'p ExprPool, exprs: &[ExprId]) -> Self {
         let mut forms = Self {
             pool,
@@ -88,8 +88,8 @@ impl<'p> CanonicalForms<'p> {
         forms
     }
 
-    /// Whether no numbers round to all decimals whose arguments were taken for each other: equal forms
-    /// prove nothing then.
+    /// Whether no numbers round to all decimals whose arguments were taken for each other: equal forms prove nothing
+    /// then.
     pub fn is_contradictory(&self) -> bool {
         self.is_contradictory
     }
@@ -114,9 +114,8 @@ impl<'p> CanonicalForms<'p> {
         self.forms[&expr].clone()
     }
 
-    /// The form with all reciprocals of sums, tangents and hyperbolic tangents removed, and magnitudes
-    /// of sums whose signs occur: times a factor that is zero nowhere in the interior of the domain.
-    /// `None` if it grows too large.
+    /// The form with all reciprocals of sums, tangents and hyperbolic tangents removed, and magnitudes of sums whose
+    /// signs occur: times a factor that is zero nowhere in the interior of the domain. `None` if it grows too large.
     pub fn without_fractions(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
         let mut form = form.clone();
         for _ in 0..MAX_REMOVALS {
@@ -285,8 +284,8 @@ impl<'p> CanonicalForms<'p> {
         Some(self.atom(atom(argument)).scaled(&sign))
     }
 
-    /// An argument of a function without its radii: one from before, if there are numbers that round
-    /// to the decimals of both and of all others that were taken for it.
+    /// An argument of a function without its radii: one from before, if there are numbers that round to the decimals of
+    /// both and of all others that were taken for it.
     pub(super) fn argument(&mut self, form: CanonicalForm) -> CanonicalForm {
         let exact = form.exact();
         self.is_rounded |= form.has_radius();
@@ -354,14 +353,13 @@ impl<'p> CanonicalForms<'p> {
 /// An argument of a function, and the numbers that its coefficients may still stand for.
 pub(super) struct Argument {
     form: CanonicalForm,
-    /// Bounds of each coefficient's distance from the one of `form`, where they are narrower than its
-    /// radius.
+    /// Bounds of each coefficient's distance from the one of `form`, where they are narrower than its radius.
     room: HashMap<Monomial, (f64, f64)>,
 }
 
 impl Argument {
-    /// Takes another form for this one if their numbers can be the same, and narrows them to those; the
-    /// largest distance of their coefficients.
+    /// Takes another form for this one if their numbers can be the same, and narrows them to those; the largest
+    /// distance of their coefficients.
     fn take(&mut self, other: &CanonicalForm) -> Option<f64> {
         let radius = |form: &CanonicalForm, monomial: &Monomial| {
             form.terms.get(monomial).map_or(0.0, |c| c.radius())

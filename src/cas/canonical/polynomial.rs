@@ -169,8 +169,8 @@ impl CanonicalForm {
         }
     }
 
-    /// The form divided by size and sign of its leading coefficient, and these; nothing for zero,
-    /// or where the size is beyond the range of floats.
+    /// The form divided by size and sign of its leading coefficient, and these; nothing for zero, or where the size is
+    /// beyond the range of floats.
     pub(super) fn normed(&self) -> Option<(Self, Coefficient, Coefficient)> {
         let leading = self.leading()?;
         let (size, sign) = (Coefficient::from(leading.size()), leading.sign());

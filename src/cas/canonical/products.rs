@@ -154,8 +154,8 @@ impl CanonicalForms<'_> {
         Some(CanonicalForm::term(size.reciprocal()?.times(&sign), atom))
     }
 
-    /// `(scale, q)` with `form = scale * q^2` and a positive scale, if there is such a sum `q`; `form` is
-    /// real. The terms of `q` follow one after the other, largest first, in an order that products keep.
+    /// `(scale, q)` with `form = scale * q^2` and a positive scale, if there is such a sum `q`; `form` is real. The
+    /// terms of `q` follow one after the other, largest first, in an order that products keep.
     pub(super) fn square_root(
         &mut self,
         form: &CanonicalForm,

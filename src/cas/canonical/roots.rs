@@ -11,8 +11,8 @@ use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
 use super::polynomial::{Atom, CanonicalForm, Monomial};
 
 impl CanonicalForms<'_> {
-    /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive
-    /// number, forms that are positive there, and the exponential.
+    /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive number, forms that
+    /// are positive there, and the exponential.
     pub(super) fn split(&mut self, form: &CanonicalForm) -> Option<Split> {
         let form = self.argument(form.clone());
         let scale = form.leading()?.size();
@@ -87,8 +87,8 @@ impl CanonicalForms<'_> {
         })
     }
 
-    /// The exponent of the exponential of largest real part among the terms of a sum, and the sum divided by
-    /// that exponential; nothing if there is none. `exp(x) + 1` and `1 + exp(-x)` leave the same sum.
+    /// The exponent of the exponential of largest real part among the terms of a sum, and the sum divided by that
+    /// exponential; nothing if there is none. `exp(x) + 1` and `1 + exp(-x)` leave the same sum.
     fn without_exponential(
         &mut self,
         form: &CanonicalForm,
@@ -135,8 +135,8 @@ impl CanonicalForms<'_> {
         }
     }
 
-    /// The powers that all terms of a sum have in common and that are not negative: those of
-    /// positive atoms, and even ones.
+    /// The powers that all terms of a sum have in common and that are not negative: those of positive atoms, and even
+    /// ones.
     fn shared_powers(&self, form: &CanonicalForm) -> Monomial {
         let smaller = |a: i32, b: i32| match a.signum() == b.signum() {
             true => a.signum() * a.abs().min(b.abs()),
@@ -336,8 +336,7 @@ pub(super) struct Split {
 
 const LARGEST_DIVISOR: u64 = 2_000;
 
-/// A positive number as a product of primes to integer powers. What is left after small divisors
-/// counts as a prime.
+/// A positive number as a product of primes to integer powers. What is left after small divisors counts as a prime.
 fn prime_powers(value: &Rational) -> Vec<(CanonicalForm, i32)> {
     let form = |prime: BigUint| CanonicalForm::constant(Rational::from(BigInt::from(prime)).into());
     let mut powers = Vec::new();

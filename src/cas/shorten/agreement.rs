@@ -204,8 +204,8 @@ fn scales(pool: &ExprPool, sum: &Summands, precision: &Precision) -> Vec<f64> {
         .collect()
 }
 
-/// Points with all pairs of scales of two variables, for each pair of the first four; the others are ordinary at
-/// about half of them, and have scales as they fall.
+/// Points with all pairs of scales of two variables, for each pair of the first four; the others are ordinary at about
+/// half of them, and have scales as they fall.
 fn points(symbols: &[SymbolId], scales: &[f64], precision: &Precision) -> Points {
     let n_scales = scales.len();
     let first = symbols.len().min(4);
@@ -263,8 +263,8 @@ fn sum_by_code(
     (values, sizes)
 }
 
-/// One expression in the order of operations that generated code has: factors with negative exponents form one
-/// divisor, powers are chains of products or exponentials of logarithms.
+/// One expression in the order of operations that generated code has: factors with negative exponents form one divisor,
+/// powers are chains of products or exponentials of logarithms.
 fn by_code(
     pool: &ExprPool,
     expr: ExprId,

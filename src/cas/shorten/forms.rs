@@ -28,8 +28,8 @@ impl Shortener<'_> {
         let n_numbers = self.n_numbers(unit, &scaled);
         let n_written = self.spread(unit, scaled).len();
         for candidate in candidates {
-            // Only a fraction whose sums become fewer, a function of a function that goes, and a sum whose
-            // decimals become fewer, may be written as several terms.
+            // Only a fraction whose sums become fewer, a function of a function that goes, and a sum whose decimals
+            // become fewer, may be written as several terms.
             let is_resolved = || {
                 let is_fraction = !self.denominators(old[0].1).is_empty();
                 (is_fraction && self.all_terms(&candidate) < n_terms)
@@ -190,8 +190,8 @@ impl Shortener<'_> {
         with_factors.collect()
     }
 
-    /// Sums in which two waves are a product: `cos(a + b) + cos(a - b) = 2*cos(a)*cos(b)` and the like,
-    /// for angles `a` and `b` of any length.
+    /// Sums in which two waves are a product: `cos(a + b) + cos(a - b) = 2*cos(a)*cos(b)` and the like, for angles `a`
+    /// and `b` of any length.
     fn waves_as_products(&mut self, singles: &Scaled) -> Vec<Scaled> {
         let mut found = Vec::new();
         if singles.len() > MAX_CHOSEN {
@@ -334,8 +334,8 @@ pub(super) enum NestedSums {
     Split,
 }
 
-/// Summands with the numbers of their terms in the coefficients and like terms added, in the order
-/// of their first appearance.
+/// Summands with the numbers of their terms in the coefficients and like terms added, in the order of their first
+/// appearance.
 pub(super) fn collected(
     pool: &ExprPool,
     summands: &[(Number, ExprId)],

@@ -65,8 +65,8 @@ impl Shortener<'_> {
         groups.into_values().filter(is_worth).collect()
     }
 
-    /// Pairs of summands that belong to one power of a sum: of `p*a^n`, `q*a^(n-1)*b` and `r*b^n`
-    /// with `q^n = n^n*p^(n-1)*r`.
+    /// Pairs of summands that belong to one power of a sum: of `p*a^n`, `q*a^(n-1)*b` and `r*b^n` with `q^n =
+    /// n^n*p^(n-1)*r`.
     pub(super) fn parts_of_powers(&mut self, summands: &[(f64, ExprId)]) -> Vec<[usize; 2]> {
         let mut pairs = Vec::new();
         if summands.len() < 3 {
@@ -102,8 +102,8 @@ impl Shortener<'_> {
         pairs
     }
 
-    /// A sum of one wave for each angle of the terms, which fixes the units of multiples, and for
-    /// half the angle of `cos(2*x)` beside a term with which it is `1 - cos(2*x)` or `1 + cos(2*x)`.
+    /// A sum of one wave for each angle of the terms, which fixes the units of multiples, and for half the angle of
+    /// `cos(2*x)` beside a term with which it is `1 - cos(2*x)` or `1 + cos(2*x)`.
     pub(super) fn all_angles(&mut self, summands: &[(f64, ExprId)]) -> ExprId {
         let mut sines = Vec::new();
         for &(coefficient, expr) in summands {

@@ -92,8 +92,8 @@ impl<'a> Shortener<'a> {
         self.pool
     }
 
-    /// The replacements that make `sum coefficient * expr` shortest, in the order of the first
-    /// positions they replace; none if it is short already.
+    /// The replacements that make `sum coefficient * expr` shortest, in the order of the first positions they replace;
+    /// none if it is short already.
     pub fn shorten(&mut self, summands: &[(f64, ExprId)]) -> Vec<Shortened> {
         if self.is_plain_sum(summands) && self.parts_of_powers(summands).is_empty() {
             return Vec::new();
@@ -199,8 +199,8 @@ impl<'a> Shortener<'a> {
         }
     }
 
-    /// The summands with a variable of its own in the place of each sum that is an angle, and these sums;
-    /// nothing if no angle is one. So what is true of one angle is found before angles are taken apart.
+    /// The summands with a variable of its own in the place of each sum that is an angle, and these sums; nothing if no
+    /// angle is one. So what is true of one angle is found before angles are taken apart.
     fn whole_angles(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let exprs: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
         let order = self.pool.reachable(&exprs);
@@ -250,8 +250,8 @@ impl<'a> Shortener<'a> {
         Some((whole.collect(), variables))
     }
 
-    /// The summands with a variable of its own in the place of each sum that is a factor, and of each function other than
-    /// waves that is a factor of several terms: `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
+    /// The summands with a variable of its own in the place of each sum that is a factor, and of each function other
+    /// than waves that is a factor of several terms: `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
     fn whole_factors(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let mut n_terms: IdMap<usize> = IdMap::default();
         for &(_, expr) in summands {
@@ -299,8 +299,8 @@ impl<'a> Shortener<'a> {
         (summands.iter()).all(|&(_, expr)| seen.insert(expr) && self.is_plain(expr))
     }
 
-    /// Whether a term is a product of variables to integer powers and at most one function of a
-    /// variable, without a number.
+    /// Whether a term is a product of variables to integer powers and at most one function of a variable, without a
+    /// number.
     pub(super) fn is_plain(&mut self, expr: ExprId) -> bool {
         let pool = &self.pool;
         *self.plain.entry(expr).or_insert_with(|| {

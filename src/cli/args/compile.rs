@@ -53,8 +53,8 @@ pub enum UnitsChoice {
     Si,
     /// Scaled as the model was learned: the model file's factors times SI values
     Scaled,
-    /// SI units, and latent coordinates and inputs in m, rad, N, N m too: equations and code without
-    /// scale factors, every coefficient with a unit
+    /// SI units, and latent coordinates and inputs in m, rad, N, N m too: equations and code without scale factors,
+    /// every coefficient with a unit
     Physical,
 }
 
@@ -105,8 +105,8 @@ pub(crate) struct EquationArguments {
     /// Write numbers in LaTeX with siunitx's \\num
     #[arg(long)]
     pub siunitx: bool,
-    /// Keep coefficients times terms as the model file has them; without it, equations are printed and
-    /// emitted in their simplest equal form
+    /// Keep coefficients times terms as the model file has them; without it, equations are printed and emitted in their
+    /// simplest equal form
     #[arg(long)]
     pub as_learned: bool,
 }

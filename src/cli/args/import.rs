@@ -74,19 +74,19 @@ pub(crate) struct ImportArguments {
     /// Another name that LaTeX has for a variable, such as z1=x or u2=F_z; can be repeated
     #[arg(long, value_name = "VARIABLE=NAME")]
     pub symbols: Vec<String>,
-    /// Candidate terms in the order of the rows of Xi: `degree=N[,trigonometric][,inputs]`, a file with one term
-    /// per line, or the terms themselves as in "1; z1; sin(z1); u1"
+    /// Candidate terms in the order of the rows of Xi: `degree=N[,trigonometric][,inputs]`, a file with one term per
+    /// line, or the terms themselves as in "1; z1; sin(z1); u1"
     #[arg(long, value_name = "LIBRARY", value_parser = library_argument)]
     pub library: Option<LibraryArgument>,
-    /// Order of the terms of degree=N,...: 1, z, dz, products, then sines and cosines as stated here, then
-    /// inputs. Needed where the library has sines, unless the recordings of --inputs-from decide it
+    /// Order of the terms of degree=N,...: 1, z, dz, products, then sines and cosines as stated here, then inputs.
+    /// Needed where the library has sines, unless the recordings of --inputs-from decide it
     #[arg(long, value_name = "ORDER", value_enum, requires = "library")]
     pub library_order: Option<LibraryOrder>,
     /// Number of latent coordinates d: needed if shapes leave it open
     #[arg(long, value_name = "D", value_parser = count(&IMPORTED_LATENT_DIM))]
     pub latent_dim: Option<usize>,
-    /// When a phase holds: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
-    /// repeated, the first match wins; contact=any, flight=none and always=always are known
+    /// When a phase holds: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be repeated,
+    /// the first match wins; contact=any, flight=none and always=always are known
     #[arg(long, value_name = "NAME=FEET")]
     pub phase: Vec<PhaseRule>,
     /// Scaled value = factor times SI value: one number or one per coordinate, separated by commas
@@ -98,16 +98,16 @@ pub(crate) struct ImportArguments {
     /// Robot whose 18 coordinates the encoder takes: go1, go2, a1, or a .toml or .urdf file
     #[arg(long, value_name = "ROBOT", value_parser = RobotParser, hide_possible_values = true)]
     pub robot: Option<String>,
-    /// Order of the 18 coordinates (and inputs) in the file, as names or groups: body,fl,fr,rl,rr or
-    /// hx,hy,kn,body; romc's own is fr,fl,rr,rl,body
+    /// Order of the 18 coordinates (and inputs) in the file, as names or groups: body,fl,fr,rl,rr or hx,hy,kn,body;
+    /// romc's own is fr,fl,rr,rl,body
     #[arg(long, value_name = "NAMES", requires = "robot")]
     pub order: Option<CoordinateOrder>,
-    /// Axes of the force and moment in the inputs that the model was trained with: body, as published, unless
-    /// given, or world
+    /// Axes of the force and moment in the inputs that the model was trained with: body, as published, unless given, or
+    /// world
     #[arg(long, value_name = "FRAME", requires = "robot", value_parser = wrench_frame)]
     pub wrench_frame: Option<WrenchFrame>,
-    /// Friction and inertia of the joints, if the model was trained with torques less these: a file with a
-    /// table `actuators`, such as one of `romc identify`; the motors' torques unless given
+    /// Friction and inertia of the joints, if the model was trained with torques less these: a file with a table
+    /// `actuators`, such as one of `romc identify`; the motors' torques unless given
     #[arg(long, value_name = "FILE.toml", requires = "robot")]
     pub actuators: Option<PathBuf>,
     /// Sampling period of the training recordings

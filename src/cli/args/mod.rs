@@ -1,7 +1,6 @@
 //! The command line's grammar: the commands, their options, and an example for each.
 //!
-//! The command line enters; [`Arguments`] leaves, with everything checked that needs no file. Read
-//! `command.rs` first.
+//! The command line enters; [`Arguments`] leaves, with everything checked that needs no file. Read `command.rs` first.
 
 mod command;
 mod compile;

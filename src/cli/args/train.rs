@@ -115,8 +115,8 @@ pub(crate) struct TrainSettings {
     /// Robot that made the recordings: go1 (unless given), go2, a1, or a .toml or .urdf file
     #[arg(long, value_name = "ROBOT", value_parser = RobotParser, hide_possible_values = true)]
     pub robot: Option<String>,
-    /// Train exactly as published: motor torques, forces in the body's axes, one scale, no mask, no lift loss,
-    /// Xi from ones (joint method)
+    /// Train exactly as published: motor torques, forces in the body's axes, one scale, no mask, no lift loss, Xi from
+    /// ones (joint method)
     #[arg(long)]
     pub paper: bool,
     /// Seed of all random choices
@@ -178,8 +178,8 @@ pub(crate) struct TrainSettings {
     /// Custom candidate terms, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
     #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
     pub terms: Option<String>,
-    /// Friction and inertia of the joints, taken from the torques: a file with a table `actuators`, `identify` for what the
-    /// training recordings tell (as `romc identify` does), or `none` (identify unless given, none with --paper)
+    /// Friction and inertia of the joints, taken from the torques: a file with a table `actuators`, `identify` for what
+    /// the training recordings tell (as `romc identify` does), or `none` (identify unless given, none with --paper)
     #[arg(long, value_name = "FILE.toml")]
     pub actuators: Option<String>,
     /// Axes of force and moment in the inputs: `world` or, as published, `body` (world unless given)

@@ -77,8 +77,8 @@ pub(crate) fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
 /// How recordings are read.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct ReadingArguments {
-    /// What the columns of the recordings are: names, units, signs, order, clocks of another program's log
-    /// (`romc inspect --guess LOG` writes a first one)
+    /// What the columns of the recordings are: names, units, signs, order, clocks of another program's log (`romc
+    /// inspect --guess LOG` writes a first one)
     #[arg(long, value_name = "MAP.toml")]
     pub columns: Option<PathBuf>,
     /// Whether clocks and angular rates that disagree with the motion are mended (unless given they are, but not by

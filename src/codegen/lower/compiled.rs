@@ -73,7 +73,8 @@ impl CompiledModel {
         dynamics.run(&[z, dz, u_lat], &mut [ddz]);
     }
 
-    /// `ddz` and the entries of its Jacobian by `(z, dz, u_lat)` that [`CompiledModel::pattern`] names; how many there are.
+    /// `ddz` and the entries of its Jacobian by `(z, dz, u_lat)` that [`CompiledModel::pattern`] names; how many there
+    /// are.
     ///
     /// # Panics
     /// If `phase` does not exist, a vector does not fit or there is no room for the entries.

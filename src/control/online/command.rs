@@ -97,12 +97,11 @@ impl Source {
 pub struct Command {
     /// Feed-forward torques, N m, within the robot's limits whatever happened.
     pub torque_nm: [f64; JOINT_DIM],
-    /// What the planned motion takes of the torques in the joints, N m: `torque_nm` less this reaches the
-    /// links. Zero in a hold and for a model without actuators.
+    /// What the planned motion takes of the torques in the joints, N m: `torque_nm` less this reaches the links. Zero
+    /// in a hold and for a model without actuators.
     pub losses_nm: [f64; JOINT_DIM],
-    /// Desired joint positions, rad, within the robot's limits: the decoded reference at 0.9 of the
-    /// stage. The plan begins at the measurement, so its own posture would leave a joint PD
-    /// nothing to correct.
+    /// Desired joint positions, rad, within the robot's limits: the decoded reference at 0.9 of the stage. The plan
+    /// begins at the measurement, so its own posture would leave a joint PD nothing to correct.
     pub joint_position_rad: [f64; JOINT_DIM],
     /// Desired joint velocities, rad/s.
     pub joint_velocity_rad_s: [f64; JOINT_DIM],
@@ -120,8 +119,8 @@ pub struct Command {
     pub solve_us: f64,
     /// Largest violation of a joint limit in the plan, in half ranges of the joint.
     pub slack: f64,
-    /// `|F_lift − G τ| / |F_lift|`: how far the force that the latent input was lifted to is from
-    /// the force that the commanded torques produce after the losses; none in flight or without a lifted force.
+    /// `|F_lift − G τ| / |F_lift|`: how far the force that the latent input was lifted to is from the force that the
+    /// commanded torques produce after the losses; none in flight or without a lifted force.
     pub inconsistency: Option<f64>,
 }
 

@@ -1,7 +1,7 @@
 //! The stages as one program over cones, for clarabel.
 //!
-//! Unknowns are, stage after stage, the input, the state that it leads to and the slack if there are soft rows. Rows are the
-//! dynamics of all stages (zero cone), then rows on the input, rates, soft rows and `t >= 0` stage by stage
+//! Unknowns are, stage after stage, the input, the state that it leads to and the slack if there are soft rows. Rows
+//! are the dynamics of all stages (zero cone), then rows on the input, rates, soft rows and `t >= 0` stage by stage
 //! (nonnegative), then the friction cones. The pattern is laid out once; a step overwrites values.
 
 use super::engine::{StageSolver, Start};

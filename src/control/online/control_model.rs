@@ -1,7 +1,7 @@
 //! The numbers of one model on one robot, in SI units on the robot's side.
 //!
-//! Everything the controller needs besides the latent dynamics: the affine maps with their scale
-//! factors multiplied in, how torques become inputs, limits, and for each phase the distribution of the training inputs.
+//! Everything the controller needs besides the latent dynamics: the affine maps with their scale factors multiplied in,
+//! how torques become inputs, limits, and for each phase the distribution of the training inputs.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -65,8 +65,8 @@ pub struct ControlPhase {
 
 /// A nonlinear encoder and decoder with their Jacobians, in SI units on the robot's side.
 ///
-/// The matrices of a [`ControlModel`] are then those at one state, and
-/// [`ControlModel::tangent_at`] gives the plant of another.
+/// The matrices of a [`ControlModel`] are then those at one state, and [`ControlModel::tangent_at`] gives the plant of
+/// another.
 pub trait NonlinearMaps: Debug + Send + Sync {
     /// Writes `z = E(s_x x)`.
     fn encode(&self, x: &[f64], z: &mut [f64]);
@@ -84,8 +84,7 @@ pub trait NonlinearMaps: Debug + Send + Sync {
     /// have full row rank.
     fn inputs(&self, x: &[f64]) -> Option<[DMatrix<f64>; 2]>;
 
-    /// The phases with the statistics of the training inputs projected at `x`; none as for
-    /// [`NonlinearMaps::inputs`].
+    /// The phases with the statistics of the training inputs projected at `x`; none as for [`NonlinearMaps::inputs`].
     fn phases(&self, x: &[f64]) -> Option<Vec<ControlPhase>>;
 }
 
@@ -93,8 +92,8 @@ impl ControlModel {
     /// A plant of given numbers.
     ///
     /// # Errors
-    /// [`ControlError::Shape`] if a map or a phase's statistics do not have the shape that the
-    /// encoder's number of rows asks for.
+    /// [`ControlError::Shape`] if a map or a phase's statistics do not have the shape that the encoder's number of rows
+    /// asks for.
     pub fn from_parts(parts: ControlModelParts) -> Result<Self, ControlError> {
         parts.check()?;
         Ok(Self {
@@ -116,9 +115,8 @@ impl ControlModel {
         self.nonlinear.is_some()
     }
 
-    /// The plant of affine maps that touch the encoder at `x` (18, SI units) and the decoder at
-    /// `z`; none for a model whose maps are affine anyway, and where the encoder's Jacobian has not
-    /// full row rank.
+    /// The plant of affine maps that touch the encoder at `x` (18, SI units) and the decoder at `z`; none for a model
+    /// whose maps are affine anyway, and where the encoder's Jacobian has not full row rank.
     pub(super) fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
         let maps = self.nonlinear.as_ref()?;
         let (encoder, decoder) = (maps.encoder_jacobian(x), maps.decoder_jacobian(z));
@@ -142,8 +140,8 @@ impl ControlModel {
         })
     }
 
-    /// Takes the statistics of the training inputs as they are projected at `x`, if the maps depend
-    /// on the state and have full rank there.
+    /// Takes the statistics of the training inputs as they are projected at `x`, if the maps depend on the state and
+    /// have full rank there.
     pub(super) fn take_statistics_at(&mut self, x: &[f64]) {
         if let Some(phases) = self.nonlinear.as_ref().and_then(|maps| maps.phases(x)) {
             self.parts.phases = phases;
@@ -218,9 +216,9 @@ impl ControlModel {
         std::array::from_fn(|joint| row_product(decoder, joint, dz))
     }
 
-    /// What the joints take, N m, over a time `step_s` in which the latent state goes from `start` to
-    /// `end` (both `(z, dz)`): at the mean of the decoded velocities, with their difference over the
-    /// time as acceleration. Zero without actuators, and never beyond a joint's torque limit.
+    /// What the joints take, N m, over a time `step_s` in which the latent state goes from `start` to `end` (both `(z,
+    /// dz)`): at the mean of the decoded velocities, with their difference over the time as acceleration. Zero without
+    /// actuators, and never beyond a joint's torque limit.
     pub fn planned_losses(&self, start: &[f64], end: &[f64], step_s: f64) -> [f64; JOINT_DIM] {
         if self.parts.input_rule.actuators().is_none() {
             return [0.0; JOINT_DIM];
@@ -250,8 +248,7 @@ impl ControlModel {
         std::array::from_fn(|input| row_product(&self.parts.lift, input, u_lat))
     }
 
-    /// The torques within the robot's limits that are nearest to these; zero for what is not a
-    /// number.
+    /// The torques within the robot's limits that are nearest to these; zero for what is not a number.
     pub fn clamp_torque(&self, torque_nm: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         let limits = self.robot().torque_limit_nm();
         std::array::from_fn(|joint| clamped_torque(torque_nm[joint], limits[joint]))

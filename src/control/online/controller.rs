@@ -21,17 +21,16 @@ use super::stage::StageShape;
 use super::trajectory::Trajectory;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
-/// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the
-/// rows that were left out may hide.
+/// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the rows that were
+/// left out may hide.
 pub(super) const SOFTENED_FROM: Real = 1.05 * ROW_MARGIN;
 
 /// Latent model-predictive controller of one model on its robot.
 ///
-/// Built once; [`Controller::set_reference`] gives it a trajectory, [`Controller::step_into`] turns
-/// each measurement into a [`Command`]. A step allocates nothing of its own and never fails: when
-/// there is no plan to trust, the last good one is shifted and used for a few stages, then the
-/// posture is held with fading torques and damped joints, and the status says why. As soon as
-/// measurements make sense again, so do commands.
+/// Built once; [`Controller::set_reference`] gives it a trajectory, [`Controller::step_into`] turns each measurement
+/// into a [`Command`]. A step allocates nothing of its own and never fails: when there is no plan to trust, the last
+/// good one is shifted and used for a few stages, then the posture is held with fading torques and damped joints, and
+/// the status says why. As soon as measurements make sense again, so do commands.
 #[derive(Debug)]
 pub struct Controller {
     pub(super) plant: ControlModel,
@@ -70,8 +69,8 @@ impl Controller {
     /// Builds a controller of a plant and its latent dynamics.
     ///
     /// # Errors
-    /// [`ControlError::Setting`] for settings out of range and [`ControlError::Solver`] if the
-    /// solver refuses the problem.
+    /// [`ControlError::Setting`] for settings out of range and [`ControlError::Solver`] if the solver refuses the
+    /// problem.
     pub fn with_plant(
         plant: ControlModel,
         dynamics: Box<dyn LatentDynamics>,
@@ -109,14 +108,14 @@ impl Controller {
         &self.plant
     }
 
-    /// The same with the maps at the last measured state, where they depend on the state: what
-    /// inputs are projected and lifted by.
+    /// The same with the maps at the last measured state, where they depend on the state: what inputs are projected and
+    /// lifted by.
     pub fn local_plant(&self) -> &ControlModel {
         self.local.as_ref().unwrap_or(&self.plant)
     }
 
-    /// Takes the maps at a state (18, SI units), as each measurement does, if they depend on it; where
-    /// the encoder's Jacobian does not have full row rank the maps stay those of the state before.
+    /// Takes the maps at a state (18, SI units), as each measurement does, if they depend on it; where the encoder's
+    /// Jacobian does not have full row rank the maps stay those of the state before.
     pub fn stand_at(&mut self, x: &[f64]) {
         if !self.plant.is_nonlinear() {
             return;
@@ -188,8 +187,8 @@ impl Controller {
         Ok(())
     }
 
-    /// Torques of the motors, N m, that this controller's lift makes of a latent input on a stance: those
-    /// at the links and the stance's losses; not clamped.
+    /// Torques of the motors, N m, that this controller's lift makes of a latent input on a stance: those at the links
+    /// and the stance's losses; not clamped.
     ///
     /// # Errors
     /// [`LiftFailure`] of the consistent lift; the transpose lift has none.
@@ -209,8 +208,8 @@ impl Controller {
         Ok(std::array::from_fn(|joint| net[joint] + losses[joint]))
     }
 
-    /// Planned minus reference positions at the end of every stage of the last plan, in standard
-    /// deviations of the reference.
+    /// Planned minus reference positions at the end of every stage of the last plan, in standard deviations of the
+    /// reference.
     pub fn planned_deviations(&self) -> impl Iterator<Item = f64> {
         let d = self.plant.latent_dim();
         let reference = self.reference.as_ref();
@@ -235,11 +234,10 @@ impl Controller {
         self.effectiveness = Effectiveness::full(self.plant.latent_dim());
     }
 
-    /// Prepares the step at a time ahead, for the feet that the reference has on the ground then: its
-    /// stages are linearised and, with the Riccati solver, its gains computed. The step then does not
-    /// have to; its command is the same to the bit either way, to rounding after a refused measurement or
-    /// a change of feet ahead of time. To be called while nothing waits for a command, if at all. Does
-    /// nothing without a reference, or about the last plan.
+    /// Prepares the step at a time ahead, for the feet that the reference has on the ground then: its stages are
+    /// linearised and, with the Riccati solver, its gains computed. The step then does not have to; its command is the
+    /// same to the bit either way, to rounding after a refused measurement or a change of feet ahead of time. To be
+    /// called while nothing waits for a command, if at all. Does nothing without a reference, or about the last plan.
     pub fn prepare(&mut self, time_s: f64) {
         let Some(reference) = &self.reference else {
             return;

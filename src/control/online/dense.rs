@@ -9,8 +9,8 @@ pub(super) const MOST_LATENT: usize = 18;
 pub(super) const MOST_STATE: usize = 2 * MOST_LATENT;
 pub(super) const MOST_SQUARE: usize = MOST_LATENT * MOST_LATENT;
 
-/// Lower Cholesky factor of a row-major symmetric matrix in place of its lower triangle; false if it
-/// is not positive definite.
+/// Lower Cholesky factor of a row-major symmetric matrix in place of its lower triangle; false if it is not positive
+/// definite.
 pub(super) fn factorise(matrix: &mut [Real], dim: usize) -> bool {
     for i in 0..dim {
         for j in 0..=i {

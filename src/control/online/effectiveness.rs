@@ -1,20 +1,18 @@
 //! How much of the commanded input arrives.
 //!
-//! Weak motors deliver a share of the torques; under a payload the same forces accelerate the body
-//! less. Either way the velocities change by `γ B u` where the plan has `B u`, with `B` the change of
-//! velocities by the input over the time that has passed. The joint PD of the motors adds its own
-//! torques to the commanded ones, whose latent input `p` follows from the measurements at the
-//! beginning and the end of that time. With `e = dz − dz_plan` and `φ = B (u + p)`, each velocity in
-//! standard deviations of the reference, a step on the ground says
+//! Weak motors deliver a share of the torques; under a payload the same forces accelerate the body less. Either way the
+//! velocities change by `γ B u` where the plan has `B u`, with `B` the change of velocities by the input over the time
+//! that has passed. The joint PD of the motors adds its own torques to the commanded ones, whose latent input `p`
+//! follows from the measurements at the beginning and the end of that time. With `e = dz − dz_plan` and `φ = B (u +
+//! p)`, each velocity in standard deviations of the reference, a step on the ground says
 //!
 //! ```text
 //! γ = γ̂ (1 + φᵀ (e − B p) / φᵀ φ),
 //! ```
 //!
-//! and the estimate `γ̂` is the weighted mean of what steps said and of a one from before the motion.
-//! The weight of a step is `φᵀ φ` in units of the first step's, at most [`LARGEST_WEIGHT`], so that
-//! the thrust, where models err most, does not outweigh what came before; it fades by
-//! `exp(−age/T)`. Inputs are divided by `γ̂` before they are lifted.
+//! and the estimate `γ̂` is the weighted mean of what steps said and of a one from before the motion. The weight of a
+//! step is `φᵀ φ` in units of the first step's, at most [`LARGEST_WEIGHT`], so that the thrust, where models err most,
+//! does not outweigh what came before; it fades by `exp(−age/T)`. Inputs are divided by `γ̂` before they are lifted.
 
 use super::control_model::ControlModel;
 use super::controller::Measurement;
@@ -55,8 +53,8 @@ impl Share {
         }
     }
 
-    /// Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities at the
-    /// stage's `start` and `end`, its `input`, and the latent input of the drives at the command and now.
+    /// Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities
+    /// at the stage's `start` and `end`, its `input`, and the latent input of the drives at the command and now.
     fn update(
         &mut self,
         part: Real,
@@ -116,8 +114,7 @@ impl Share {
 #[derive(Debug, Clone)]
 pub(super) struct Effectiveness {
     share: Share,
-    /// Whether the plan's first stage has feet on the ground, and the change of the velocities at its
-    /// end by its input.
+    /// Whether the plan's first stage has feet on the ground, and the change of the velocities at its end by its input.
     is_grounded: bool,
     by_input: Vec<f64>,
     /// Posture and joint velocities that the motors' PD holds; none before a command.
@@ -174,8 +171,7 @@ impl Effectiveness {
         self.held = None;
     }
 
-    /// Takes a measurement with its latent velocities; `deviation` are the reference's standard
-    /// deviations of them.
+    /// Takes a measurement with its latent velocities; `deviation` are the reference's standard deviations of them.
     pub(super) fn update(
         &mut self,
         (plant, plan): (&ControlModel, &Plan),

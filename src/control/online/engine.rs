@@ -21,8 +21,8 @@ pub(super) struct Start {
 pub(super) trait StageSolver: Debug + Send {
     fn forget(&mut self) {}
 
-    /// Computes ahead what does not depend on the start, after the horizon moved on by `shift` stages and those
-    /// that `is_new` names were written.
+    /// Computes ahead what does not depend on the start, after the horizon moved on by `shift` stages and those that
+    /// `is_new` names were written.
     fn prepare(&mut self, _stages: &[StageQp], _shift: usize, _is_new: &[bool]) {}
 
     /// Solves the prepared program; how it ended, and iterations.

@@ -6,8 +6,8 @@ use crate::robot::ContactFlags;
 
 /// Why a controller could not be set up or given a reference.
 ///
-/// Once it runs, a controller does not fail: each step's command carries a
-/// [`Status`](super::Status). Samples and coordinates count from zero.
+/// Once it runs, a controller does not fail: each step's command carries a [`Status`](super::Status). Samples and
+/// coordinates count from zero.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "each variant's message names its fields")]

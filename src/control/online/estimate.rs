@@ -1,7 +1,7 @@
 //! The input of a reference that comes without one, estimated from its accelerations.
 //!
-//! In each phase the model reads `ddz = f(z, dz, u) + r`. Around an expected input `m`, with `B = ∂f/∂u`
-//! there, the reference's own acceleration leaves
+//! In each phase the model reads `ddz = f(z, dz, u) + r`. Around an expected input `m`, with `B = ∂f/∂u` there, the
+//! reference's own acceleration leaves
 //!
 //! ```text
 //! y = ddz − f(z, dz, m) = B (u − m) + r,   u − m ~ (0, S),   r ~ (0, R)
@@ -13,11 +13,11 @@
 //! û = m + S Bᵀ (B S Bᵀ + R)⁻¹ y.
 //! ```
 //!
-//! [`InputGivenState`] has `m = M [1; z; dz]`, `S` and `R` of the training. A phase without it has its mean
-//! training input and the covariance of these inputs, and `R` is estimated from the reference: input
-//! and residual of a least-squares model are uncorrelated, so `Cov(y) = B S Bᵀ + R`, and `R` is what
-//! `B S Bᵀ` leaves of the sample covariance (in units of the standard deviations of `y`, eigenvalues
-//! not below `RESIDUAL_FLOOR`). Latents whose acceleration the model hardly explains then hardly count.
+//! [`InputGivenState`] has `m = M [1; z; dz]`, `S` and `R` of the training. A phase without it has its mean training
+//! input and the covariance of these inputs, and `R` is estimated from the reference: input and residual of a
+//! least-squares model are uncorrelated, so `Cov(y) = B S Bᵀ + R`, and `R` is what `B S Bᵀ` leaves of the sample
+//! covariance (in units of the standard deviations of `y`, eigenvalues not below `RESIDUAL_FLOOR`). Latents whose
+//! acceleration the model hardly explains then hardly count.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -130,8 +130,8 @@ fn write_expected(given: &[Real], state: &[Real], d: usize, input: &mut [Real]) 
     }
 }
 
-/// Adds `S Bᵀ (B S Bᵀ + R)⁻¹ y` to an input, unless the sum in brackets is not positive definite. Matrices are row-major; `y` is
-/// overwritten.
+/// Adds `S Bᵀ (B S Bᵀ + R)⁻¹ y` to an input, unless the sum in brackets is not positive definite. Matrices are
+/// row-major; `y` is overwritten.
 fn add_correction(
     gain: &[Real],
     covariance: &[Real],

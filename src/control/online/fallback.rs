@@ -1,7 +1,7 @@
 //! Commands of a step without a trusted plan.
 //!
-//! First the last good plan, shifted, for as many stages as the settings allow; then a hold: the
-//! posture stays, the feed-forward torque fades, the joints are damped.
+//! First the last good plan, shifted, for as many stages as the settings allow; then a hold: the posture stays, the
+//! feed-forward torque fades, the joints are damped.
 
 use super::command::{Command, Source, Status};
 use super::controller::Controller;

@@ -121,8 +121,8 @@ impl Horizon {
         (&self.programs, &self.start)
     }
 
-    /// Writes what a stage has in the solution: its latent input `u_r + C_p û` and the latent state at
-    /// its end `x_r⁺ + σ x̂⁺`.
+    /// Writes what a stage has in the solution: its latent input `u_r + C_p û` and the latent state at its end `x_r⁺ +
+    /// σ x̂⁺`.
     pub(super) fn unscale(
         &self,
         index: usize,

@@ -1,7 +1,7 @@
 //! The controller behind a C interface: numbers in, numbers and codes out, never a panic.
 //!
-//! A generated controller wraps these functions under its model's name; pointers are turned into
-//! slices there, everything else happens here. A pointer that cannot be used arrives as `None`.
+//! A generated controller wraps these functions under its model's name; pointers are turned into slices there,
+//! everything else happens here. A pointer that cannot be used arrives as `None`.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
@@ -71,8 +71,8 @@ pub fn report(message: &str) {
     LAST_ERROR.with_borrow_mut(|last| *last = text);
 }
 
-/// Why the last call on this thread that made a controller or set a reference was refused; valid
-/// until the next such call on this thread.
+/// Why the last call on this thread that made a controller or set a reference was refused; valid until the next such
+/// call on this thread.
 pub fn last_error() -> *const c_char {
     LAST_ERROR.with_borrow(|last| last.as_ptr())
 }
@@ -127,8 +127,8 @@ impl<const D: usize> RawCommand<D> {
     }
 }
 
-/// [`ReferenceSamples`] as they come through the interface. Feet are four values per sample, zero in the air; of `u` the
-/// inner `None` is a bad pointer.
+/// [`ReferenceSamples`] as they come through the interface. Feet are four values per sample, zero in the air; of `u`
+/// the inner `None` is a bad pointer.
 #[derive(Debug, Clone, Copy)]
 #[allow(missing_docs, reason = "as in `ReferenceSamples`")]
 pub struct RawReference<'a> {
@@ -160,8 +160,8 @@ pub struct Handle<const D: usize> {
 }
 
 impl<const D: usize> Handle<D> {
-    /// Builds a controller with `build`, from settings or the defaults; a message is left for
-    /// [`last_error`] if there is none to be made.
+    /// Builds a controller with `build`, from settings or the defaults; a message is left for [`last_error`] if there
+    /// is none to be made.
     pub fn create(
         settings: Option<&Settings>,
         build: impl FnOnce(MpcSettings) -> Result<Controller, ControlError>,
@@ -180,8 +180,8 @@ impl<const D: usize> Handle<D> {
         made.ok()
     }
 
-    /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`]. A refused
-    /// trajectory leaves the old one.
+    /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`]. A refused trajectory leaves the
+    /// old one.
     pub fn set_reference(&mut self, raw: &RawReference<'_>) -> i32 {
         match self.take_reference(raw) {
             Ok(()) => {

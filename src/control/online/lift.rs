@@ -1,32 +1,31 @@
 //! Torques that can carry a latent input: the lift that obeys the ground.
 //!
-//! `u = W_eᵀ u_lat` returns torques *and* a body force, and nothing ties the two together. The
-//! consistent lift looks for the torques alone and lets the legs make the force:
+//! `u = W_eᵀ u_lat` returns torques *and* a body force, and nothing ties the two together. The consistent lift looks
+//! for the torques alone and lets the legs make the force:
 //!
 //! ```text
 //! minimise   ‖ M τ − u_lat ‖² + w (τ − m)ᵀ S⁻¹ (τ − m),   M = pinv(W_eᵀ) s_u [ I ; G(q, c) ]
 //! subject to |τ + ℓ| ≤ τ_max,   ‖(R F_k)_{x,y}‖ ≤ μ (R F_k)_z,   F_k = −J_k⁻ᵀ τ_k for each foot k in contact
 //! ```
 //!
-//! `τ` are the torques at the links and `τ + ℓ` the command, with the losses `ℓ` of the joints in the
-//! planned motion. `G(q, c)` maps torques to force and moment of the feet in contact, in the frame of
-//! the model's inputs; `m` and `S` are mean and covariance of the training torques in the phase,
-//! `R` turns the body frame upright. The prior
-//! decides what the latent input leaves open, twelve torques against a few latent coordinates.
-//! `τ = 0` satisfies every constraint, as `ℓ` is never beyond the limits.
+//! `τ` are the torques at the links and `τ + ℓ` the command, with the losses `ℓ` of the joints in the planned motion.
+//! `G(q, c)` maps torques to force and moment of the feet in contact, in the frame of the model's inputs; `m` and `S`
+//! are mean and covariance of the training torques in the phase, `R` turns the body frame upright. The prior decides
+//! what the latent input leaves open, twelve torques against a few latent coordinates. `τ = 0` satisfies every
+//! constraint, as `ℓ` is never beyond the limits.
 //!
-//! Torques are written by the standard deviations of the training's, `τ = m + C y` with `C Cᵀ = S`,
-//! and with `A = M C / √w` and `r = (u_lat − M m) / √w` the program becomes
+//! Torques are written by the standard deviations of the training's, `τ = m + C y` with `C Cᵀ = S`, and with `A = M C /
+//! √w` and `r = (u_lat − M m) / √w` the program becomes
 //!
 //! ```text
 //! minimise ½ ‖A y − r‖² + ½ ‖y‖²   subject to the rows,
 //! y₀ = Aᵀ (I + A Aᵀ)⁻¹ r,   I + Aᵀ A = L Lᵀ,   y = y₀ + L⁻ᵀ v:   minimise ½ ‖v‖²
 //! ```
 //!
-//! `y₀` takes a system of as many unknowns as latent coordinates and is the solution if it keeps all
-//! rows; otherwise `½ ‖v‖²` under the rows is a program of one stage, for clarabel with the cones or for the
-//! structured solver with the pyramids inside them. Torques are the solution of one convex
-//! program for every latent input, and change continuously with it.
+//! `y₀` takes a system of as many unknowns as latent coordinates and is the solution if it keeps all rows; otherwise `½
+//! ‖v‖²` under the rows is a program of one stage, for clarabel with the cones or for the structured solver with the
+//! pyramids inside them. Torques are the solution of one convex program for every latent input, and change continuously
+//! with it.
 
 use nalgebra::{Cholesky, Matrix3};
 
@@ -49,8 +48,8 @@ use crate::solver::{Outcome, Settings};
 
 /// Cap on the interior-point iterations of a lift.
 const LIFT_ITERATIONS: u32 = 60;
-/// Curvature of the cost as the solvers have it: `CURVATURE / 2 ‖v‖²`. Inputs a few deviations beyond the
-/// limits then have multipliers near those at which iterations begin.
+/// Curvature of the cost as the solvers have it: `CURVATURE / 2 ‖v‖²`. Inputs a few deviations beyond the limits then
+/// have multipliers near those at which iterations begin.
 const CURVATURE: Real = 0.01;
 
 type Torque = [f64; JOINT_DIM];
@@ -159,8 +158,8 @@ impl ConsistentLift {
         }
     }
 
-    /// Torques at the links, N m, for a latent input on a stance; with the stance's losses added they
-    /// are within the motors' limits.
+    /// Torques at the links, N m, for a latent input on a stance; with the stance's losses added they are within the
+    /// motors' limits.
     ///
     /// # Errors
     /// [`LiftFailure`] if a leg in contact is singular or the program is not solved.
@@ -206,8 +205,8 @@ impl ConsistentLift {
         self.iterations
     }
 
-    /// The rows on the torques, and the room that `torque` leaves: limits, and of each foot in contact the pyramid. A foot in the
-    /// air has a cone of which the axis is the slack, strictly inside.
+    /// The rows on the torques, and the room that `torque` leaves: limits, and of each foot in contact the pyramid. A
+    /// foot in the air has a cone of which the axis is the slack, strictly inside.
     fn write_rows(&mut self, torque: &Torque, losses_nm: &Torque, forces: &FootForces) {
         let (friction, weight_n) = (self.foot_friction, self.weight_n);
         let down = forces.iter().flatten().count();
@@ -324,8 +323,7 @@ fn solver(shape: StageShape, settings: &MpcSettings) -> Result<Box<dyn StageSolv
     })
 }
 
-/// `C` with `C Cᵀ = S`, upper triangular, of the torques of a phase; none if their precision is not
-/// positive definite.
+/// `C` with `C Cᵀ = S`, upper triangular, of the torques of a phase; none if their precision is not positive definite.
 pub fn torque_deviation(phase: &ControlPhase) -> Option<[[f64; JOINT_DIM]; JOINT_DIM]> {
     // S⁻¹ = K Kᵀ, C = K⁻ᵀ.
     let inverse = Cholesky::new(phase.torque_precision)?.l().try_inverse()?;

@@ -1,14 +1,14 @@
 //! Discrete dynamics of one stage with exact sensitivities.
 //!
-//! The latent equations `d/dt (z, dz) = (dz, f(z, dz, u))` are integrated over a stage of length
-//! `h` by the classical Runge-Kutta method with the input held,
+//! The latent equations `d/dt (z, dz) = (dz, f(z, dz, u))` are integrated over a stage of length `h` by the classical
+//! Runge-Kutta method with the input held,
 //!
 //! ```text
 //! x⁺ = F(x, u),   x = (z, dz),
 //! ```
 //!
-//! and the method itself is differentiated: with `S_i` the derivative of the i-th internal state by
-//! `(z, dz, u)` and `K_i` that of the i-th slope,
+//! and the method itself is differentiated: with `S_i` the derivative of the i-th internal state by `(z, dz, u)` and
+//! `K_i` that of the i-th slope,
 //!
 //! ```text
 //! S_1 = (I 0),   S_{i+1} = S_1 + a_i h K_i,
@@ -16,8 +16,7 @@
 //! (A B) = S_1 + h/6 (K_1 + 2 K_2 + 2 K_3 + K_4).
 //! ```
 //!
-//! So `A` and `B` are derivatives of the discrete map to rounding, not approximations of a matrix
-//! exponential.
+//! So `A` and `B` are derivatives of the discrete map to rounding, not approximations of a matrix exponential.
 
 use std::fmt::Debug;
 
@@ -33,8 +32,8 @@ const WEIGHTS: [Real; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 ///
 /// The interpreter's programs and the generated code of a controller both are.
 pub trait LatentDynamics: Debug + Send {
-    /// Writes `ddz = Xiᵀ Θ(z, dz, u)` of a phase and the entries of its Jacobian by `(z, dz, u)` that need not be zero; how
-    /// many there are, at most `3 latent_dim²`.
+    /// Writes `ddz = Xiᵀ Θ(z, dz, u)` of a phase and the entries of its Jacobian by `(z, dz, u)` that need not be zero;
+    /// how many there are, at most `3 latent_dim²`.
     fn accelerate(
         &mut self,
         phase: usize,

@@ -1,7 +1,7 @@
 //! The last good plan, in latent units, and how long it may be trusted.
 
-/// Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the
-/// stage's end is ahead of the motion and adds to the thrust; that of the middle takes from it.
+/// Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the stage's end is
+/// ahead of the motion and adds to the thrust; that of the middle takes from it.
 const POSTURE_SHARE: f64 = 0.9;
 
 /// Inputs and states of a solved horizon.
@@ -41,8 +41,8 @@ impl Plan {
         self.step_s
     }
 
-    /// Share of the first stage that has passed at a time; none before its end plus a tenth, at its
-    /// beginning, or without a plan.
+    /// Share of the first stage that has passed at a time; none before its end plus a tenth, at its beginning, or
+    /// without a plan.
     pub(super) fn share_of_first(&self, time_s: f64) -> Option<f64> {
         let share = (time_s - self.start_s?) / self.step_s;
         (share > 0.0 && share < 1.1).then_some(share)
@@ -53,8 +53,7 @@ impl Plan {
         self.phase
     }
 
-    /// The stage that a time belongs to, counted from the plan's first; none before the plan or
-    /// without one.
+    /// The stage that a time belongs to, counted from the plan's first; none before the plan or without one.
     pub fn stage_at(&self, time_s: f64) -> Option<usize> {
         let passed = (time_s - self.start_s?) / self.step_s;
         // A time that is a stage's beginning but for rounding belongs to that stage.
@@ -81,15 +80,14 @@ impl Plan {
         &self.states[stage + 1]
     }
 
-    /// State and input that the plan has at a time, beyond its end those of its last stage; none
-    /// without a plan.
+    /// State and input that the plan has at a time, beyond its end those of its last stage; none without a plan.
     pub fn at(&self, time_s: f64) -> Option<(&[f64], &[f64])> {
         let stage = self.stage_at(time_s)?.min(self.inputs.len() - 1);
         Some((self.start(stage), self.input(stage)))
     }
 
-    /// Largest deviation of a state from the one that the plan predicts for a time, in multiples
-    /// of `deviation`; none if the plan does not reach that far.
+    /// Largest deviation of a state from the one that the plan predicts for a time, in multiples of `deviation`; none
+    /// if the plan does not reach that far.
     pub(super) fn normalised_innovation(
         &self,
         time_s: f64,

@@ -1,7 +1,7 @@
 //! The optimal control problem and the rows of its constraints.
 //!
-//! At a control step at time `t` with measured latent state `x₀ = (z, dz)` the controller solves,
-//! over `N` stages of length `h` with reference `(x_r, u_r)`,
+//! At a control step at time `t` with measured latent state `x₀ = (z, dz)` the controller solves, over `N` stages of
+//! length `h` with reference `(x_r, u_r)`,
 //!
 //! ```text
 //! minimise   Σ_{k=1..N}   w_k/2 Σ_i [ (z_k,i − z_r,i)² + w_v (dz_k,i − dz_r,i)² ] / σ_i²
@@ -35,9 +35,9 @@
 //!   the rows that contradict the measurement, hence they alone are soft, and from stage 1 on: `u = 0`
 //!   satisfies all others but those of a limited torque rate.
 //!
-//! All is written in deviations divided by their scale, `x_k = x_r,k + σ x̂_k` and
-//! `u_k = u_r,k + C_p û_k` with `C_p C_pᵀ = S_p`, and each row divided by its limit: then the cost is
-//! a constant diagonal and the solver needs no scaling of its own.
+//! All is written in deviations divided by their scale, `x_k = x_r,k + σ x̂_k` and `u_k = u_r,k + C_p û_k` with `C_p
+//! C_pᵀ = S_p`, and each row divided by its limit: then the cost is a constant diagonal and the solver needs no scaling
+//! of its own.
 
 use nalgebra::DVector;
 
@@ -50,15 +50,15 @@ use super::stage::StageCost;
 use super::trajectory::Trajectory;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
 
-/// Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all
-/// multipliers near one and needs two iterations more if it has to bring them to 100.
+/// Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all multipliers near one and
+/// needs two iterations more if it has to bring them to 100.
 const SLACK_PRICE: Real = 10.0;
 
 /// Distance from the mean training input, in standard deviations, within which limits matter.
 const INPUT_REACH: f64 = 10.0;
 
-/// By how much the rows that are kept may let one that is left out be exceeded, relative to its
-/// limit or half range: plans may be that far off, commands are clamped and are not.
+/// By how much the rows that are kept may let one that is left out be exceeded, relative to its limit or half range:
+/// plans may be that far off, commands are clamped and are not.
 pub(super) const ROW_MARGIN: Real = 0.02;
 
 /// A row `row · v ≤ bound` on latent inputs or latent positions.
@@ -70,8 +70,8 @@ pub struct Row {
     pub row: Vec<f64>,
     /// Right-hand side.
     pub bound: f64,
-    /// By how much a loss of 1 N m in the joint takes from the right-hand side; zero unless the row is
-    /// that of a torque limit.
+    /// By how much a loss of 1 N m in the joint takes from the right-hand side; zero unless the row is that of a torque
+    /// limit.
     pub per_loss: f64,
 }
 
@@ -143,11 +143,10 @@ fn turn_force(rotation: &[Real], force: &[Real], coefficient: Real, d: usize, ou
 impl StageRows {
     /// The rows for a model on its robot.
     ///
-    /// Unless all are asked for, two kinds are left out, once: rows that the others imply to within
-    /// 2 % of the limit, and torque rows that in no phase an input within `INPUT_REACH` standard
-    /// deviations of the training inputs can reach. A plan may pass a limit that was left out, by
-    /// 2 % or by asking for an input unlike any in training, or where the joints take much; the command
-    /// is clamped and does not.
+    /// Unless all are asked for, two kinds are left out, once: rows that the others imply to within 2 % of the limit,
+    /// and torque rows that in no phase an input within `INPUT_REACH` standard deviations of the training inputs can
+    /// reach. A plan may pass a limit that was left out, by 2 % or by asking for an input unlike any in training, or
+    /// where the joints take much; the command is clamped and does not.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Self {
         Self::selected(plant, settings, row_selection(plant, settings))
     }
@@ -233,8 +232,8 @@ pub(super) fn row_selection(plant: &ControlModel, settings: &MpcSettings) -> Row
 }
 
 impl StageRows {
-    /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes
-    /// there, so that the rows are not the same.
+    /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes there, so that the
+    /// rows are not the same.
     pub(super) fn with_maps_of(
         &self,
         plant: &ControlModel,
@@ -245,11 +244,11 @@ impl StageRows {
         (shape(&rows) == shape(self)).then_some(rows)
     }
 
-    /// The same without the joint rows that no state within `STATE_REACH` standard deviations of
-    /// some state of the reference reaches, the deviations being the reference's own.
+    /// The same without the joint rows that no state within `STATE_REACH` standard deviations of some state of the
+    /// reference reaches, the deviations being the reference's own.
     ///
-    /// Joint limits are soft and positions in commands are clamped, so what is given up is only that
-    /// a plan from far away bends around limits that its reference is nowhere near.
+    /// Joint limits are soft and positions in commands are clamped, so what is given up is only that a plan from far
+    /// away bends around limits that its reference is nowhere near.
     pub fn near(mut self, reference: &Reference) -> Self {
         let deviation = reference.deviation();
         let matters = |row: &Row| reference.comes_near(&row.row, row.bound, deviation);
@@ -258,8 +257,8 @@ impl StageRows {
     }
 }
 
-/// Whether an input within `INPUT_REACH` standard deviations reaches a row's bound in some phase:
-/// the farthest that such inputs go along the row is `row · m + reach ‖Cᵀ row‖`.
+/// Whether an input within `INPUT_REACH` standard deviations reaches a row's bound in some phase: the farthest that
+/// such inputs go along the row is `row · m + reach ‖Cᵀ row‖`.
 fn is_reachable(plant: &ControlModel, row: &Row) -> bool {
     let direction = DVector::from_column_slice(&row.row);
     plant.phases().iter().any(|phase| {
@@ -321,8 +320,7 @@ pub fn to_upright(frame: WrenchFrame, attitude: [f64; 2]) -> [[f64; 3]; 3] {
     }
 }
 
-/// Rotation from the body frame to an upright frame with the same heading, `R_y(pitch) R_x(roll)`,
-/// row-major.
+/// Rotation from the body frame to an upright frame with the same heading, `R_y(pitch) R_x(roll)`, row-major.
 pub fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
     let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) =
         (attitude[0].sin_cos(), attitude[1].sin_cos());

@@ -1,9 +1,9 @@
 //! Which of many linear constraints can be active at all.
 //!
-//! A row is superfluous if no point that satisfies the other rows violates it by more than a margin.
-//! That is a linear program for each row: maximise `row · v` subject to the others, with the row
-//! itself relaxed so that the maximum exists. The margin matters: left and right legs have nearly
-//! equal rows, of which each cuts a sliver off what the other allows.
+//! A row is superfluous if no point that satisfies the other rows violates it by more than a margin. That is a linear
+//! program for each row: maximise `row · v` subject to the others, with the row itself relaxed so that the maximum
+//! exists. The margin matters: left and right legs have nearly equal rows, of which each cuts a sliver off what the
+//! other allows.
 
 use super::problem::Row;
 use super::qp::{Cone, ConeProgram, QpSettings, QpSolver, sparse};
@@ -11,10 +11,9 @@ use crate::solver::Outcome;
 
 /// The rows without those that follow from the others to within `margin`, in the same order.
 ///
-/// Rows are tried from the last to the first, so of two equal rows the first stays. As rows leave,
-/// earlier decisions loosen; at the end each dropped row is tried against those that stayed and
-/// comes back if they no longer imply it. A row also stays whenever its linear program is not solved
-/// beyond doubt.
+/// Rows are tried from the last to the first, so of two equal rows the first stays. As rows leave, earlier decisions
+/// loosen; at the end each dropped row is tried against those that stayed and comes back if they no longer imply it. A
+/// row also stays whenever its linear program is not solved beyond doubt.
 pub fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
     let mut is_kept = vec![true; rows.len()];
     for index in (0..rows.len()).rev() {

@@ -7,10 +7,10 @@
 //! subject to A x + s = b,   s ∈ K = K₁ × K₂ × …
 //! ```
 //!
-//! with `K` a product of zero, nonnegative and second-order cones. A [`QpSolver`] is built once
-//! for a pattern of `P` and `A`; afterwards only values change. What a solve returns is a value,
-//! [`Outcome`], and it is `Solved` only if the optimality conditions hold for the returned point
-//! by [`QpSolver::residuals`], which is computed here from the problem's own data.
+//! with `K` a product of zero, nonnegative and second-order cones. A [`QpSolver`] is built once for a pattern of `P`
+//! and `A`; afterwards only values change. What a solve returns is a value, [`Outcome`], and it is `Solved` only if the
+//! optimality conditions hold for the returned point by [`QpSolver::residuals`], which is computed here from the
+//! problem's own data.
 
 use clarabel::algebra::{CscMatrix, VectorMath};
 use clarabel::solver::{
@@ -43,8 +43,8 @@ impl Cone {
 /// A matrix in compressed sparse columns.
 pub type SparseColumns = CscMatrix<f64>;
 
-/// The matrix of `(row, column, value)` in any order, each inside `n_rows` by `n_cols`, zeros among them; values of
-/// one place are added.
+/// The matrix of `(row, column, value)` in any order, each inside `n_rows` by `n_cols`, zeros among them; values of one
+/// place are added.
 pub fn sparse(n_rows: usize, n_cols: usize, entries: &[(usize, usize, f64)]) -> SparseColumns {
     let mut entries = entries.to_vec();
     entries.sort_unstable_by_key(|&(row, col, _)| (col, row));
@@ -85,8 +85,8 @@ pub struct ConeProgram {
 /// How clarabel is set up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SolverProfile {
-    /// For a problem whose rows and variables are already scaled and which is solved over and
-    /// over: no equilibration, no iterative refinement, no presolve.
+    /// For a problem whose rows and variables are already scaled and which is solved over and over: no equilibration,
+    /// no iterative refinement, no presolve.
     Tuned,
     /// For a problem that is solved once: the solver's scaling and refinement, to the given tolerance.
     Scaled,
@@ -190,8 +190,8 @@ impl QpSolver {
         {
             return Outcome::NumericalFailure;
         }
-        // An iterator of all positions would do without whole vectors, at the price of a division per
-        // entry inside clarabel: whole-vector updates are copied as they are.
+        // An iterator of all positions would do without whole vectors, at the price of a division per entry inside
+        // clarabel: whole-vector updates are copied as they are.
         let (program, solver) = (&self.program, &mut self.solver);
         let updated = solver.update_q(&program.q).is_ok()
             && solver.update_b(&program.b).is_ok()

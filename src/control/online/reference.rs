@@ -16,8 +16,8 @@ pub struct ReferenceSamples<'a> {
     pub x: &'a [f64],
     /// Velocities, 18 values per sample.
     pub dx: &'a [f64],
-    /// Generalised inputs (12 torques, force, moment), 18 values per sample, if they are known; the
-    /// controller estimates them if not.
+    /// Generalised inputs (12 torques, force, moment), 18 values per sample, if they are known; the controller
+    /// estimates them if not.
     pub u: Option<&'a [f64]>,
     /// Feet in contact.
     pub feet: &'a [ContactFlags],
@@ -25,8 +25,8 @@ pub struct ReferenceSamples<'a> {
 
 /// An encoded trajectory that can be sampled at any time.
 ///
-/// Between samples positions and velocities are interpolated linearly; before the first sample and
-/// after the last the end is held at rest.
+/// Between samples positions and velocities are interpolated linearly; before the first sample and after the last the
+/// end is held at rest.
 #[derive(Debug, Clone)]
 pub struct Reference {
     latent_dim: usize,
@@ -46,10 +46,9 @@ impl Reference {
     /// Encodes a trajectory.
     ///
     /// # Errors
-    /// [`ControlError::ReferenceLen`] below two samples, [`ControlError::ReferenceShape`] if array lengths
-    /// disagree, [`ControlError::ReferenceValue`] for values that are not finite,
-    /// [`ControlError::ReferenceTime`] if time does not increase and [`ControlError::ReferencePhase`] if a
-    /// foot pattern selects no phase.
+    /// [`ControlError::ReferenceLen`] below two samples, [`ControlError::ReferenceShape`] if array lengths disagree,
+    /// [`ControlError::ReferenceValue`] for values that are not finite, [`ControlError::ReferenceTime`] if time does
+    /// not increase and [`ControlError::ReferencePhase`] if a foot pattern selects no phase.
     pub fn new(plant: &ControlModel, samples: ReferenceSamples<'_>) -> Result<Self, ControlError> {
         check(plant, &samples)?;
         let d = plant.latent_dim();
@@ -79,8 +78,7 @@ impl Reference {
         Ok(reference)
     }
 
-    /// Gives a trajectory that comes without its input the one that the model finds behind its
-    /// accelerations.
+    /// Gives a trajectory that comes without its input the one that the model finds behind its accelerations.
     pub(super) fn estimate_input(
         &mut self,
         plant: &ControlModel,
@@ -94,9 +92,8 @@ impl Reference {
         self.input.is_some()
     }
 
-    /// Standard deviation of each of `(z, dz)` over the trajectory, never below a hundredth of
-    /// the largest position's or velocity's; for one that stands still, the scale of a small
-    /// motion of the joints.
+    /// Standard deviation of each of `(z, dz)` over the trajectory, never below a hundredth of the largest position's
+    /// or velocity's; for one that stands still, the scale of a small motion of the joints.
     pub fn deviation(&self) -> &[f64] {
         &self.deviation
     }

@@ -1,5 +1,5 @@
-//! Settings of the controller: the one table of names, defaults, ranges and descriptions, from which the structures in Rust
-//! and C, their checks, the headers, the Python binding and the parameters of ROS are made.
+//! Settings of the controller: the one table of names, defaults, ranges and descriptions, from which the structures in
+//! Rust and C, their checks, the headers, the Python binding and the parameters of ROS are made.
 
 use super::error::ControlError;
 use super::qp::QpSettings;
@@ -7,12 +7,11 @@ use super::qp::QpSettings;
 /// How a latent input becomes joint torques, each way with its number for interfaces without enumerations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Lift {
-    /// The paper's `u = W_eᵀ u_lat`: the torques are its leading entries, the body force that it
-    /// holds as well need not be the one that these torques produce.
+    /// The paper's `u = W_eᵀ u_lat`: the torques are its leading entries, the body force that it holds as well need not
+    /// be the one that these torques produce.
     Transpose = 0,
-    /// The torques whose own ground reaction forces come closest to the latent input, within
-    /// torque limits and the friction cones of the feet in contact; see
-    /// [`ConsistentLift`](super::ConsistentLift).
+    /// The torques whose own ground reaction forces come closest to the latent input, within torque limits and the
+    /// friction cones of the feet in contact; see [`ConsistentLift`](super::ConsistentLift).
     Consistent = 1,
 }
 
@@ -28,8 +27,7 @@ pub enum Linearisation {
 /// What stands for the dynamics of the reference itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Drift {
-    /// The reference's own finite differences if it has an input, its own or an estimate, otherwise
-    /// the model.
+    /// The reference's own finite differences if it has an input, its own or an estimate, otherwise the model.
     Automatic,
     /// The reference's own finite differences: the model is trusted for deviations only.
     Reference,
@@ -40,8 +38,7 @@ pub enum Drift {
 /// What stands for the input of a reference that comes without one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MissingInput {
-    /// What the model finds behind the reference's accelerations, see
-    /// [`estimate`](super::estimate).
+    /// What the model finds behind the reference's accelerations, see [`estimate`](super::estimate).
     Estimate,
     /// The mean training input of each phase: the optimisation has to find the rest.
     Mean,
@@ -61,9 +58,9 @@ pub enum RowSelection {
 pub enum Solver {
     /// clarabel, for all rows and cones.
     Clarabel = 0,
-    /// The structured [`solver`](crate::solver): Riccati's recursion where no row is active, else an
-    /// interior point of it; for at most [`MAX_STRUCTURED_DIM`](super::MAX_STRUCTURED_DIM) latent
-    /// coordinates, with friction pyramids inside the cones.
+    /// The structured [`solver`](crate::solver): Riccati's recursion where no row is active, else an interior point of
+    /// it; for at most [`MAX_STRUCTURED_DIM`](super::MAX_STRUCTURED_DIM) latent coordinates, with friction pyramids
+    /// inside the cones.
     Riccati = 1,
 }
 
@@ -76,8 +73,8 @@ pub struct FallbackSettings {
     pub torque_decay_s: f64,
     /// Joint damping of a hold, N m s/rad, on measured joint velocities.
     pub damping_nm_s: f64,
-    /// Deviation from the predicted latent state, in standard deviations of the reference, from
-    /// which a measurement is not believed at first.
+    /// Deviation from the predicted latent state, in standard deviations of the reference, from which a measurement is
+    /// not believed at first.
     pub jump_deviations: f64,
     /// How many steps in a row a measurement is disbelieved before it is taken for true.
     pub jump_patience: usize,
@@ -266,8 +263,8 @@ macro_rules! settings {
             /// The same for the controller.
             ///
             /// # Errors
-            /// [`ControlError::Setting`] for a choice or a count that does not exist; other ranges are
-            /// checked when the controller is built.
+            /// [`ControlError::Setting`] for a choice or a count that does not exist; other ranges are checked when the
+            /// controller is built.
             pub fn to_mpc(&self) -> Result<MpcSettings, ControlError> {
                 for (setting, found) in SETTINGS.iter().zip(self.numbers()) {
                     if let Accepts::Whole(..) = setting.accepts {
@@ -323,13 +320,13 @@ settings! {
             "UPPER_CLARABEL (default) or _RICCATI", in_c "";
         /// The input is held over it.
         step_s: f64 = 0.01 => step_s: f64, Accepts::Positive, "duration of a stage, s";
-        /// (`w_u`), measured by the inverse covariance of the training inputs. Along a recording it hardly
-        /// matters; in closed loop (`examples/mujoco/closed_loop.py`) a weight of one follows errors of the
-        /// model into a fall, a weight of hundreds is the reference input without feedback.
+        /// (`w_u`), measured by the inverse covariance of the training inputs. Along a recording it hardly matters; in
+        /// closed loop (`examples/mujoco/closed_loop.py`) a weight of one follows errors of the model into a fall, a
+        /// weight of hundreds is the reference input without feedback.
         input_weight: f64 = 10.0 => input_weight: Real, Accepts::Positive,
             "weight of deviations from the reference's input";
-        /// (`w_v`). In closed loop small weights let a jump that is under-powered, by a payload or weak motors,
-        /// end short; see `docs/control.md`.
+        /// (`w_v`). In closed loop small weights let a jump that is under-powered, by a payload or weak motors, end
+        /// short; see `docs/control.md`.
         velocity_weight: f64 = 0.1 => velocity_weight: Real, Accepts::Positive,
             "weight of velocities against positions";
         terminal_weight: f64 = 1.0 => terminal_weight: Real, Accepts::Positive,

@@ -4,9 +4,9 @@
 //! x̂⁺ = A x̂ + B v + c,   G v <= g,   E p̂⁺ − t <= e,   t >= 0,   L v − L⁻ v⁻ <= l + o⁻ − o,   k − K v ∈ second-order cones
 //! ```
 //!
-//! `p̂⁺` are the positions among the states `x̂⁺`, `L⁻ v⁻` and `o⁻` belong to the stage before. Both solvers take stages as
-//! they are: [`conic`](super::conic) makes clarabel's sparse matrices of them, [`structured`](super::structured)
-//! solves them one after the other.
+//! `p̂⁺` are the positions among the states `x̂⁺`, `L⁻ v⁻` and `o⁻` belong to the stage before. Both solvers take
+//! stages as they are: [`conic`](super::conic) makes clarabel's sparse matrices of them,
+//! [`structured`](super::structured) solves them one after the other.
 
 use super::dense::{MOST_LATENT, Real};
 use super::linearise::StageModel;
@@ -183,8 +183,8 @@ impl StageQp {
         }
     }
 
-    /// Friction of the force with rows `(μ F_z, F_x, F_y)`, all zero without contact, as a cone or as the last rows on the
-    /// input. Without contact slacks are strictly inside.
+    /// Friction of the force with rows `(μ F_z, F_x, F_y)`, all zero without contact, as a cone or as the last rows on
+    /// the input. Without contact slacks are strictly inside.
     pub(super) fn write_friction(&mut self, force: &[f64], scale: &StageScale<'_>) {
         let dim = scale.input.len();
         for (number, bound) in self.cones.bounds.iter_mut().enumerate() {
@@ -211,7 +211,8 @@ impl StageScale<'_> {
     }
 }
 
-/// Writes `σ⁻¹ A σ` and `σ⁻¹ B C_p` of derivatives `(A B)`, `2d × 3d`; all row-major but `C_p`, lower triangular, column by column.
+/// Writes `σ⁻¹ A σ` and `σ⁻¹ B C_p` of derivatives `(A B)`, `2d × 3d`; all row-major but `C_p`, lower triangular,
+/// column by column.
 fn scale_dynamics(
     by: &[Real],
     root: &[Real],
@@ -250,8 +251,8 @@ fn scale_row(row: &[Real], root: &[Real], input: &[Real], d: usize, out: &mut [R
     at_reference
 }
 
-/// Writes the friction pyramid of a force with rows `(μ F_z, F_x, F_y)`, all zero without contact, where slacks are strictly
-/// inside.
+/// Writes the friction pyramid of a force with rows `(μ F_z, F_x, F_y)`, all zero without contact, where slacks are
+/// strictly inside.
 fn write_pyramid(
     force: &[Real],
     root: &[Real],
@@ -296,8 +297,8 @@ pub(super) fn unscale(
     }
 }
 
-/// What a step `next` with derivatives `(A B)` at `(x, u)` leaves of the dynamics at a reference `(state, input)` that goes to
-/// `end`: `next + A (state − x) + B (input − u) − end`.
+/// What a step `next` with derivatives `(A B)` at `(x, u)` leaves of the dynamics at a reference `(state, input)` that
+/// goes to `end`: `next + A (state − x) + B (input − u) − end`.
 pub(super) fn write_defect(
     next: &[Real],
     by: &[Real],

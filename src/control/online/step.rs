@@ -105,8 +105,8 @@ impl Controller {
         }
     }
 
-    /// Largest violation of a joint limit at the ends of the plan's stages, in half ranges of the
-    /// joint, whichever rows the program has.
+    /// Largest violation of a joint limit at the ends of the plan's stages, in half ranges of the joint, whichever rows
+    /// the program has.
     fn largest_violation(&self) -> f64 {
         let d = self.plant.latent_dim();
         let limits = self.plant.robot().joint_limit_rad();

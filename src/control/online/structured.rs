@@ -12,8 +12,8 @@ use crate::solver::{
 pub const TOLERANCE: f64 = 1e-9;
 /// Gap between primal and dual cost, relative to the cost, at which they end as well.
 const GAP: Real = 1e-8;
-/// Complementarity and violation of rows at which iterations end if torque rates are limited: their rows tie the
-/// inputs of all stages together, so that each is as good as the worst.
+/// Complementarity and violation of rows at which iterations end if torque rates are limited: their rows tie the inputs
+/// of all stages together, so that each is as good as the worst.
 pub const RATE_TOLERANCE: f64 = 1e-12;
 /// How soft the rows of such a program are within a step, see [`Links`].
 pub const RATE_SOFTNESS: f64 = 1e-8;
@@ -21,7 +21,8 @@ pub const RATE_SOFTNESS: f64 = 1e-8;
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
 /// The solver of a horizon, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]. An odd dimension is filled up
-/// to the next even one with inputs and states that nothing moves, which changes no bit and halves what has to be compiled.
+/// to the next even one with inputs and states that nothing moves, which changes no bit and halves what has to be
+/// compiled.
 pub(super) fn structured(
     horizon: usize,
     shape: StageShape,
@@ -233,8 +234,8 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StageSolver
     }
 }
 
-/// [`Program::prepare`] with the widest vectors that the processor has; the bits are the same with all. Programs
-/// with rates, which are rare, make do with the narrowest: a copy less to compile.
+/// [`Program::prepare`] with the widest vectors that the processor has; the bits are the same with all. Programs with
+/// rates, which are rare, make do with the narrowest: a copy less to compile.
 pub fn prepare<const NX: usize, const NU: usize, const LINKED: bool>(
     program: &mut Program<'_, f64, NX, NU, LINKED>,
 ) -> bool {

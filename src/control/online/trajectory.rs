@@ -1,7 +1,7 @@
 //! A trajectory at any time, wherever its samples are. C is made of this file.
 //!
-//! In: samples, by the required methods of [`Trajectory`]. Out: states, inputs, phases, accelerations. Between samples states are
-//! on the straight line; before the first and after the last the end is held at rest.
+//! In: samples, by the required methods of [`Trajectory`]. Out: states, inputs, phases, accelerations. Between samples
+//! states are on the straight line; before the first and after the last the end is held at rest.
 
 use super::dense::{MOST_LATENT, MOST_STATE, Real, add_scaled};
 
@@ -159,8 +159,8 @@ pub(super) trait Trajectory {
         }
     }
 
-    /// Writes the standard deviation of each of `(z, dz)`, never below a hundredth of the largest of its kind; `still` if that
-    /// is a motion within which the trajectory stands still.
+    /// Writes the standard deviation of each of `(z, dz)`, never below a hundredth of the largest of its kind; `still`
+    /// if that is a motion within which the trajectory stands still.
     fn write_deviations(&self, still: &[Real], deviation: &mut [Real]) {
         let d = self.latent_dim();
         let mut mean: [Real; MOST_STATE] = [0.0; MOST_STATE];
@@ -209,7 +209,8 @@ pub(super) trait Trajectory {
         }
     }
 
-    /// Whether a state within `STATE_REACH` standard deviations of some state of the trajectory reaches `row · z = bound`.
+    /// Whether a state within `STATE_REACH` standard deviations of some state of the trajectory reaches `row · z =
+    /// bound`.
     fn comes_near(&self, row: &[Real], bound: Real, deviation: &[Real]) -> bool {
         let d = self.latent_dim();
         let mut z: [Real; MOST_LATENT] = [0.0; MOST_LATENT];

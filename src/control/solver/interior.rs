@@ -119,8 +119,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let share = boundary_share(complementarity);
         let mut longest = T::ZERO;
         let mut aim = T::ZERO;
-        // A loop of two turns, so that the passes over the stages are compiled once: the first looks for
-        // the step that does not centre, the second takes the one that does.
+        // A loop of two turns, so that the passes over the stages are compiled once: the first looks for the step that
+        // does not centre, the second takes the one that does.
         for turn in 0..2 {
             let is_corrected = turn > 0;
             if is_corrected {
@@ -129,8 +129,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             let reach = self.advance(point.kept, is_corrected);
             longest = share / reach.times.or_larger(share);
             if !is_corrected {
-                // What is left of the products, exactly: a change that does not centre cancels their
-                // first order.
+                // What is left of the products, exactly: a change that does not centre cancels their first order.
                 let rest = T::ONE - longest;
                 let square = longest * longest;
                 let predicted = Point {
@@ -154,8 +153,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         longest
     }
 
-    /// Gains with the weights of the rows, and the constant parts of the inputs' changes for a step that
-    /// does not centre; `left` is the share of the rows' residuals that is left.
+    /// Gains with the weights of the rows, and the constant parts of the inputs' changes for a step that does not
+    /// centre; `left` is the share of the rows' residuals that is left.
     #[inline(always)]
     fn predict(&mut self, left: T) -> bool {
         let shape = self.shape;
@@ -258,8 +257,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         true
     }
 
-    /// Constant parts of the inputs' changes for a step that aims at this product of slacks and
-    /// multipliers, with the second order of the step that does not centre.
+    /// Constant parts of the inputs' changes for a step that aims at this product of slacks and multipliers, with the
+    /// second order of the step that does not centre.
     #[inline(always)]
     fn pull_all(&mut self, left: T, aim: T) {
         let shape = self.shape;
@@ -310,8 +309,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         }
     }
 
-    /// The changes of all unknowns. Before the correction the multipliers aimed at are those that make
-    /// every product zero to first order, so that their changes follow from those of the slacks.
+    /// The changes of all unknowns. Before the correction the multipliers aimed at are those that make every product
+    /// zero to first order, so that their changes follow from those of the slacks.
     #[inline(always)]
     fn advance(&mut self, left: T, is_corrected: bool) -> Reach<T> {
         let soft = self.shape.soft;
@@ -419,8 +418,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
 }
 
 impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
-    /// Adds the `count` soft rows, with weights `w` and multipliers `y`, to gradient and Hessian by the state; the slack is
-    /// eliminated.
+    /// Adds the `count` soft rows, with weights `w` and multipliers `y`, to gradient and Hessian by the state; the
+    /// slack is eliminated.
     #[inline(always)]
     fn add_soft_rows(
         &mut self,

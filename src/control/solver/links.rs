@@ -1,7 +1,7 @@
 //! Rows that link the inputs of consecutive stages, `L_k v_k − L_{k−1} v_{k−1} <= bound`.
 //!
-//! The recursion then goes over the state and the input before it: with `w` the weights of a stage's
-//! links and `V(x, v_before) = ½ xᵀ P x + v_beforeᵀ M x + ½ v_beforeᵀ N v_before + …`,
+//! The recursion then goes over the state and the input before it: with `w` the weights of a stage's links and `V(x,
+//! v_before) = ½ xᵀ P x + v_beforeᵀ M x + ½ v_beforeᵀ N v_before + …`,
 //!
 //! ```text
 //! H_vv = R + L_kᵀ w L_k + Bᵀ P B + M B + (M B)ᵀ + N,   H_vx = Bᵀ P A + M A,   C = −L_kᵀ w L_{k−1}
@@ -9,11 +9,11 @@
 //! M ← −Cᵀ K,   N ← L_{k−1}ᵀ w L_{k−1} − Cᵀ K_before
 //! ```
 //!
-//! `N` is the difference of two matrices of the weights' size, and near the optimum the weight of an active
-//! row grows without bound: what is left of `N` would be rounding. Rows of a linked program are
-//! therefore softened: the equation of a row is `row · dv + ds − softness dy = −residual`, its weight
-//! `y / (s + softness y)` at most `1 / softness`. A step then leaves `softness dy` of a row, which
-//! vanishes with the steps, so that the optimum is that of the rows as they stand.
+//! `N` is the difference of two matrices of the weights' size, and near the optimum the weight of an active row grows
+//! without bound: what is left of `N` would be rounding. Rows of a linked program are therefore softened: the equation
+//! of a row is `row · dv + ds − softness dy = −residual`, its weight `y / (s + softness y)` at most `1 / softness`. A
+//! step then leaves `softness dy` of a row, which vanishes with the steps, so that the optimum is that of the rows as
+//! they stand.
 
 use super::lower::Lower;
 use super::problem::{Program, Stage};

@@ -7,15 +7,14 @@
 //!            L_k v_k − L_{k−1} v_{k−1} <= l_k,   L_0 v_0 <= l_0
 //! ```
 //!
-//! In: a [`Program`], stages and rows in memory that the caller lends. Out: inputs, states and
-//! multipliers in that memory, and a [`Report`]. First the linear-quadratic optimum, by gains that
-//! [`Program::prepare`] makes ahead; if it keeps every row it is the optimum. Otherwise Mehrotra's
-//! interior point, of which each step is another Riccati recursion, from the last solution or, where
-//! that proves far away, from a well-centred point. Iterations are bounded; `Solved` means that the
-//! optimality conditions hold, computed from the program's own numbers.
+//! In: a [`Program`], stages and rows in memory that the caller lends. Out: inputs, states and multipliers in that
+//! memory, and a [`Report`]. First the linear-quadratic optimum, by gains that [`Program::prepare`] makes ahead; if it
+//! keeps every row it is the optimum. Otherwise Mehrotra's interior point, of which each step is another Riccati
+//! recursion, from the last solution or, where that proves far away, from a well-centred point. Iterations are bounded;
+//! `Solved` means that the optimality conditions hold, computed from the program's own numbers.
 //!
-//! Nothing here needs `std` or allocates, and every sum has one order: C that `romc compile --emit
-//! controller-c` makes has the same bits. Read `problem` first, then `solve`.
+//! Nothing here needs `std` or allocates, and every sum has one order: C that `romc compile --emit controller-c` makes
+//! has the same bits. Read `problem` first, then `solve`.
 //!
 //! ```
 //! use romc::solver::{Cost, Links, Outcome, Program, RowMatrices, Settings, Shape, Stage};

@@ -38,13 +38,12 @@ pub(super) const AGAIN: Centring = Centring {
     slack: 1e-1,
     product: 2e-1,
 };
-/// A guess is of quite another program if the optimum without rows moved further than this, in units of
-/// the input's rows.
+/// A guess is of quite another program if the optimum without rows moved further than this, in units of the input's
+/// rows.
 pub(super) const FAR_CHANGE: f64 = 3.0;
 /// A first step from a guess that is shorter than this shows that the guess is not near a solution.
 pub(super) const SHORT_STEP: f64 = 0.4;
-/// Iterations after which slacks and multipliers are centred again: now and then the method goes round
-/// in a circle.
+/// Iterations after which slacks and multipliers are centred again: now and then the method goes round in a circle.
 pub(super) const PATIENCE: u32 = 16;
 
 /// Share of the residuals at the last centring, those of the gradient among them, that may be left.
@@ -86,8 +85,8 @@ impl<T: Real> Point<T> {
         self.kept * self.residual
     }
 
-    /// Whether the iterations may end here: gradient and rows hold, and each product, or the gap between primal
-    /// and dual cost, is small.
+    /// Whether the iterations may end here: gradient and rows hold, and each product, or the gap between primal and
+    /// dual cost, is small.
     #[inline(always)]
     pub(super) fn is_optimal(&self, settings: &Settings<T>) -> bool {
         self.left <= T::of(LEFT)

@@ -80,8 +80,8 @@ pub struct Shape {
     pub hard_offset: usize,
     /// Rows that link the input to that of the stage before; none unless the program has [`Links`].
     pub link: usize,
-    /// How many pairs of opposite rows come first, the two sides of a limit: `row, −row`. Each takes the
-    /// products and squares of one row.
+    /// How many pairs of opposite rows come first, the two sides of a limit: `row, −row`. Each takes the products and
+    /// squares of one row.
     pub pairs: Pairs,
 }
 
@@ -119,8 +119,8 @@ impl Shape {
     }
 }
 
-/// Numbers per row: bound, slack, multiplier, weight, target, residual, the change of slack and
-/// multiplier, and the slack's inverse.
+/// Numbers per row: bound, slack, multiplier, weight, target, residual, the change of slack and multiplier, and the
+/// slack's inverse.
 pub(super) const ROW_NUMBERS: usize = 9;
 
 /// Coefficients of the rows; stages may share them.
@@ -134,8 +134,7 @@ pub struct RowMatrices<'a, T, const NU: usize> {
     pub hard: &'a [[T; NU]],
 }
 
-/// The cost, the same at all stages but for the last one's states:
-/// `½ vᵀ R v + ½ xᵀ Q x + price t`.
+/// The cost, the same at all stages but for the last one's states: `½ vᵀ R v + ½ xᵀ Q x + price t`.
 #[derive(Debug, Clone, Copy)]
 pub struct Cost<T, const NX: usize, const NU: usize> {
     /// Diagonal of `Q` before the last stage.
@@ -201,8 +200,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         &self.rows[self.at(stage) * self.shape.memory() + 2 * rows..][..rows]
     }
 
-    /// Moves the horizon on by one stage: the second becomes the first, and the first the last, whose
-    /// data have to be written then. Inputs, slacks and multipliers stay as a guess at the next solution.
+    /// Moves the horizon on by one stage: the second becomes the first, and the first the last, whose data have to be
+    /// written then. Inputs, slacks and multipliers stay as a guess at the next solution.
     pub fn shift(&mut self) {
         let rows = self.shape.rows();
         let memory = self.shape.memory();
@@ -227,8 +226,8 @@ pub struct Settings<T> {
     pub max_iterations: u32,
     /// Violation of rows and largest product of slack and multiplier at which the iterations end.
     pub tolerance: T,
-    /// Sum of these products, in units of `Σ vᵀ R v + xᵀ Q x` or of one where that is less, at which the
-    /// iterations end as well; zero for the largest product to decide.
+    /// Sum of these products, in units of `Σ vᵀ R v + xᵀ Q x` or of one where that is less, at which the iterations end
+    /// as well; zero for the largest product to decide.
     pub gap: T,
     /// Largest residual of the optimality conditions with which a point counts as solved.
     pub accepted_residual: T,
@@ -251,8 +250,7 @@ pub enum Outcome {
     Unbounded,
 }
 
-/// Residuals of the optimality conditions, each relative to the size of the terms it is made of
-/// (never less than one).
+/// Residuals of the optimality conditions, each relative to the size of the terms it is made of (never less than one).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residuals<T> {
     /// Largest violation of a row or cone, or error of the dynamics.

@@ -11,8 +11,8 @@ use super::problem::Stage;
 use super::rows::{part, part_mut};
 use super::scalar::Real;
 
-/// Most inputs, and the width of rows of `NU` numbers that are filled up with zeros: vectors of four
-/// then have no odd ends.
+/// Most inputs, and the width of rows of `NU` numbers that are filled up with zeros: vectors of four then have no odd
+/// ends.
 pub(super) const WIDE: usize = 12;
 
 /// Products of [`eliminate`], kept from stage to stage so that they need not be cleared.
@@ -108,8 +108,8 @@ impl<T: Real, const NX: usize, const NU: usize> Products<T, NX, NU> {
     }
 }
 
-/// `P` of one stage's end to `P` of its beginning, without the costs there; gain and factor of the
-/// stage are overwritten. False if the whole Hessian of the input is not positive definite.
+/// `P` of one stage's end to `P` of its beginning, without the costs there; gain and factor of the stage are
+/// overwritten. False if the whole Hessian of the input is not positive definite.
 #[inline(always)]
 pub(super) fn eliminate<T: Real, const NX: usize, const NU: usize>(
     stage: &mut Stage<T, NX, NU>,
@@ -178,8 +178,7 @@ fn add_products<T: Real, const NX: usize, const NU: usize, const N: usize, const
     }
 }
 
-/// `L D Lᵀ` of a symmetric matrix, of which the lower triangle is read; false if it is not positive
-/// definite.
+/// `L D Lᵀ` of a symmetric matrix, of which the lower triangle is read; false if it is not positive definite.
 #[inline(always)]
 fn factorise<T: Real, const NU: usize>(
     matrix: &[[T; WIDE]; NU],
@@ -355,9 +354,9 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
         *end = sum;
     }
 
-    /// Gradient pass: from `p` at the stage's end, with the cost's gradient there added already, to
-    /// `p` at its beginning, and from the gradient `h` by the input to the whole one; the constant part of the
-    /// input is overwritten.
+    /// Gradient pass: from `p` at the stage's end, with the cost's gradient there added already, to `p` at its
+    /// beginning, and from the gradient `h` by the input to the whole one; the constant part of the input is
+    /// overwritten.
     #[inline(always)]
     pub(super) fn pull(&mut self, p: &mut [T; NX], h: &mut [T; NU]) {
         add_transposed(&self.b, p, h);

@@ -72,8 +72,8 @@ impl<'a, T: Real> Rows<'a, T> {
         }
     }
 
-    /// Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of
-    /// the step that does not centre.
+    /// Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of the step
+    /// that does not centre.
     #[inline(always)]
     pub(super) fn aim_at(&mut self, left: T, aim: T) {
         for i in 0..self.count {
@@ -204,8 +204,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         rows
     }
 
-    /// Adds the rows' share, with multipliers `y`, of the gradient by input and state; returns that by
-    /// the slack.
+    /// Adds the rows' share, with multipliers `y`, of the gradient by input and state; returns that by the slack.
     #[inline(always)]
     pub(super) fn add_rows_pull(
         &self,

@@ -7,8 +7,8 @@ use super::riccati::{Products, add_product, add_transposed, eliminate};
 use super::scalar::Real;
 
 impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
-    /// Eliminates all stages without their rows: gains and constant parts of the linear-quadratic
-    /// optimum from any initial state. False if a Hessian is not positive definite.
+    /// Eliminates all stages without their rows: gains and constant parts of the linear-quadratic optimum from any
+    /// initial state. False if a Hessian is not positive definite.
     #[inline(always)]
     pub fn prepare(&mut self) -> bool {
         let horizon = self.stages.len();
@@ -38,8 +38,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
 
     /// Solves the program from an initial state, with the gains of [`Program::prepare`] for the present stages.
     ///
-    /// `is_warm` says that inputs and multipliers are a guess at the solution, such as the last one's,
-    /// shifted by a stage.
+    /// `is_warm` says that inputs and multipliers are a guess at the solution, such as the last one's, shifted by a
+    /// stage.
     #[inline(always)]
     pub fn solve(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
         let worst = self.follow_gains(x0);
@@ -249,8 +249,8 @@ fn failure<T: Real>(iterations: u32) -> Report<T> {
     }
 }
 
-/// The same code for vector units of 256 bits: sums keep their order and products are not contracted, so
-/// that the bits are those of [`Program::prepare`] and [`Program::solve`].
+/// The same code for vector units of 256 bits: sums keep their order and products are not contracted, so that the bits
+/// are those of [`Program::prepare`] and [`Program::solve`].
 #[cfg(target_arch = "x86_64")]
 impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// [`Program::prepare`] on a processor with AVX2.

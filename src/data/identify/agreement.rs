@@ -1,5 +1,5 @@
-//! Whether recordings are of one robot: each jump's torques bear its weight, it falls in flight, and its mass is that of
-//! the others.
+//! Whether recordings are of one robot: each jump's torques bear its weight, it falls in flight, and its mass is that
+//! of the others.
 //!
 //! A payload that all recordings have is no contradiction; one log without torques, or of another robot, is.
 
@@ -68,8 +68,8 @@ fn refused(recording: &Recording, segment: Option<usize>, found: String) -> Iden
     }
 }
 
-/// Mass of each segment by its vertical acceleration in contact, the other unknowns as in all, and its standard error as
-/// a share of it (jackknife over blocks).
+/// Mass of each segment by its vertical acceleration in contact, the other unknowns as in all, and its standard error
+/// as a share of it (jackknife over blocks).
 fn masses(windows: &Windows, estimate: &Estimate) -> Vec<(usize, f64, f64)> {
     let mut blocks = vec![(0.0, 0.0); windows.blocks.len()];
     let upwards = (windows.rows.iter()).filter(|row| row.group == Group::Contact(2));

@@ -1,13 +1,11 @@
 //! The linear equations between motion and torques at every sample of a segment.
 //!
-//! With `m` the mass, `p` the trunk's origin, `e` directions of trunk and links (second derivatives
-//! `e''`) and `s_e` their first moments, Newton's law for the whole robot is
-//! `p'' = -g e_z + 1/m (sum_k F_k - sum_e s_e e'')`. A foot on the ground pushes with
-//! `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`: `Y_k pi` are the torques that move the
-//! leg's own links (first and second moments `pi`, linear), and contact is the torque of a foot
-//! of radius `r` that rolls with resistance `rho`. A leg in the air obeys
-//! `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter linearly; torques are taken a delay
-//! later, and a column of their rates tells by how much that delay is wrong.
+//! With `m` the mass, `p` the trunk's origin, `e` directions of trunk and links (second derivatives `e''`) and `s_e`
+//! their first moments, Newton's law for the whole robot is `p'' = -g e_z + 1/m (sum_k F_k - sum_e s_e e'')`. A foot on
+//! the ground pushes with `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`: `Y_k pi` are the torques that move the
+//! leg's own links (first and second moments `pi`, linear), and contact is the torque of a foot of radius `r` that
+//! rolls with resistance `rho`. A leg in the air obeys `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter
+//! linearly; torques are taken a delay later, and a column of their rates tells by how much that delay is wrong.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -165,8 +163,8 @@ impl BodyEquation {
     }
 }
 
-/// First moments of a leg in the order of [`Directions`](super::motion::Directions): its share in the
-/// acceleration of the centre of mass.
+/// First moments of a leg in the order of [`Directions`](super::motion::Directions): its share in the acceleration of
+/// the centre of mass.
 const MOMENTS: [usize; 5] = [LEG_SIDE, THIGH, CALF, THIGH_FRONT, CALF_FRONT];
 
 /// Unknowns of a leg's own links in the torques of its joints.
@@ -218,8 +216,8 @@ impl LegSample {
 
 /// Torques at the three joints that move the links of a leg, per unit of each unknown of [`OWN`].
 ///
-/// A mass at `s` from a point that accelerates by `a` (gravity subtracted) needs the moment
-/// `s x (a + s'')` about it. The mass beside the axis of abduction is taken in the leg's plane.
+/// A mass at `s` from a point that accelerates by `a` (gravity subtracted) needs the moment `s x (a + s'')` about it.
+/// The mass beside the axis of abduction is taken in the leg's plane.
 fn own_torques(
     robot: &Robot,
     motion: &Motion,

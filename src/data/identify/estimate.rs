@@ -29,17 +29,15 @@ const LARGEST_DELAY_S: f64 = 0.06; // largest delay either way, s
 /// Changes in a round below which the rounds end: of the delay (s), of the mass (relative).
 const SETTLED: [f64; 2] = [2e-5, 1e-4];
 
-/// What the recordings say of a robot of this geometry: gravity, mass, losses by kind of joint,
-/// with standard errors.
+/// What the recordings say of a robot of this geometry: gravity, mass, losses by kind of joint, with standard errors.
 ///
-/// Implausible samples stay and become notes; samples with a leg on the ground close to a singular
-/// posture are left out one by one.
+/// Implausible samples stay and become notes; samples with a leg on the ground close to a singular posture are left out
+/// one by one.
 ///
 /// # Errors
-/// [`IdentifyError::Contact`], [`IdentifyError::Still`] for too little to go by,
-/// [`IdentifyError::Mass`] where forces do not explain the acceleration, [`IdentifyError::Contradiction`] for a recording
-/// that contradicts physics or the others,
-/// [`IdentifyError::Recording`] for a segment without two samples at different times.
+/// [`IdentifyError::Contact`], [`IdentifyError::Still`] for too little to go by, [`IdentifyError::Mass`] where forces
+/// do not explain the acceleration, [`IdentifyError::Contradiction`] for a recording that contradicts physics or the
+/// others, [`IdentifyError::Recording`] for a segment without two samples at different times.
 pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identification, IdentifyError> {
     let mut notes = Vec::new();
     let (mut segments, mut mended_recordings, mut ranges) = (Vec::new(), Vec::new(), Vec::new());

@@ -56,8 +56,7 @@ impl Identification {
     /// Reads a file that [`Identification::to_toml`] wrote; its notes are comments and stay there.
     ///
     /// # Errors
-    /// [`IdentifyError::File`] with line and column of a fault of syntax, or with the entry whose
-    /// value no robot has.
+    /// [`IdentifyError::File`] with line and column of a fault of syntax, or with the entry whose value no robot has.
     pub fn read(path: &Path) -> Result<Self, IdentifyError> {
         let file = path.display().to_string();
         let action = "read";

@@ -1,9 +1,9 @@
 //! Weighted least squares with losses that are not negative, and honest standard errors.
 //!
-//! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual deviation, estimated with the
-//! unknowns; residuals beyond three deviations count less (Huber). Residuals of neighbouring windows are alike, and those
-//! of one jump may be, so standard errors come from leaving out blocks of 0.1 s in turn and, where there are enough, whole
-//! jumps (jackknife).
+//! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual deviation, estimated with
+//! the unknowns; residuals beyond three deviations count less (Huber). Residuals of neighbouring windows are alike, and
+//! those of one jump may be, so standard errors come from leaving out blocks of 0.1 s in turn and, where there are
+//! enough, whole jumps (jackknife).
 
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 

@@ -143,8 +143,9 @@ impl Identification {
         doubts
     }
 
-    /// Why these values are no robot's: gravity is not the earth's, or the trunk moves against them, or forwards better by the feet's forces alone.
-    /// Upwards forces alone may fit better: rounds weigh windows by their noise, and commanded torques are noisy there.
+    /// Why these values are no robot's: gravity is not the earth's, or the trunk moves against them, or forwards better
+    /// by the feet's forces alone. Upwards forces alone may fit better: rounds weigh windows by their noise, and
+    /// commanded torques are noisy there.
     pub fn contradiction(&self) -> Option<String> {
         if (self.gravity_m_s2 / GRAVITY_M_S2 - 1.0).abs() > NO_GRAVITY_SHARE {
             return Some(format!(

@@ -1,10 +1,10 @@
 //! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia.
 //!
-//! Enters: recordings and the robot's geometry. Leaves: an [`Identification`], each value with its
-//! standard error, and the file that keeps it. [`motion`] has the directions of the links and their accelerations,
-//! [`equations`] the linear equations that these obey at every sample, `windows` their averages, `fit` the weighted
-//! least squares, `estimate` the loop around it, `agreement` the refusal of recordings that contradict each other.
-//! Read `estimate` first; `docs/identify.md` has the method and measured figures.
+//! Enters: recordings and the robot's geometry. Leaves: an [`Identification`], each value with its standard error, and
+//! the file that keeps it. [`motion`] has the directions of the links and their accelerations, [`equations`] the linear
+//! equations that these obey at every sample, `windows` their averages, `fit` the weighted least squares, `estimate`
+//! the loop around it, `agreement` the refusal of recordings that contradict each other. Read `estimate` first;
+//! `docs/identify.md` has the method and measured figures.
 //!
 //! ```
 //! use std::path::Path;

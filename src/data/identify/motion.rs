@@ -1,8 +1,8 @@
 //! Directions of trunk and legs in the world along a segment, and their accelerations.
 //!
-//! World axes are those of the recorded body position: z up. Attitudes are roll, pitch, yaw with
-//! `R = Rz Ry Rx`. Velocities of directions follow from the recorded rates; accelerations are
-//! differences of velocities, those of the recording included, so that all carry the same errors.
+//! World axes are those of the recorded body position: z up. Attitudes are roll, pitch, yaw with `R = Rz Ry Rx`.
+//! Velocities of directions follow from the recorded rates; accelerations are differences of velocities, those of the
+//! recording included, so that all carry the same errors.
 
 use nalgebra::{DMatrix, Matrix3, Rotation3, Unit, Vector3};
 

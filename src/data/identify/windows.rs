@@ -1,8 +1,8 @@
 //! Equations of samples averaged over short windows within one stance.
 //!
-//! The same average is taken on both sides of every equation, so it stays an equation, and noise of
-//! differences of velocities is averaged out. No window crosses a change of the feet on the ground
-//! or comes near one: impacts are not what torques explain.
+//! The same average is taken on both sides of every equation, so it stays an equation, and noise of differences of
+//! velocities is averaged out. No window crosses a change of the feet on the ground or comes near one: impacts are not
+//! what torques explain.
 
 use std::ops::Range;
 
@@ -120,8 +120,8 @@ impl Windows {
     }
 
     /// Ways to divide the blocks into groups that are left out in turn for standard errors: the group of every block.
-    /// Blocks by themselves; and whole segments, which are jumps, where there are at least six and none has more than
-    /// a third of the equations of the fit.
+    /// Blocks by themselves; and whole segments, which are jumps, where there are at least six and none has more than a
+    /// third of the equations of the fit.
     pub(crate) fn groupings(&self) -> Vec<Vec<usize>> {
         let mut groupings = vec![(0..self.blocks.len()).collect()];
         let mut counts = vec![0; self.segments];

@@ -1,8 +1,7 @@
 //! Plausibility: what a recording says that a robot cannot have done.
 //!
-//! Numbers that are not finite never get here: reading refuses them. What is
-//! found is reported with row and column; samples are left out only by
-//! [`without`], when asked.
+//! Numbers that are not finite never get here: reading refuses them. What is found is reported with row and column;
+//! samples are left out only by [`without`], when asked.
 
 use std::fmt;
 use std::ops::Range;
@@ -48,10 +47,10 @@ pub enum Implausible {
     Acceleration,
     Clipped,
     TimeStep,
-    /// A leg on the ground is near a singularity: `value` is the span of thigh and calf (its knee's
-    /// column) or the height of its hip over the foot (its flexion's column), both normalised as in
-    /// [`LegGeometry::spans`](crate::robot::LegGeometry::spans), `bound` where damping begins. The robot
-    /// may well have done that, so that such samples are reported, and never left out.
+    /// A leg on the ground is near a singularity: `value` is the span of thigh and calf (its knee's column) or the
+    /// height of its hip over the foot (its flexion's column), both normalised as in
+    /// [`LegGeometry::spans`](crate::robot::LegGeometry::spans), `bound` where damping begins. The robot may well have
+    /// done that, so that such samples are reported, and never left out.
     NearSingular,
 }
 
@@ -138,9 +137,8 @@ pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
     out
 }
 
-/// The recording without the samples of these findings, and how many that
-/// leaves out; those of legs near a singularity stay. Segments are divided where samples are missing; a remainder of
-/// a single sample goes too.
+/// The recording without the samples of these findings, and how many that leaves out; those of legs near a singularity
+/// stay. Segments are divided where samples are missing; a remainder of a single sample goes too.
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`] if nothing remains.
@@ -340,15 +338,15 @@ fn slope(time_s: &[f64], values: &[f64], j: usize) -> f64 {
     (values[j] - values[j - 1]) / (time_s[j] - time_s[j - 1])
 }
 
-/// Three times the median change of slope from step to step: what sensor noise
-/// puts between a rate and the differences of a noisy value.
+/// Three times the median change of slope from step to step: what sensor noise puts between a rate and the differences
+/// of a noisy value.
 fn noise(time_s: &[f64], values: &[f64]) -> f64 {
     let change = |j: usize| (slope(time_s, values, j + 1) - slope(time_s, values, j)).abs();
     3.0 * quantile((1..values.len().saturating_sub(1)).map(change), 0.5)
 }
 
-/// Compares the rate recorded at a sample with the slopes of the values before
-/// and after it: a rate lies between the two unless it turns within the steps.
+/// Compares the rate recorded at a sample with the slopes of the values before and after it: a rate lies between the
+/// two unless it turns within the steps.
 fn disagrees(time_s: &[f64], values: &[f64], rates: &[f64], j: usize, slack: f64) -> Breach {
     if j == 0 || j + 1 >= rates.len() {
         return None;

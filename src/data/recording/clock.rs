@@ -1,9 +1,9 @@
 //! Segments whose time stamps disagree with their motion, mended.
 //!
-//! A logger that counts its samples instead of reading a clock says that time passes evenly even
-//! where samples came late or were lost. The velocities know better: between two samples the robot
-//! moved by velocity times elapsed time, in every coordinate. A clock is wrong for all of them alike: where they
-//! disagree, a coordinate is wrong, not the clock.
+//! A logger that counts its samples instead of reading a clock says that time passes evenly even where samples came
+//! late or were lost. The velocities know better: between two samples the robot moved by velocity times elapsed time,
+//! in every coordinate. A clock is wrong for all of them alike: where they disagree, a coordinate is wrong, not the
+//! clock.
 
 use super::error::RecordingError;
 use super::preprocess::{differences, median, resampled};
@@ -52,8 +52,8 @@ pub struct Mended {
     pub rates_replaced: bool,
 }
 
-/// The segment at even time steps; its times are rebuilt where they disagree with the motion, its
-/// angular rates where they disagree with the angles.
+/// The segment at even time steps; its times are rebuilt where they disagree with the motion, its angular rates where
+/// they disagree with the angles.
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
@@ -116,8 +116,7 @@ fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
         .collect()
 }
 
-/// Time that passed by the motion over time that passed by the stamps, if by the stamps more moved than
-/// `least`.
+/// Time that passed by the motion over time that passed by the stamps, if by the stamps more moved than `least`.
 fn ratio(intervals: &[Interval], least: f64) -> Option<f64> {
     let moved: f64 = intervals.iter().map(|i| i.moved).sum();
     let stamped: f64 = intervals.iter().map(|i| i.speed * i.stamped_s).sum();
@@ -164,8 +163,8 @@ fn by_motion(segment: &Segment, elapsed: &[Interval]) -> Segment {
 
 /// Replaces the trunk's angular rates by differences of its angles if the two disagree; whether so.
 ///
-/// Rates that clip, that are differences over wrong stamps, or that a gyroscope measured about the
-/// trunk's own axes are no rates of roll, pitch and yaw.
+/// Rates that clip, that are differences over wrong stamps, or that a gyroscope measured about the trunk's own axes are
+/// no rates of roll, pitch and yaw.
 fn replace_angular_rates(segment: &mut Segment) -> bool {
     const FIRST: usize = JOINT_DIM + BODY_DIM / 2;
     let angles = segment.x.rows(FIRST, BODY_DIM / 2).into_owned();

@@ -38,7 +38,8 @@ impl Column {
         }
     }
 
-    /// The columns of a file, with or without accelerations and the body wrench, in the order in which they are written.
+    /// The columns of a file, with or without accelerations and the body wrench, in the order in which they are
+    /// written.
     pub fn all(accelerations: bool, force: bool) -> Vec<Column> {
         let mut out = vec![Column::Time];
         for i in 0..STATE_DIM {

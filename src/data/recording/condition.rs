@@ -1,5 +1,5 @@
-//! Recordings made ready for training: implausible samples are found and,
-//! when asked, left out; accelerations are recomputed and rows smoothed, when asked.
+//! Recordings made ready for training: implausible samples are found and, when asked, left out; accelerations are
+//! recomputed and rows smoothed, when asked.
 
 use clap::ValueEnum;
 use nalgebra::DMatrix;

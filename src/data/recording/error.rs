@@ -55,8 +55,8 @@ pub enum RecordingFault {
     /// Two columns have the same name; columns count from 1.
     #[error("occurs twice, as number {first} and {second}")]
     DuplicateColumn { first: usize, second: usize },
-    /// A row has fewer cells than the header, or more; the place is the first column without a
-    /// cell, or the last column.
+    /// A row has fewer cells than the header, or more; the place is the first column without a cell, or the last
+    /// column.
     #[error("found {found} cells, expected {expected}{hint}")]
     RowLength {
         found: usize,

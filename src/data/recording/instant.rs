@@ -39,8 +39,8 @@ impl Instant {
         })
     }
 
-    /// A date and time as ISO 8601 writes it, in s since 1970: `2026-03-01T12:00:00.002Z`, with a blank for
-    /// the `T` and `+01:00` for the `Z` if need be; or a time of day alone, `12:00:00.002`.
+    /// A date and time as ISO 8601 writes it, in s since 1970: `2026-03-01T12:00:00.002Z`, with a blank for the `T` and
+    /// `+01:00` for the `Z` if need be; or a time of day alone, `12:00:00.002`.
     pub(crate) fn from_iso(text: &str) -> Option<Self> {
         if count(text, ':') == 0 {
             return None;

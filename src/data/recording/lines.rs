@@ -15,7 +15,8 @@ pub(super) const MAX_ROWS: usize = 1_000_000;
 /// Longest line accepted, in bytes: some thirty times a row of 71 columns.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
 
-/// Most empty lines in a row, and in all beyond one for each that is not; compressed, billions would fit into a small file.
+/// Most empty lines in a row, and in all beyond one for each that is not; compressed, billions would fit into a small
+/// file.
 const MAX_BLANK_ROWS: usize = 10_000;
 
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
@@ -38,8 +39,8 @@ impl<'a> Lines<'a> {
         Self::of(path, file, size.map_or(u64::MAX, |size| size.len()))
     }
 
-    /// Of a source of so many bytes, which bound what they may unpack to: plain or gzip, found from the first two bytes;
-    /// `path` stands for it in messages.
+    /// Of a source of so many bytes, which bound what they may unpack to: plain or gzip, found from the first two
+    /// bytes; `path` stands for it in messages.
     pub(crate) fn of(
         path: &'a Path,
         mut source: impl Read + 'a,
@@ -205,8 +206,7 @@ impl NumberReader {
         }
     }
 
-    /// The value of a cell, or `None` if it is no number in this notation.
-    /// May be infinite or NaN.
+    /// The value of a cell, or `None` if it is no number in this notation. May be infinite or NaN.
     pub(crate) fn parse(&mut self, cell: &str) -> Option<f64> {
         let Some(place) = cell.bytes().position(|b| b == b'.' || b == b',') else {
             return cell.parse().ok();

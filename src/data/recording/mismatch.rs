@@ -2,9 +2,9 @@
 //!
 //! [`check`](super::check) looks at samples; a recording in which every sample is possible can still be of another
 //! robot, in other units, or have legs, signs or columns exchanged. The robot's own geometry shows it: a foot on the
-//! ground stays where it is, the feet carry the weight, a body in flight falls, a hip holds the weight on its own
-//! side. Each figure is taken over a whole recording and compared with bounds that leave room for what right
-//! recordings of simulated and real jumps have (`docs/recordings.md` has the table).
+//! ground stays where it is, the feet carry the weight, a body in flight falls, a hip holds the weight on its own side.
+//! Each figure is taken over a whole recording and compared with bounds that leave room for what right recordings of
+//! simulated and real jumps have (`docs/recordings.md` has the table).
 
 mod balance;
 mod feet;
@@ -134,9 +134,9 @@ impl Figures {
     }
 }
 
-/// What cannot be true of any robot, or of one robot beside the others of these recordings, with the index of the recording
-/// and in words: torques that carry nothing, a body that does not fall in flight, torques that carry another share of
-/// the weight than most.
+/// What cannot be true of any robot, or of one robot beside the others of these recordings, with the index of the
+/// recording and in words: torques that carry nothing, a body that does not fall in flight, torques that carry another
+/// share of the weight than most.
 pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
     let each = || balances.iter().enumerate();
     let shares = || each().filter_map(|(at, balance)| Some((at, balance.weight_share?)));
@@ -269,7 +269,8 @@ fn hip_torques(balance: &Balance) -> Option<Mismatch> {
         |(leg, share): (Leg, Option<f64>)| Some((leg, share.filter(|s| *s < HIP_SHARE)?));
     let wrong: Vec<(Leg, f64)> = shares.filter_map(is_wrong).collect();
     let value = (wrong.iter().map(|(_, share)| *share)).min_by(f64::total_cmp)?;
-    // Both legs of one end alone pull inwards where feet stick and positions are controlled, and less than exchanged ones.
+    // Both legs of one end alone pull inwards where feet stick and positions are controlled, and less than exchanged
+    // ones.
     let is_of_end = |end: &[Leg]| wrong.iter().all(|(leg, _)| end.contains(leg));
     let is_pair = wrong.len() == 2 && Leg::ALL.chunks(2).any(is_of_end);
     if is_pair && wrong.iter().any(|(_, share)| *share > HIP_SHARE_OF_PAIR) {

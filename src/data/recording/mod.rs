@@ -1,9 +1,8 @@
 //! Recorded jumps: reading, checking, phases, preprocessing, writing.
 //!
-//! Enters: CSV files of one or several jumps, plain or gzip. Leaves: segments
-//! of consecutive samples in SI units, samples as columns; the spans of each
-//! contact phase; a report of what is implausible, and of what is not this robot. Read [`segment`] for the
-//! data first, then [`columns`] for the format, [`check`], [`mismatch`], [`condition()`],
+//! Enters: CSV files of one or several jumps, plain or gzip. Leaves: segments of consecutive samples in SI units,
+//! samples as columns; the spans of each contact phase; a report of what is implausible, and of what is not this robot.
+//! Read [`segment`] for the data first, then [`columns`] for the format, [`check`], [`mismatch`], [`condition()`],
 //! [`phases`] and [`preprocess`] for what is done with it, and [`mod@write`].
 //!
 //! ```

@@ -1,9 +1,8 @@
 //! Contact phases: which feet are down, and for how long.
 //!
-//! A rule is a list of named foot patterns, the first match wins, as in the
-//! model file. With the paper's two phases, samples with one to three feet
-//! down count as contact and so join the launch or the landing they border
-//! (section IV-C4). Three phases describe an asynchronous jump.
+//! A rule is a list of named foot patterns, the first match wins, as in the model file. With the paper's two phases,
+//! samples with one to three feet down count as contact and so join the launch or the landing they border (section
+//! IV-C4). Three phases describe an asynchronous jump.
 
 use std::ops::Range;
 
@@ -79,8 +78,7 @@ impl PhaseRule {
         Self::new(patterns.map(pattern).into())
     }
 
-    /// The asynchronous jump: `contact` (a front foot is down), `rear` (only
-    /// rear feet), `flight` (none).
+    /// The asynchronous jump: `contact` (a front foot is down), `rear` (only rear feet), `flight` (none).
     pub fn three_phase() -> Self {
         let all = (0..16).map(|bits: u8| std::array::from_fn(|foot| bits & (1 << foot) != 0));
         let down = all.filter(|feet: &ContactFlags| feet.contains(&true));
@@ -110,9 +108,8 @@ impl PhaseRule {
 
     /// The spans of a segment, in order and without gaps.
     ///
-    /// A run of samples that matches no pattern (transitional, under a rule
-    /// that lists exact patterns) joins the neighbour with more feet down, on
-    /// a tie the one before it.
+    /// A run of samples that matches no pattern (transitional, under a rule that lists exact patterns) joins the
+    /// neighbour with more feet down, on a tie the one before it.
     ///
     /// # Errors
     /// [`RecordingFault::NoPhase`] if no sample matches any pattern.

@@ -1,5 +1,5 @@
-//! From segments to phases ready for training: accelerations by differences,
-//! resampling of each phase to whole batches (section IV-C4).
+//! From segments to phases ready for training: accelerations by differences, resampling of each phase to whole batches
+//! (section IV-C4).
 //!
 //! Nothing crosses the border of a segment. Scaling belongs to the model.
 
@@ -33,8 +33,8 @@ pub fn prepare(
     Ok(out)
 }
 
-/// Slopes of each row over time: second-order differences inside, also for
-/// unequal steps, first-order at the two ends (equation 21).
+/// Slopes of each row over time: second-order differences inside, also for unequal steps, first-order at the two ends
+/// (equation 21).
 ///
 /// `rows` has one column a time; a single sample has slope 0.
 pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {

@@ -1,7 +1,7 @@
 //! How files become recordings: by romc's own names or a map of columns, with clocks as stamped or mended.
 //!
-//! romc's own text: `;` or tabs with decimal comma or point, or `,` with decimal point, found from the header; columns by
-//! name in any order; gzip found from the first two bytes. Memory is bounded by the samples kept.
+//! romc's own text: `;` or tabs with decimal comma or point, or `,` with decimal point, found from the header; columns
+//! by name in any order; gzip found from the first two bytes. Memory is bounded by the samples kept.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -26,8 +26,8 @@ pub enum Clocks {
     /// Times, steps and angular rates stay as recorded
     #[default]
     Recorded,
-    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, angular rates that
-    /// disagree with the angles become their differences
+    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, angular rates that disagree
+    /// with the angles become their differences
     Repaired,
 }
 

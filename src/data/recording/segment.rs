@@ -10,8 +10,8 @@ use super::error::{RecordingError, RecordingFault};
 use super::smoothing::moving_average;
 use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
-/// Time over which accelerations of joints are averaged before the inertia of the motors counts, in
-/// s: 11 samples at 500 Hz.
+/// Time over which accelerations of joints are averaged before the inertia of the motors counts, in s: 11 samples at
+/// 500 Hz.
 const ACCELERATION_WINDOW_S: f64 = 0.02;
 
 /// What a file holds.
@@ -219,9 +219,9 @@ impl Segment {
         std::array::from_fn(|i| self.torque_nm[(i, sample)])
     }
 
-    /// Accelerations of the joints, 12 x n, in rad/s^2: [`Self::ddx`] averaged over
-    /// 20 ms within stretches of equal contact (a foot down, or none), so that
-    /// the noise of differences and the spikes of landings do not become torques.
+    /// Accelerations of the joints, 12 x n, in rad/s^2: [`Self::ddx`] averaged over 20 ms within stretches of equal
+    /// contact (a foot down, or none), so that the noise of differences and the spikes of landings do not become
+    /// torques.
     pub fn joint_accelerations(&self) -> DMatrix<f64> {
         let half = match self.mean_step_s() {
             step if step > 0.0 => (0.5 * ACCELERATION_WINDOW_S / step).round() as usize,
@@ -260,9 +260,9 @@ impl Segment {
         out
     }
 
-    /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model: `tau`
-    /// are the torques at the links, recorded ones less [`Segment::losses`], `F` and `M` what they and
-    /// the contacts do to the body (equation 22); under the published rule the file's own, if it carries them.
+    /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model: `tau` are the torques at
+    /// the links, recorded ones less [`Segment::losses`], `F` and `M` what they and the contacts do to the body
+    /// (equation 22); under the published rule the file's own, if it carries them.
     ///
     /// Near a singularity of a leg in contact its force is damped, see
     /// [`Robot::damped_force_map`](crate::robot::Robot::damped_force_map).

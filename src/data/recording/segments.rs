@@ -9,8 +9,8 @@ use super::segment::Segment;
 use crate::robot::STATE_DIM;
 
 pub(super) const DERIVED_DDX: &str = "accelerations are differences of velocities";
-/// A step this many times the one before it starts a new segment, as a jump
-/// back does: samples were left out between the two.
+/// A step this many times the one before it starts a new segment, as a jump back does: samples were left out between
+/// the two.
 const GAP_STEPS: f64 = 20.0;
 /// A first time beyond this is that of a clock that counts from an epoch: times count from it then.
 pub(super) const EPOCH_S: f64 = 1e7;
@@ -58,8 +58,8 @@ pub(super) fn divided(
     Ok(segments)
 }
 
-/// Stretches of increasing time without gaps. A new one begins where time jumps back by more than a step or to where the
-/// stretch began, or far ahead. An error has the sample at which time stands still, or steps back by less.
+/// Stretches of increasing time without gaps. A new one begins where time jumps back by more than a step or to where
+/// the stretch began, or far ahead. An error has the sample at which time stands still, or steps back by less.
 pub(super) fn ranges(times_s: &[f64]) -> Result<Vec<Range<usize>>, (usize, RecordingFault)> {
     let mut ranges = Vec::new();
     let mut start = 0;

@@ -1,9 +1,8 @@
 //! Moving averages, and Savitzky-Golay smoothing: a polynomial through each window by least squares.
 //!
-//! Inside, each sample takes the value of the polynomial fitted to the window
-//! centred on it; at the ends, the first and last window's polynomial is
-//! evaluated off centre, so no sample is lost and polynomials up to the order
-//! pass unchanged everywhere. Samples count as equally spaced.
+//! Inside, each sample takes the value of the polynomial fitted to the window centred on it; at the ends, the first and
+//! last window's polynomial is evaluated off centre, so no sample is lost and polynomials up to the order pass
+//! unchanged everywhere. Samples count as equally spaced.
 
 use std::str::FromStr;
 
@@ -103,8 +102,8 @@ impl From<SavitzkyGolay> for String {
 
 /// Mean over a centred window of `window` samples (columns), shortened symmetrically at both ends.
 ///
-/// Landing and lift-off spikes in accelerations weigh a regression more than the whole rest of a jump; averaged over
-/// 11 samples (20 ms) they carry the momentum change they stand for. A window of 0 or 1 returns the samples.
+/// Landing and lift-off spikes in accelerations weigh a regression more than the whole rest of a jump; averaged over 11
+/// samples (20 ms) they carry the momentum change they stand for. A window of 0 or 1 returns the samples.
 pub fn moving_average(samples: &DMatrix<f64>, window: usize) -> DMatrix<f64> {
     let n = samples.ncols();
     let half = window / 2;

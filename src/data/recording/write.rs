@@ -1,8 +1,7 @@
 //! Writer of the recordings' CSV format.
 //!
-//! Numbers are written with the fewest digits that read back to the same
-//! bits. Files appear whole or not at all: they are written beside their
-//! place and then renamed.
+//! Numbers are written with the fewest digits that read back to the same bits. Files appear whole or not at all: they
+//! are written beside their place and then renamed.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -56,8 +55,8 @@ pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
     write_as(path, recording, None, &options, Overwrite::Replace)
 }
 
-/// [`write()`] with a choice of notation and columns, and, if given, the inputs of each segment (18 x samples), as columns
-/// `Input fr.hx` and so on, which reading ignores.
+/// [`write()`] with a choice of notation and columns, and, if given, the inputs of each segment (18 x samples), as
+/// columns `Input fr.hx` and so on, which reading ignores.
 ///
 /// # Errors
 /// As [`write()`], and for a file that is there and may not be replaced.

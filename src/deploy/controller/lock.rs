@@ -1,7 +1,7 @@
 //! The versions of the solver and of linear algebra that romc was built with.
 //!
-//! A generated controller gets the part of romc's own `Cargo.lock` that it needs, so that its
-//! torques have the same bits and that it can be built from the same downloads.
+//! A generated controller gets the part of romc's own `Cargo.lock` that it needs, so that its torques have the same
+//! bits and that it can be built from the same downloads.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;

@@ -1,8 +1,8 @@
 //! The controller as a crate with a C interface: `NAME-controller/`.
 //!
-//! In: a complete linear model. Out: romc's own controller sources ([`sources`]), the model's
-//! numbers as `src/control_model.rs`, its equations as the crate that `--emit rust` makes, a header,
-//! examples, and the versions of the solver that romc was built with ([`lock`]).
+//! In: a complete linear model. Out: romc's own controller sources ([`sources`]), the model's numbers as
+//! `src/control_model.rs`, its equations as the crate that `--emit rust` makes, a header, examples, and the versions of
+//! the solver that romc was built with ([`lock`]).
 
 mod control_model;
 mod lock;
@@ -92,8 +92,8 @@ templates! {
     ExamplePy: "controller/example_py.askama",
 }
 
-/// The crate of a model's controller; `provenance` is the text of each file's first line, and `plan`
-/// the jump of its C example.
+/// The crate of a model's controller; `provenance` is the text of each file's first line, and `plan` the jump of its C
+/// example.
 pub fn emit(
     equations: &Equations<'_>,
     form: Form,

@@ -3,8 +3,7 @@
 use super::numbers::{Numbers, integers, nested};
 use crate::robot::{ChainLeg, Leg, LegGeometry, PlanarLeg, Robot};
 
-/// Initialisers for the four legs, in the order of [`Leg::ALL`]; a leg of one kind is zeros in the
-/// table of the other.
+/// Initialisers for the four legs, in the order of [`Leg::ALL`]; a leg of one kind is zeros in the table of the other.
 pub(super) struct Legs {
     pub has_planar: bool,
     pub has_chain: bool,

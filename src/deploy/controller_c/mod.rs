@@ -1,9 +1,9 @@
 //! The controller in C99 alone: `NAME-controller-c/`.
 //!
-//! In: a complete linear model. Out: the model's equations as `--emit c` makes them, and beside them
-//! the controller: reference, horizon, structured solver, commands and fallbacks in one file. The solver and the steps of the
-//! controller are made from their Rust (`src/translate`), the rest has the operations of `control/online` in their order, so that
-//! both give the same bits. Read `templates/controller_c/source.askama` first.
+//! In: a complete linear model. Out: the model's equations as `--emit c` makes them, and beside them the controller:
+//! reference, horizon, structured solver, commands and fallbacks in one file. The solver and the steps of the
+//! controller are made from their Rust (`src/translate`), the rest has the operations of `control/online` in their
+//! order, so that both give the same bits. Read `templates/controller_c/source.askama` first.
 
 mod legs;
 pub(super) mod numbers;

@@ -17,13 +17,12 @@ use crate::robot::{InputRule, JOINT_DIM, STATE_DIM};
 
 /// Most steps of each run of the self-test: the shipped jump to its end, where the horizon is at rest.
 const STEPS: usize = 200;
-/// How far measurements are pushed off the jump, times -2 to 2: height (m), pitch (rad), vertical
-/// velocity (m/s).
+/// How far measurements are pushed off the jump, times -2 to 2: height (m), pitch (rad), vertical velocity (m/s).
 const PUSH: [f64; 3] = [0.05, 0.15, 0.9];
 /// Largest difference of a torque, N m, by precision.
 const TOLERANCE_NM: [f64; 2] = [1e-6, 0.1];
-/// Steps of a run that may have another status, by precision: in single precision a plan's residuals can be on the other side
-/// of what is accepted.
+/// Steps of a run that may have another status, by precision: in single precision a plan's residuals can be on the
+/// other side of what is accepted.
 const OTHER_STATUSES: [usize; 2] = [0, 3];
 
 /// `NAME_controller_selftest.c`.

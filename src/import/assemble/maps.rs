@@ -141,8 +141,8 @@ impl<'a> Assembly<'a, '_> {
         Ok(Some(map))
     }
 
-    /// How the weights are stored: the way in which each layer takes what the one before gives,
-    /// and `d <= n` coordinates leave an encoder. Every shape but a square decides.
+    /// How the weights are stored: the way in which each layer takes what the one before gives, and `d <= n`
+    /// coordinates leave an encoder. Every shape but a square decides.
     fn orientation(&mut self, part: Part, layers: &[Tensors<'_>]) -> Result<Layout, ImportError> {
         let first = layers[0].0;
         let shapes = layers.iter().map(|(assigned, _)| shape_of(part, assigned));

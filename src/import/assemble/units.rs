@@ -1,5 +1,5 @@
-//! Units and order of the robot's coordinates: scale factors, means that training took off, and the
-//! order in which the file has them.
+//! Units and order of the robot's coordinates: scale factors, means that training took off, and the order in which the
+//! file has them.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -82,8 +82,8 @@ impl<'a> Assembly<'a, '_> {
         })
     }
 
-    /// Takes the mean that the training subtracted into the biases: of `E(s (x - m))` and
-    /// `D(z) / s + m` to `E'(s x)` and `D'(z) / s`.
+    /// Takes the mean that the training subtracted into the biases: of `E(s (x - m))` and `D(z) / s + m` to `E'(s x)`
+    /// and `D'(z) / s`.
     pub(super) fn fold_mean(&mut self, parts: &mut Parts) -> Result<(), ImportError> {
         let Some(assigned) = self.find(&Role::StateMean) else {
             return Ok(());

@@ -1,5 +1,5 @@
-//! What TeX makes of a document before it prints: macros replaced, definitions followed, branches of conditionals chosen,
-//! text that is not printed left out.
+//! What TeX makes of a document before it prints: macros replaced, definitions followed, branches of conditionals
+//! chosen, text that is not printed left out.
 
 use std::rc::Rc;
 

@@ -1,7 +1,7 @@
 //! One right side: from LaTeX to the grammar of candidate terms, each piece with its place.
 //!
-//! What is ambiguous in print is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash (`2/3z_1`,
-//! `z_1/2u_1`), a number after a variable. Nesting is limited, so the machine's stack is safe.
+//! What is ambiguous in print is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash
+//! (`2/3z_1`, `z_1/2u_1`), a number after a variable. Nesting is limited, so the machine's stack is safe.
 
 use super::super::equations::Equation;
 use super::reader::{BARE, Last, Read, Reader, has};
@@ -115,8 +115,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads terms with their signs up to something that ends a sum; where it `leads`, integers
-    /// that begin a term are coefficients.
+    /// Reads terms with their signs up to something that ends a sum; where it `leads`, integers that begin a term are
+    /// coefficients.
     pub(super) fn sum(&mut self, leads: bool) -> Read<()> {
         let mut is_first = true;
         loop {

@@ -14,8 +14,8 @@ const STRETCHES: [(&str, &str); 6] = [
     ("<script", "</script>"),
 ];
 
-/// Tokens of the displays (`math` fences, `$$`, `\[`) and of the mathematics in the lines (`$`, `\(`), with headings and
-/// the text around as comments. Code, comments, references and what stands before the text are passed over.
+/// Tokens of the displays (`math` fences, `$$`, `\[`) and of the mathematics in the lines (`$`, `\(`), with headings
+/// and the text around as comments. Code, comments, references and what stands before the text are passed over.
 pub(super) fn tokens(text: &str) -> Vec<Token> {
     let mut lines = text.lines().map(str::trim_end);
     let has_metadata = lines.next() == Some("---") && lines.next().is_some_and(|l| l.contains(':'));
@@ -199,8 +199,8 @@ fn code_or_escape(text: &str) -> Option<usize> {
     (length > 0).then_some(length)
 }
 
-/// Where mathematics in a line is that opens at the start of `text`, and the place behind its end: `$z_1$`, `` $`z_1`$ ``.
-/// As on GitHub, spaces are not inside next to the marks, and no digit follows (`$5 and $6`). `\(z_1\)` as well.
+/// Where mathematics in a line is that opens at the start of `text`, and the place behind its end: `$z_1$`, `` $`z_1`$
+/// ``. As on GitHub, spaces are not inside next to the marks, and no digit follows (`$5 and $6`). `\(z_1\)` as well.
 fn inline(text: &str) -> Option<(Range<usize>, usize)> {
     for (open, end) in [("\\(", "\\)"), ("$`", "`$")] {
         if let Some(inside) = text.strip_prefix(open) {

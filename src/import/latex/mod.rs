@@ -2,11 +2,12 @@
 //!
 //! A document enters; sections of equations in the grammar of candidate terms leave, each piece with its place, so that
 //! every later fault is reported there. Displays without a left side `\ddot z_k =` are skipped, as is the text around
-//! them, unless the only equations are in its lines; in a display that is read, whatever has no meaning here is an error.
+//! them, unless the only equations are in its lines; in a display that is read, whatever has no meaning here is an
+//! error.
 //!
 //! Read `token.rs` and `markdown.rs` (text to tokens), `expander.rs` with `definitions.rs`, `conditionals.rs` and
-//! `scopes.rs` (what of them is printed), `document.rs` (formulas), `derivatives.rs`, `sections.rs` (equations and phases),
-//! `reader.rs`, `digits.rs`, `expression.rs`, `variables.rs` and `numbers.rs` (one right side) in this order.
+//! `scopes.rs` (what of them is printed), `document.rs` (formulas), `derivatives.rs`, `sections.rs` (equations and
+//! phases), `reader.rs`, `digits.rs`, `expression.rs`, `variables.rs` and `numbers.rs` (one right side) in this order.
 
 mod conditionals;
 mod definitions;

@@ -26,8 +26,8 @@ pub struct NameError {
 
 /// Names that a document gives to latent coordinates and inputs; `z_1` and `u_1` unless renamed.
 ///
-/// A name is written as in `romc compile --rename`: a letter, word or Greek letter's name, with an
-/// optional subscript (`x`, `theta`, `F_lin,x`). Velocities follow their coordinate.
+/// A name is written as in `romc compile --rename`: a letter, word or Greek letter's name, with an optional subscript
+/// (`x`, `theta`, `F_lin,x`). Velocities follow their coordinate.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SymbolNames {
     names: BTreeMap<String, LatentVariable>,
@@ -37,8 +37,8 @@ impl SymbolNames {
     /// Reads entries `VARIABLE=NAME`.
     ///
     /// # Errors
-    /// [`NameError`] for an entry without `=`, with a left side other than `z1` to `z64` or `u1`
-    /// and so on, or with a variable or name that was given before.
+    /// [`NameError`] for an entry without `=`, with a left side other than `z1` to `z64` or `u1` and so on, or with a
+    /// variable or name that was given before.
     pub fn parse<S: AsRef<str>>(entries: &[S]) -> Result<Self, NameError> {
         let mut names = BTreeMap::new();
         for entry in entries.iter().map(AsRef::as_ref) {

@@ -8,8 +8,8 @@ use super::token::Kind;
 const MAX_ODD_RADICAND: usize = 1000;
 
 impl Reader<'_> {
-    /// The literal of a number: a power of ten behind it goes into it, and an integer that the
-    /// document has rounded gets a point or an exponent, so that it counts as rounded.
+    /// The literal of a number: a power of ten behind it goes into it, and an integer that the document has rounded
+    /// gets a point or an exponent, so that it counts as rounded.
     pub(super) fn literal(&mut self, text: &str, leads: bool) -> String {
         if let Some(exponent) = self.power_of_ten()
             && !text.contains(['e', 'E'])
@@ -121,7 +121,8 @@ impl Reader<'_> {
         Ok(Last::Number)
     }
 
-    /// A root at its command. Even ones have no value below zero, as powers do not; odd ones are `abs(x)^(1/3)*sign(x)`.
+    /// A root at its command. Even ones have no value below zero, as powers do not; odd ones are
+    /// `abs(x)^(1/3)*sign(x)`.
     pub(super) fn root(&mut self, place: (usize, usize)) -> Read<Last> {
         self.at += 1;
         let index = self.index()?;

@@ -14,8 +14,8 @@ const DISTINCTIONS: &str = "cases dcases array";
 
 /// Reads the equations of a document.
 ///
-/// `known` are names of phases, which labels may end in; the phase of a comment `Phase NAME` (a
-/// heading in Markdown) goes before that of a label.
+/// `known` are names of phases, which labels may end in; the phase of a comment `Phase NAME` (a heading in Markdown)
+/// goes before that of a label.
 pub(in crate::import) fn read(
     file: &str,
     bytes: &[u8],
@@ -110,8 +110,8 @@ fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(),
     }
 }
 
-/// The tokens without `\begin` and `\end` of environments that arrange lines, and without the
-/// brace that `\left\{` puts before them.
+/// The tokens without `\begin` and `\end` of environments that arrange lines, and without the brace that `\left\{` puts
+/// before them.
 fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     let mut flat: Vec<Token> = Vec::with_capacity(tokens.len());
     let mut open: Vec<(&Token, &str)> = Vec::new();
@@ -302,8 +302,8 @@ impl Document<'_> {
             .filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
     }
 
-    /// The section that an equation belongs to: the open one, or a new one where a comment or
-    /// label names another phase, or where the left side is there already.
+    /// The section that an equation belongs to: the open one, or a new one where a comment or label names another
+    /// phase, or where the left side is there already.
     fn section(
         &mut self,
         output: usize,

@@ -1,8 +1,7 @@
-//! The controller along a recording: each control step sees the measured state, its reference is
-//! the recording itself.
+//! The controller along a recording: each control step sees the measured state, its reference is the recording itself.
 //!
-//! This is not a closed loop, the robot does not feel the commands. It asks what the controller
-//! would have commanded where the robot really was, and compares with what was commanded then.
+//! This is not a closed loop, the robot does not feel the commands. It asks what the controller would have commanded
+//! where the robot really was, and compares with what was commanded then.
 //!
 //! ```
 //! use std::path::Path;
@@ -45,8 +44,8 @@ pub struct StepRow {
     pub segment: usize,
     pub time_s: f64,
     pub command: Command,
-    /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the
-    /// torques at the links and the force that they produce.
+    /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the torques at the
+    /// links and the force that they produce.
     pub input: [f64; STATE_DIM],
     /// Recorded torques, N m, averaged over the time that the command is held.
     pub recorded_torque_nm: [f64; JOINT_DIM],
@@ -60,8 +59,8 @@ pub struct StepRow {
 pub struct Run {
     pub rows: Vec<StepRow>,
     pub summary: Summary,
-    /// The model and its baselines, see [`control_metrics`](super::control_metrics); none where only the controller
-    /// was at hand.
+    /// The model and its baselines, see [`control_metrics`](super::control_metrics); none where only the controller was
+    /// at hand.
     pub metrics: Option<ControlMetrics>,
 }
 
@@ -90,13 +89,14 @@ impl Run {
 
 /// Runs the controller along a recording, one segment after the other.
 ///
-/// Recorded torques beyond twice the robot's limits are no torques of the robot: steps with one are
-/// left out of the comparison and counted. As reference input torques are clamped to the limits.
-/// `progress(done, total)` is called once a control step.
+/// Recorded torques beyond twice the robot's limits are no torques of the robot: steps with one are left out of the
+/// comparison and counted. As reference input torques are clamped to the limits. `progress(done, total)` is called once
+/// a control step.
 ///
 /// # Errors
-/// Those of [`Controller::set_reference`], [`MpcError::Step`] if the controller's step is shorter
-/// than the recording's, [`MpcError::NoStep`] if no segment is as long as one step, and [`MpcError::Recording`] if the recording's inputs cannot be computed.
+/// Those of [`Controller::set_reference`], [`MpcError::Step`] if the controller's step is shorter than the recording's,
+/// [`MpcError::NoStep`] if no segment is as long as one step, and [`MpcError::Recording`] if the recording's inputs
+/// cannot be computed.
 pub fn along_recording(
     controller: &mut Controller,
     recording: &Recording,
@@ -151,8 +151,8 @@ pub fn along_recording(
     })
 }
 
-/// R² of the torques that the controller's lift makes of exactly projected recorded inputs, at
-/// every sample: what the lift alone loses.
+/// R² of the torques that the controller's lift makes of exactly projected recorded inputs, at every sample: what the
+/// lift alone loses.
 ///
 /// # Errors
 /// [`MpcError::Recording`] if the recording's inputs cannot be computed.
@@ -188,8 +188,8 @@ pub fn lift_comparison(
     Ok(comparison)
 }
 
-/// Samples at which a controller with period `step_s` acts: the first at or after each multiple,
-/// as long as the command's whole hold lies within the recording.
+/// Samples at which a controller with period `step_s` acts: the first at or after each multiple, as long as the
+/// command's whole hold lies within the recording.
 pub(super) fn control_samples(time_s: &[f64], step_s: f64) -> Vec<usize> {
     let mut samples = Vec::new();
     let (Some(&first), Some(&last)) = (time_s.first(), time_s.last()) else {
@@ -326,8 +326,8 @@ fn lifted_input(
     input
 }
 
-/// Whether a command leaves a friction cone that the controller constrains, by more than a
-/// thousandth of the robot's weight; none if it constrains none here.
+/// Whether a command leaves a friction cone that the controller constrains, by more than a thousandth of the robot's
+/// weight; none if it constrains none here.
 fn friction_violated(
     controller: &Controller,
     command: &Command,

@@ -38,8 +38,8 @@ impl Aslip {
 
     /// Accelerations of body x and z, in m/s^2.
     ///
-    /// In contact `ddx = k_s/m (p_f,x - x) + F_x/m`, `ddz = k_s/m (l_0 + p_f,z - z) - g + F_z/m`
-    /// (equation 27, actuated by the legs' force over the mass); in flight `0` and `-g` (equation 28).
+    /// In contact `ddx = k_s/m (p_f,x - x) + F_x/m`, `ddz = k_s/m (l_0 + p_f,z - z) - g + F_z/m` (equation 27, actuated
+    /// by the legs' force over the mass); in flight `0` and `-g` (equation 28).
     fn acceleration(&self, position: Vector2<f64>, stance: Option<Stance>) -> Vector2<f64> {
         let gravity = Vector2::new(0.0, -self.gravity_m_s2);
         match stance {
@@ -55,7 +55,8 @@ impl Aslip {
 
     /// Rolls the pendulum out over a segment, from the recorded state at each start.
     ///
-    /// The pendulum is driven by the same forces as a learned model of this rule, in the world's axes, and switches between contact and flight as recorded.
+    /// The pendulum is driven by the same forces as a learned model of this rule, in the world's axes, and switches
+    /// between contact and flight as recorded.
     ///
     /// # Errors
     /// [`SimError::Recording`] if an angle or torque is not finite.
@@ -256,11 +257,10 @@ impl Baseline {
 
 /// Constants of the pendulum that fit the recorded accelerations in contact best; gravity stays.
 ///
-/// With `a = k_s / m`, `b = a l_0` and `c = 1 / m`, equation (27) is linear:
-/// `ddx = a (p_f,x - x) + c F_x` and `ddz + g = a (p_f,z - z) + b + c F_z`; `a`, `b`, `c` minimise the
-/// squared residuals over all samples with a foot down. A spring that pushes away (`a <= 0`) is no
-/// spring: it is left out, and only the mass is fitted. None without contact, or where the forces say
-/// nothing about a mass.
+/// With `a = k_s / m`, `b = a l_0` and `c = 1 / m`, equation (27) is linear: `ddx = a (p_f,x - x) + c F_x` and `ddz + g
+/// = a (p_f,z - z) + b + c F_z`; `a`, `b`, `c` minimise the squared residuals over all samples with a foot down. A
+/// spring that pushes away (`a <= 0`) is no spring: it is left out, and only the mass is fitted. None without contact,
+/// or where the forces say nothing about a mass.
 fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
     let published = Aslip::PUBLISHED;
     let (mut rows, mut right) = (Vec::new(), Vec::new());

@@ -44,8 +44,8 @@ impl<'a> Assessment<'a> {
     /// Simulates `model` over all segments of `recordings` and measures it.
     ///
     /// # Errors
-    /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] and [`EvaluateError::Recording`] for samples
-    /// that cannot be encoded or integrated.
+    /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] and [`EvaluateError::Recording`] for
+    /// samples that cannot be encoded or integrated.
     pub fn over(
         model: &ReducedModel,
         recordings: &'a [Recording],
@@ -121,8 +121,8 @@ impl<'a> Assessment<'a> {
     }
 }
 
-/// What speaks against using a model on these recordings: recordings that cannot be of its robot
-/// ([`notes`]), and accelerations that it does not explain at all.
+/// What speaks against using a model on these recordings: recordings that cannot be of its robot ([`notes`]), and
+/// accelerations that it does not explain at all.
 ///
 /// # Errors
 /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] for samples that cannot be encoded.
@@ -145,12 +145,12 @@ pub fn remarks(
         .collect())
 }
 
-/// By how much `R^2` of a phase's accelerations may be below that of the training. Single jumps of another controller of
-/// the same robot are up to 1.1 below.
+/// By how much `R^2` of a phase's accelerations may be below that of the training. Single jumps of another controller
+/// of the same robot are up to 1.1 below.
 const BELOW_TRAINING: f64 = 1.5;
 
-/// Phases whose accelerations the mean would explain better, and clearly worse than those of the training are explained.
-/// Flight is left out: accelerations hardly vary there, and any model is as far off as their mean.
+/// Phases whose accelerations the mean would explain better, and clearly worse than those of the training are
+/// explained. Flight is left out: accelerations hardly vary there, and any model is as far off as their mean.
 fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
     let accelerations = pointwise.acceleration.iter().map(FitSums::r2);
     let phases = model.phases().iter().zip(accelerations).enumerate();
@@ -169,8 +169,8 @@ fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
     unlike.collect()
 }
 
-/// `R^2` of a phase's accelerations over the training, if the model file says it. Refinement by rollouts may have traded
-/// it for predictions.
+/// `R^2` of a phase's accelerations over the training, if the model file says it. Refinement by rollouts may have
+/// traded it for predictions.
 fn training_r2(model: &ReducedModel, phase: usize) -> Option<f64> {
     let training = model.provenance().get("report")?.get("training")?;
     training.get("ddz_r2")?.get(phase)?.as_f64()

@@ -38,17 +38,17 @@ pub struct Summary {
     pub prepare_us: StepTimes,
     /// Agreement of commanded and recorded torques, see [`Comparison::r2`].
     pub torque_r2: ByContact,
-    /// The same for torques that the lift alone makes of projected recorded inputs, at every sample;
-    /// see [`lift_comparison`](super::lift_comparison).
+    /// The same for torques that the lift alone makes of projected recorded inputs, at every sample; see
+    /// [`lift_comparison`](super::lift_comparison).
     pub lift_r2: ByContact,
     /// Root mean square of commanded minus recorded torques over all steps and joints, N m.
     pub torque_rms_nm: Option<f64>,
-    /// Root mean square over all steps, stages and latents of planned minus reference position, in
-    /// standard deviations of the reference.
+    /// Root mean square over all steps, stages and latents of planned minus reference position, in standard deviations
+    /// of the reference.
     pub tracking_rms: Option<f64>,
     pub limit_violations: usize,
-    /// Steps that leave a friction cone by more than a thousandth of the weight; none if the
-    /// controller constrains none.
+    /// Steps that leave a friction cone by more than a thousandth of the weight; none if the controller constrains
+    /// none.
     pub friction_violations: Option<usize>,
     /// Mean of `|F_lift − G τ| / |F_lift|` over the steps where it is defined.
     pub inconsistency: Option<f64>,

@@ -10,9 +10,8 @@ use crate::sim::{LatentSegment, Rollout};
 pub struct Fit {
     /// Root mean square of the residuals, in the unit of the samples.
     pub rms: f64,
-    /// Coefficient of determination `1 - sum (y - y_hat)^2 / sum (y - mean y)^2`; at most 1, and
-    /// negative where the mean of the record would have been the better prediction. `None` when the
-    /// record does not move.
+    /// Coefficient of determination `1 - sum (y - y_hat)^2 / sum (y - mean y)^2`; at most 1, and negative where the
+    /// mean of the record would have been the better prediction. `None` when the record does not move.
     pub r2: Option<f64>,
 }
 
@@ -37,8 +36,8 @@ impl FitSums {
 
     /// Adds the pairs that `other` holds; deviations are each taken from its own mean.
     ///
-    /// This is how several coordinates, or several jumps, make one coefficient of determination
-    /// without the differences between their means counting as explained.
+    /// This is how several coordinates, or several jumps, make one coefficient of determination without the differences
+    /// between their means counting as explained.
     pub fn merge_keeping_means(&mut self, other: &Self) {
         self.count += other.count;
         self.residual_square += other.residual_square;
@@ -137,8 +136,8 @@ impl CoordinateSums {
         Ok(())
     }
 
-    /// Adds the residuals of a robot that keeps the recorded velocity at the start of each window, over the samples that
-    /// `rollout` predicts.
+    /// Adds the residuals of a robot that keeps the recorded velocity at the start of each window, over the samples
+    /// that `rollout` predicts.
     pub(super) fn add_constant_velocity(
         &mut self,
         segment: &Segment,

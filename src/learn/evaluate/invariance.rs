@@ -26,8 +26,8 @@ pub struct Invariance {
     pub gravity_m_s2: Option<f64>,
     /// Vertical force of four feet over the acceleration of that combination that it makes, kg.
     pub mass_kg: Option<f64>,
-    /// Largest change of a decoded joint angle for a body 1 m further on, rad/m: what a controller's joint
-    /// targets and a plan's postures are off where x does not count from where the jump begins.
+    /// Largest change of a decoded joint angle for a body 1 m further on, rad/m: what a controller's joint targets and
+    /// a plan's postures are off where x does not count from where the jump begins.
     pub joint_shift_rad_m: f64,
     pub phases: Vec<PhaseInvariance>,
 }
@@ -152,8 +152,8 @@ fn latent_acceleration(
     model.ddz(phase, &model.encode(x)?, &dz, &u_lat)
 }
 
-/// The mirror image of a state, a velocity or an input: legs change sides; abduction, y, roll and yaw (and the force and
-/// moments that go with them) change sign.
+/// The mirror image of a state, a velocity or an input: legs change sides; abduction, y, roll and yaw (and the force
+/// and moments that go with them) change sign.
 fn mirrored(vector: &DVector<f64>) -> DVector<f64> {
     let mut image = vector.clone();
     for leg in Leg::ALL {

@@ -24,8 +24,7 @@ impl LinearisedPhase {
         self.eigenvalues.first().map(|value| value.re)
     }
 
-    /// Ratio of the largest and the smallest singular value of the input gain; none where the
-    /// smallest is 0.
+    /// Ratio of the largest and the smallest singular value of the input gain; none where the smallest is 0.
     pub fn input_condition(&self) -> Option<f64> {
         let largest = self.input_singular_values.first()?;
         let smallest = self.input_singular_values.last()?;
@@ -40,8 +39,8 @@ impl LinearisedPhase {
     }
 }
 
-/// Each phase of a model, linearised at its mean over the recorded samples; none for a phase that no
-/// sample is in, or whose Jacobian there is not finite.
+/// Each phase of a model, linearised at its mean over the recorded samples; none for a phase that no sample is in, or
+/// whose Jacobian there is not finite.
 pub fn linearise_phases(
     model: &CompiledModel,
     segments: &[&LatentSegment],

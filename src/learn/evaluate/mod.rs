@@ -1,9 +1,8 @@
 //! How good a model is, in numbers.
 //!
-//! Rollouts and recordings come in; fits (root mean square in SI units, coefficient of
-//! determination), template models under the same inputs, stability, the losses of the lift and a [`Verdict`] leave.
-//! `docs/mathematics.md` defines each figure once. Start with `assessment.rs`, then
-//! [`coordinates`](Fit).
+//! Rollouts and recordings come in; fits (root mean square in SI units, coefficient of determination), template models
+//! under the same inputs, stability, the losses of the lift and a [`Verdict`] leave. `docs/mathematics.md` defines each
+//! figure once. Start with `assessment.rs`, then [`coordinates`](Fit).
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 

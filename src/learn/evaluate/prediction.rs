@@ -1,5 +1,5 @@
-//! Predictions one stage ahead: the recorded state and input in, where the robot is one control step later out; and
-//! the no-dynamics baseline: the same maps, and latent inputs that accelerate their own coordinate.
+//! Predictions one stage ahead: the recorded state and input in, where the robot is one control step later out; and the
+//! no-dynamics baseline: the same maps, and latent inputs that accelerate their own coordinate.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -83,8 +83,8 @@ pub(super) fn recorded_stages(
     Ok(stages)
 }
 
-/// The error of predictions over all stages, decoded by `maps`; none without stages. A stage's end is predicted from its
-/// beginning by a model's dynamics with the input held at its mean, or, without a model, by a constant velocity.
+/// The error of predictions over all stages, decoded by `maps`; none without stages. A stage's end is predicted from
+/// its beginning by a model's dynamics with the input held at its mean, or, without a model, by a constant velocity.
 pub(super) fn prediction_error(
     maps: &ReducedModel,
     dynamics: Option<&ReducedModel>,
@@ -125,8 +125,8 @@ pub(super) fn prediction_error(
 
 /// A copy of a model with `ddz = g u_lat` for dynamics.
 ///
-/// Encoder, decoder, robot and input statistics stay. The one number `g` of each phase is the least-squares fit to these
-/// very stages, so that the copy has the right scale and nothing else: no gravity, no coupling of coordinates, no
+/// Encoder, decoder, robot and input statistics stay. The one number `g` of each phase is the least-squares fit to
+/// these very stages, so that the copy has the right scale and nothing else: no gravity, no coupling of coordinates, no
 /// effect of the state. How far its accelerations are off is its own.
 pub(super) fn uninformed(
     model: &ReducedModel,

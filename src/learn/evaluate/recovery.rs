@@ -1,8 +1,8 @@
 //! Pushed, and back to the recording: the controller's feedback in a closed loop that no model has a part in.
 //!
-//! Along a recording the measured state is the reference, so that feedback has nothing to do and a command is the lifted
-//! reference input whatever the dynamics are. Here the trunk gets a push and moves on by Newton's law under what the
-//! commanded torques differ from the recorded ones:
+//! Along a recording the measured state is the reference, so that feedback has nothing to do and a command is the
+//! lifted reference input whatever the dynamics are. Here the trunk gets a push and moves on by Newton's law under what
+//! the commanded torques differ from the recorded ones:
 //!
 //! ```text
 //! m dv' = sum_k R F_k(tau_command - tau_recorded),   F_k = -J_k^-T tau_k for each foot k on the ground,   dp' = dv,

@@ -1,5 +1,5 @@
-//! Whether a model made elsewhere fits recordings: what its maps and equations miss before anything
-//! is integrated, and which usual slip explains it.
+//! Whether a model made elsewhere fits recordings: what its maps and equations miss before anything is integrated, and
+//! which usual slip explains it.
 
 use nalgebra::DVector;
 
@@ -17,8 +17,7 @@ const SAMPLES: usize = 240;
 const LARGEST_ERROR: f64 = 1.0;
 /// How many times smaller the error has to get for a slip to explain it.
 const EXPLAINED: f64 = 4.0;
-/// How much larger than the smallest an error may be for an earlier slip to be taken: left and right
-/// differ little.
+/// How much larger than the smallest an error may be for an earlier slip to be taken: left and right differ little.
 const ALIKE: f64 = 1.5;
 /// Relative error that needs no explanation.
 const SMALL_ERROR: f64 = 0.01;
@@ -27,8 +26,8 @@ const UNEXPLAINED: f64 = 0.3;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoundTrip {
-    /// Mean square of `decode(encode(x)) - x` over the mean square of the deviation of `x` from its
-    /// mean, all coordinates in the model's scaled units.
+    /// Mean square of `decode(encode(x)) - x` over the mean square of the deviation of `x` from its mean, all
+    /// coordinates in the model's scaled units.
     pub error: f64,
     /// The slip under which `error` is smallest, if it explains the error.
     pub slip: Option<(Slip, f64)>,
@@ -65,8 +64,8 @@ enum ScalingSlip {
 }
 
 impl RoundTrip {
-    /// Looks at an imported model along the recordings that came with it; none without recordings or
-    /// without both maps. `order` is that of a standard library's terms in the file.
+    /// Looks at an imported model along the recordings that came with it; none without recordings or without both maps.
+    /// `order` is that of a standard library's terms in the file.
     ///
     /// # Errors
     /// [`EvaluateError`] for a model without robot, or inputs that cannot be computed.
@@ -115,14 +114,14 @@ impl RoundTrip {
         self.all_acceleration_r2.is_none_or(|r2| r2 >= 0.0)
     }
 
-    /// Whether the model is not to be taken: its maps miss the recordings, or a slip explains why its
-    /// equations do. Equations that miss them for no known reason may be right for other motions.
+    /// Whether the model is not to be taken: its maps miss the recordings, or a slip explains why its equations do.
+    /// Equations that miss them for no known reason may be right for other motions.
     pub fn is_refused(&self) -> bool {
         !self.maps_fit() || self.acceleration_slip.is_some()
     }
 
-    /// What is wrong with the model along the recordings, if anything is, and the option of an import
-    /// that mends it; `tensor` has the names of tensors by their parts.
+    /// What is wrong with the model along the recordings, if anything is, and the option of an import that mends it;
+    /// `tensor` has the names of tensors by their parts.
     pub fn fault(&self, tensor: &dyn Fn(&str) -> Option<String>) -> Option<String> {
         if !self.maps_fit() {
             let found = format!(

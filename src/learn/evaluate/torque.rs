@@ -1,5 +1,5 @@
-//! Agreement of torques with recorded ones: the one coefficient of determination that every command prints; and what the
-//! plain lift `u = W_e^T u_lat` alone loses, without any controller.
+//! Agreement of torques with recorded ones: the one coefficient of determination that every command prints; and what
+//! the plain lift `u = W_e^T u_lat` alone loses, without any controller.
 
 use super::coordinates::{FitSums, Mean};
 use crate::model::ReducedModel;
@@ -60,10 +60,9 @@ impl Comparison {
         }
     }
 
-    /// Coefficient of determination over all twelve joints jointly,
-    /// `R² = 1 − Σ_k Σ_j (τ_kj − τ̂_kj)² / Σ_k Σ_j (τ̂_kj − mean_j)²`
-    /// with `τ` predicted, `τ̂` recorded and `mean_j` the recorded mean of joint `j`, over the samples
-    /// `k` in contact or in flight.
+    /// Coefficient of determination over all twelve joints jointly, `R² = 1 − Σ_k Σ_j (τ_kj − τ̂_kj)² / Σ_k Σ_j (τ̂_kj
+    /// − mean_j)²` with `τ` predicted, `τ̂` recorded and `mean_j` the recorded mean of joint `j`, over the samples `k`
+    /// in contact or in flight.
     pub fn r2(&self) -> ByContact {
         ByContact {
             contact: FitSums::jointly(&self.contact).r2(),
@@ -87,8 +86,8 @@ const SMALL_FORCE_N: f64 = 1.0;
 
 /// Torques of exactly projected and lifted inputs against the recorded ones.
 ///
-/// Per sample `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u`; what the joints take at the
-/// recorded velocities and accelerations is added to the lifted torques.
+/// Per sample `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u`; what the joints take at the recorded
+/// velocities and accelerations is added to the lifted torques.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LiftSums {
     pub torque: Comparison,
@@ -127,8 +126,8 @@ impl LiftSums {
         Ok(())
     }
 
-    /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down: how far the lifted
-    /// body wrench is from what the lifted torques produce.
+    /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down: how far the lifted body wrench is from
+    /// what the lifted torques produce.
     pub fn inconsistency(&self) -> Option<f64> {
         self.inconsistency.get()
     }
@@ -137,9 +136,8 @@ impl LiftSums {
 /// The published weight of complexity in the combined loss (29).
 pub const LAMBDA: f64 = 0.001;
 
-/// The combined loss `L_mod = 2 E_dec + 2 lambda ln |Xi|` (equation 29), of the decoder's mean square
-/// (scaled units) and the number of active terms in all phases.
-/// None for a model without terms.
+/// The combined loss `L_mod = 2 E_dec + 2 lambda ln |Xi|` (equation 29), of the decoder's mean square (scaled units)
+/// and the number of active terms in all phases. None for a model without terms.
 pub fn combined_loss(decoder_mean_square: f64, active_terms: usize, lambda: f64) -> Option<f64> {
     let logarithm = (active_terms > 0).then(|| (active_terms as f64).ln())?;
     Some(2.0 * decoder_mean_square + 2.0 * lambda * logarithm)

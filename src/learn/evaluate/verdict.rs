@@ -150,9 +150,9 @@ impl VerdictRow {
     }
 }
 
-/// What a model is fit for on some recordings, and why. Uses are `0.1 s` (predictions of body x and z between restarts, by
-/// their time), `whole motion` (the same from the first sample on), `torques` (those that the controller finds itself) and
-/// `control`; one that recordings or model do not allow to measure is in neither list.
+/// What a model is fit for on some recordings, and why. Uses are `0.1 s` (predictions of body x and z between restarts,
+/// by their time), `whole motion` (the same from the first sample on), `torques` (those that the controller finds
+/// itself) and `control`; one that recordings or model do not allow to measure is in neither list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Verdict {
     pub fit_for: Vec<String>,
@@ -177,8 +177,8 @@ impl Verdict {
     }
 }
 
-/// The verdict on a model from its rollouts and the controller's figures along each recording; without these, torques and
-/// control are not judged.
+/// The verdict on a model from its rollouts and the controller's figures along each recording; without these, torques
+/// and control are not judged.
 pub fn verdict(
     model: &ReducedModel,
     assessment: &Assessment<'_>,

@@ -11,8 +11,7 @@ use crate::recording::RecordingError;
 
 /// Why a controller could not be built or given a reference.
 ///
-/// Once it runs, a controller does not fail: each step's command carries a
-/// [`Status`](super::Status).
+/// Once it runs, a controller does not fail: each step's command carries a [`Status`](super::Status).
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "each variant's message names its fields")]

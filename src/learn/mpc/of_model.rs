@@ -19,8 +19,8 @@ use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 /// shorter by what rounds it.
 pub const STEP_SLACK: f64 = 0.99;
 
-/// Share of the mean variance that is added to every variance, so that a direction in which the
-/// training inputs never moved has a finite weight.
+/// Share of the mean variance that is added to every variance, so that a direction in which the training inputs never
+/// moved has a finite weight.
 const VARIANCE_FLOOR: f64 = 1e-6;
 
 /// The accelerations of a model's phases, run by the interpreter.
@@ -52,9 +52,8 @@ impl LatentDynamics for ModelDynamics {
 /// A controller of a model.
 ///
 /// # Errors
-/// [`MpcError::Control`] for settings out of range or a problem that the solver refuses, those
-/// of [`control_model`] if the model lacks something and [`MpcError::Lower`] if its dynamics do
-/// not compile.
+/// [`MpcError::Control`] for settings out of range or a problem that the solver refuses, those of [`control_model`] if
+/// the model lacks something and [`MpcError::Lower`] if its dynamics do not compile.
 pub fn controller(model: &ReducedModel, settings: MpcSettings) -> Result<Controller, MpcError> {
     let plant = control_model(model)?;
     let dynamics = Box::new(ModelDynamics(CompiledModel::new(model)?));
@@ -63,13 +62,12 @@ pub fn controller(model: &ReducedModel, settings: MpcSettings) -> Result<Control
 
 /// Reads off a model what the controller needs.
 ///
-/// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`,
-/// and the statistics of the inputs are projected there, until a reference comes.
+/// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`, and the statistics of
+/// the inputs are projected there, until a reference comes.
 ///
 /// # Errors
-/// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input
-/// statistics, [`MpcError::StateDim`] if it is not over the robot's 18 coordinates, and
-/// [`MpcError::Statistics`] if a covariance cannot be factorised.
+/// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input statistics, [`MpcError::StateDim`]
+/// if it is not over the robot's 18 coordinates, and [`MpcError::Statistics`] if a covariance cannot be factorised.
 pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
     if !model.is_linear() {
         let stand = model.decode(&DVector::zeros(model.latent_dim()))?;
@@ -99,8 +97,7 @@ pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
     })?)
 }
 
-/// The nonlinear maps of a model over the robot's coordinates with full maps: checked when the
-/// plant was made.
+/// The nonlinear maps of a model over the robot's coordinates with full maps: checked when the plant was made.
 #[derive(Debug)]
 struct ModelMaps(ReducedModel);
 

@@ -11,8 +11,8 @@ const TIME_UNIT_S: f64 = 0.01;
 /// The first latent coordinate that counts as posture: the two before it carry the body.
 const FIRST_OF_POSTURE: usize = 2;
 
-/// Adds the cost about an iterate; half the sum of squares each, so that weights are as documented
-/// up to a common factor.
+/// Adds the cost about an iterate; half the sum of squares each, so that weights are as documented up to a common
+/// factor.
 pub(crate) fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
     for (expression, weight) in squares(task, y) {
         builder.square(&expression, weight);
@@ -67,8 +67,8 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
     out
 }
 
-/// Feet on the ground stay where they stand, as far as they do in the prior: along the floor from
-/// the start or from touch-down, above it from the start or from the prior's own height.
+/// Feet on the ground stay where they stand, as far as they do in the prior: along the floor from the start or from
+/// touch-down, above it from the start or from the prior's own height.
 fn add_feet(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)>) {
     let (settings, of) = (task.settings, &task.seed.parts[part]);
     let anchor_part = task.anchor_part(part);

@@ -14,8 +14,8 @@ pub struct Goal {
 }
 
 impl Goal {
-    /// A jump forwards by `distance_m`, during which the body rises `apex_m` above its height at the
-    /// start; from the mean start of the model's training jumps.
+    /// A jump forwards by `distance_m`, during which the body rises `apex_m` above its height at the start; from the
+    /// mean start of the model's training jumps.
     pub fn new(distance_m: f64, apex_m: f64) -> Result<Self, PlanError> {
         let above = " above the height at the start";
         for (what, found, above) in [("distance", distance_m, ""), ("apex", apex_m, above)] {
@@ -44,8 +44,8 @@ impl Goal {
         self.goal_m
     }
 
-    /// Refuses goals that are out of all proportion to the training jumps, so that no time is spent
-    /// on them: farther from their range than `reach` times its width.
+    /// Refuses goals that are out of all proportion to the training jumps, so that no time is spent on them: farther
+    /// from their range than `reach` times its width.
     pub(super) fn check_within(
         &self,
         prior: &JumpPrior,
@@ -78,9 +78,8 @@ impl Goal {
         Ok(())
     }
 
-    /// The goal inside the ranges of the training jumps less a `share` of them at either end: the
-    /// goal of the trajectory that the plan starts from. A regression over few jumps is not to be
-    /// trusted at its ends.
+    /// The goal inside the ranges of the training jumps less a `share` of them at either end: the goal of the
+    /// trajectory that the plan starts from. A regression over few jumps is not to be trusted at its ends.
     pub(super) fn clipped(
         &self,
         prior: &JumpPrior,

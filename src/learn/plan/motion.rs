@@ -1,8 +1,8 @@
 //! A plan as a recording, and how close it comes to its bounds between the nodes.
 //!
-//! Velocities and inputs are linear between nodes, positions their integral, so that the motion
-//! passes through the nodes of the program. Torques are the lifted input with what the joints take
-//! of the very motion that is written, so that who reads the recording finds the planned input.
+//! Velocities and inputs are linear between nodes, positions their integral, so that the motion passes through the
+//! nodes of the program. Torques are the lifted input with what the joints take of the very motion that is written, so
+//! that who reads the recording finds the planned input.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,11 +23,11 @@ pub struct Margins {
     pub beyond_joint_limit_rad: f64,
     /// Farthest that the lifted force is outside the friction cone, N; negative inside.
     pub beyond_friction_n: f64,
-    /// Farthest that a foot on the ground moves beyond what it does in the prior, along and above the
-    /// floor, at the nodes, m.
+    /// Farthest that a foot on the ground moves beyond what it does in the prior, along and above the floor, at the
+    /// nodes, m.
     pub foot_slip_m: [f64; 2],
-    /// Farthest that a foot on the ground is from where it came down, along the floor, and below its
-    /// height at the start, m.
+    /// Farthest that a foot on the ground is from where it came down, along the floor, and below its height at the
+    /// start, m.
     pub foot_drift_m: [f64; 2],
 }
 
@@ -118,8 +118,8 @@ fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>
     margins
 }
 
-/// Farthest that a foot on the ground moves at a node, beyond what it does in the prior: along the
-/// floor from the start or from touch-down, above it.
+/// Farthest that a foot on the ground moves at a node, beyond what it does in the prior: along the floor from the start
+/// or from touch-down, above it.
 fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let mut farthest = [0.0_f64; 2];
     for (part, of) in task.seed.parts.iter().enumerate() {
@@ -135,8 +135,8 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     farthest
 }
 
-/// Farthest that a foot on the ground is, at any sample, from its place at the first sample of that
-/// contact, along the floor, and below its height at the first of all samples.
+/// Farthest that a foot on the ground is, at any sample, from its place at the first sample of that contact, along the
+/// floor, and below its height at the first of all samples.
 fn foot_drift(robot: &Robot, motion: &Segment) -> [f64; 2] {
     let place = |leg: Leg, sample: usize| robot.foot_in_world(leg, &motion.state(sample));
     let mut farthest = [0.0_f64; 2];

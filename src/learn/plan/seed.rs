@@ -106,8 +106,8 @@ impl<'a> Seed<'a> {
     }
 }
 
-/// The three coordinates of a state that encoding and decoding moves farthest, of those that it moves
-/// farther than the limits.
+/// The three coordinates of a state that encoding and decoding moves farthest, of those that it moves farther than the
+/// limits.
 fn lost(x: &DVector<f64>, decoded: &DVector<f64>) -> Vec<String> {
     let mut far: Vec<(f64, String)> = Vec::new();
     for (row, (&given, &held)) in x.iter().zip(decoded).enumerate() {
@@ -183,8 +183,8 @@ fn seed_part<'a>(
     }
 }
 
-/// From the program's variables of a node to `(z, dz, u_lat)`: standard deviations, and the root of
-/// the input's covariance.
+/// From the program's variables of a node to `(z, dz, u_lat)`: standard deviations, and the root of the input's
+/// covariance.
 fn scales(prior: &JumpPrior, root: &DMatrix<f64>, d: usize) -> DMatrix<f64> {
     let mut scales = DMatrix::zeros(3 * d, 3 * d);
     for i in 0..2 * d {

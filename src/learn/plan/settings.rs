@@ -7,8 +7,8 @@ const ANY: f64 = f64::INFINITY;
 /// Makes [`PlanSettings`] of a table: field, default, and the upper end of its range from zero.
 macro_rules! settings {
     ($($(#[$doc:meta])* $field:ident: $type:ty = $default:expr, $most:expr;)*) => {
-        /// What a plan is weighed and bounded by. Deviations are those from the prior, each in standard
-        /// deviations of the training, averaged over the coordinates and summed over time in units of 10 ms.
+        /// What a plan is weighed and bounded by. Deviations are those from the prior, each in standard deviations of
+        /// the training, averaged over the coordinates and summed over time in units of 10 ms.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub struct PlanSettings {
@@ -73,8 +73,7 @@ settings! {
     warn_deviation: f64 = 0.6, ANY;
     /// Input deviation beyond which a plan is refused.
     refuse_deviation: f64 = 1.2, ANY;
-    /// Distance of goals from the range of the training jumps, in widths of it, beyond which they
-    /// are not tried.
+    /// Distance of goals from the range of the training jumps, in widths of it, beyond which they are not tried.
     reach: f64 = 1.5, ANY;
 }
 

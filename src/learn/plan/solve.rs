@@ -20,8 +20,7 @@ use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2};
 const CONVERGED_DEFECT: f64 = 1e-4;
 /// Largest change of a variable from one program to the next that counts as none.
 const CONVERGED_STEP: f64 = 2e-2;
-/// First programs after each of which the node of the apex is placed anew; then it stays, so that they
-/// converge.
+/// First programs after each of which the node of the apex is placed anew; then it stays, so that they converge.
 const APEX_PROGRAMS: usize = 3;
 /// Largest violation of an equation with which a plan may be used at all.
 const USABLE_DEFECT: f64 = 1e-3;
@@ -43,11 +42,11 @@ pub struct Plan {
     pub parts: Vec<PlannedPart>,
     /// The cost: weighted squares of the deviations from the prior.
     pub cost: f64,
-    /// Largest Mahalanobis deviation of the latent input from the prior's, per coordinate, in
-    /// standard deviations of the training's inputs.
+    /// Largest Mahalanobis deviation of the latent input from the prior's, per coordinate, in standard deviations of
+    /// the training's inputs.
     pub input_deviation: f64,
-    /// Expected errors of distance and rise, one standard deviation, m: what the thrusts of jumps
-    /// that the deviations were not fitted to did beside them.
+    /// Expected errors of distance and rise, one standard deviation, m: what the thrusts of jumps that the deviations
+    /// were not fitted to did beside them.
     pub error_m: [f64; 2],
     /// How close the motion comes to its bounds, between the nodes too.
     pub margins: Margins,
@@ -59,8 +58,8 @@ pub struct Plan {
 /// Plans a jump.
 ///
 /// # Errors
-/// [`PlanError`]: a model without a prior, a goal out of all proportion to the training jumps,
-/// programs without a solution. A plan that is not to be trusted is none: its [`Verdict`] says so.
+/// [`PlanError`]: a model without a prior, a goal out of all proportion to the training jumps, programs without a
+/// solution. A plan that is not to be trusted is none: its [`Verdict`] says so.
 pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Result<Plan, PlanError> {
     let clock = Instant::now();
     let seed = Seed::new(model, goal, settings)?;

@@ -1,9 +1,8 @@
 //! The program of a plan about an iterate.
 //!
-//! Every part has `n + 1` nodes. With the prior's trajectory `(z_p, dz_p, u_p)`, variables are
-//! deviations in standard deviations: `z = z_p + sigma zeta`, `dz = dz_p + sigma nu`,
-//! `u_lat = u_p + L mu`, and a duration `T = T_p (1 + 0.15 tau)` per part. Over an interval
-//! `h = T / n`, with a bar for the mean of its ends and `f` the model of deviations:
+//! Every part has `n + 1` nodes. With the prior's trajectory `(z_p, dz_p, u_p)`, variables are deviations in standard
+//! deviations: `z = z_p + sigma zeta`, `dz = dz_p + sigma nu`, `u_lat = u_p + L mu`, and a duration `T = T_p (1 + 0.15
+//! tau)` per part. Over an interval `h = T / n`, with a bar for the mean of its ends and `f` the model of deviations:
 //!
 //! ```text
 //! minimise   sum over nodes of h/10 ms (|mu|^2 + posture + rates + smoothness + feet) + durations
@@ -14,10 +13,9 @@
 //!            |lift u_lat + losses| <= limit, joints inside their limits, |Fx| <= mu Fz
 //! ```
 //!
-//! `drift_k` and `ddz_k` are such that the prior itself is a trajectory; `f` is zero for a coordinate
-//! that the model lets fall freely. Only products with `h`, `vz^2`, the feet and the losses are not
-//! linear: they are linearised about the iterate, or kept from it.
-//! Bounds that are far from active are left out, and looked at again with the result.
+//! `drift_k` and `ddz_k` are such that the prior itself is a trajectory; `f` is zero for a coordinate that the model
+//! lets fall freely. Only products with `h`, `vz^2`, the feet and the losses are not linear: they are linearised about
+//! the iterate, or kept from it. Bounds that are far from active are left out, and looked at again with the result.
 
 use std::ops::Add;
 
@@ -225,8 +223,8 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// The difference that an equation demands to be zero with a step of `step` s, and the rate that
-    /// the step multiplies; `i` below `latent_dim` is a position, above a velocity.
+    /// The difference that an equation demands to be zero with a step of `step` s, and the rate that the step
+    /// multiplies; `i` below `latent_dim` is a position, above a velocity.
     fn equation(&self, part: usize, interval: usize, i: usize, step: f64) -> (Affine, Affine) {
         let d = self.seed.latent_dim;
         let [here, next] = [interval, interval + 1];
@@ -365,14 +363,14 @@ impl<'a> Task<'a> {
         flight.expect("invariant: checked with the model")
     }
 
-    /// The part at whose first node the feet of `part` stand where they are to stay: the first part, or the
-    /// landing itself.
+    /// The part at whose first node the feet of `part` stand where they are to stay: the first part, or the landing
+    /// itself.
     pub(crate) fn anchor_part(&self, part: usize) -> usize {
         if part > self.flight() { part } else { 0 }
     }
 
-    /// Height that the body reaches by its height and speed at the node of the apex, less the height
-    /// that is wanted; linear about the iterate.
+    /// Height that the body reaches by its height and speed at the node of the apex, less the height that is wanted;
+    /// linear about the iterate.
     fn apex(&self, y: &[f64]) -> Affine {
         let flight = self.flight();
         let wanted = self.start_x(BODY_Z) + self.seed.goal.goal_m()[1];

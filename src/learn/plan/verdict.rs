@@ -12,8 +12,8 @@ const NO_SLACK: f64 = 2e-3;
 const NO_JOINT: f64 = 2e-3;
 /// Force outside the friction cone between nodes beyond that allowed at them, N.
 const NO_FRICTION_N: f64 = 2.0;
-/// Farthest that standing feet may be from where they came down, along the floor, and below it, m:
-/// twice what plans and recordings with rolling, point-like feet show.
+/// Farthest that standing feet may be from where they came down, along the floor, and below it, m: twice what plans and
+/// recordings with rolling, point-like feet show.
 const FOOT_DRIFT_M: [f64; 2] = [0.04, 0.02];
 
 /// What a plan is worth.

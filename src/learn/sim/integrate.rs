@@ -1,11 +1,11 @@
-//! Adaptive integration of `dy/dt = f(t, y)` by extrapolation: Gragg's explicit midpoint rule first,
-//! and where that needs too many evaluations (a stiff problem), the linearly implicit Euler rule
-//! from the same start. The paper uses LSODA, which switches in the same spirit.
+//! Adaptive integration of `dy/dt = f(t, y)` by extrapolation: Gragg's explicit midpoint rule first, and where that
+//! needs too many evaluations (a stiff problem), the linearly implicit Euler rule from the same start. The paper uses
+//! LSODA, which switches in the same spirit.
 //!
-//! A step of length `H` is computed with `n_0 < n_1 < ...` substeps, and the results are extrapolated to
-//! infinitely many (Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, II.9, and
-//! II, IV.9): order `2j + 2` or `j + 1` after `j + 1` results, as many as the tolerance asks for. Steps
-//! end at every requested time, so that an input with a kink there is integrated exactly.
+//! A step of length `H` is computed with `n_0 < n_1 < ...` substeps, and the results are extrapolated to infinitely
+//! many (Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, II.9, and II, IV.9): order `2j + 2` or
+//! `j + 1` after `j + 1` results, as many as the tolerance asks for. Steps end at every requested time, so that an
+//! input with a kink there is integrated exactly.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -86,8 +86,8 @@ pub fn integrate(
     run(IntegrationMethod::Implicit, usize::MAX)
 }
 
-/// Results of one step that are extrapolated at most. More would amplify the rounding errors of the
-/// linearly implicit rule to the default tolerance.
+/// Results of one step that are extrapolated at most. More would amplify the rounding errors of the linearly implicit
+/// rule to the default tolerance.
 const MOST_RESULTS: usize = 8;
 
 struct Stepper<'a, S> {
@@ -107,8 +107,8 @@ struct Trial {
     next: f64,
 }
 
-/// The cheapest way on: evaluations for the length just tried, a length, and an index of the table at
-/// which its error is expected to meet the tolerance.
+/// The cheapest way on: evaluations for the length just tried, a length, and an index of the table at which its error
+/// is expected to meet the tolerance.
 struct Plan {
     work: f64,
     length: f64,
@@ -116,8 +116,8 @@ struct Plan {
 }
 
 impl Plan {
-    /// Takes the length at which entry `j` should meet the tolerance, if that costs less per length;
-    /// its `error` grows with the power `order` of the length, and took `spent` evaluations at `h`.
+    /// Takes the length at which entry `j` should meet the tolerance, if that costs less per length; its `error` grows
+    /// with the power `order` of the length, and took `spent` evaluations at `h`.
     fn consider(&mut self, j: usize, error: f64, order: usize, spent: f64, h: f64) {
         let factor = 0.9 * (0.5 / error.max(1e-300)).powf(1.0 / order as f64);
         let factor = factor.clamp(0.02, 4.0);
@@ -173,8 +173,8 @@ impl<S: OdeSystem> Stepper<'_, S> {
         }
     }
 
-    /// One step of length `h`: results with ever more substeps, until two neighbours in the
-    /// extrapolation table agree to the tolerance or one result more than expected was not enough.
+    /// One step of length `h`: results with ever more substeps, until two neighbours in the extrapolation table agree
+    /// to the tolerance or one result more than expected was not enough.
     fn step(&mut self, time: f64, y: &DVector<f64>, h: f64) -> Trial {
         let begun = self.evaluations;
         let mut rate = DVector::zeros(y.len());
@@ -278,8 +278,8 @@ impl<S: OdeSystem> Stepper<'_, S> {
         defined.then(|| self.system.rate(time, y.as_slice(), f.as_mut_slice()))
     }
 
-    /// Adds a row to the extrapolation table, of which only the last row is kept; returns the
-    /// difference of its last two entries.
+    /// Adds a row to the extrapolation table, of which only the last row is kept; returns the difference of its last
+    /// two entries.
     fn extrapolate(&self, row: &mut Vec<DVector<f64>>, result: DVector<f64>) -> DVector<f64> {
         let n = (row.len() + 1) as f64;
         let mut entry = result;

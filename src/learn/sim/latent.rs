@@ -20,8 +20,8 @@ pub enum SimError {
 
 /// Latent samples of one recorded segment; every matrix is `latent_dim x n`, a column a sample.
 ///
-/// The equations are those of a linear model; a nonlinear encoder's Jacobian at the sample's `x`
-/// takes the place of `W_e`, and accelerations have the term `dJ/dt dx`.
+/// The equations are those of a linear model; a nonlinear encoder's Jacobian at the sample's `x` takes the place of
+/// `W_e`, and accelerations have the term `dJ/dt dx`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LatentSegment {
     pub time_s: Vec<f64>,

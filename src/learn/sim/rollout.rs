@@ -1,7 +1,7 @@
 //! Rollouts: the hybrid model integrated over the recorded inputs, equation (24).
 //!
-//! Phases switch as recorded; the latent state is carried through the switch. Between samples the
-//! latent input is interpolated linearly.
+//! Phases switch as recorded; the latent state is carried through the switch. Between samples the latent input is
+//! interpolated linearly.
 
 use std::ops::Range;
 

@@ -12,10 +12,10 @@ use crate::robot::Robot;
 
 /// Learns a model: encoder by its row space, decoder by least squares, Xi by sparse regression.
 ///
-/// The encoder's rows span the space of least reconstruction error and lift loss (`subspace`), rotated by
-/// varimax; its bias puts the mean of the training states at `z = 0`. The decoder is the least-squares one over all
-/// phases. Xi of each phase is chosen among many regressions by rollouts (`select`). A cancelled
-/// training ends with the seeds begun by then; seeds without a stable model are left out. Deterministic.
+/// The encoder's rows span the space of least reconstruction error and lift loss (`subspace`), rotated by varimax; its
+/// bias puts the mean of the training states at `z = 0`. The decoder is the least-squares one over all phases. Xi of
+/// each phase is chosen among many regressions by rollouts (`select`). A cancelled training ends with the seeds begun
+/// by then; seeds without a stable model are left out. Deterministic.
 ///
 /// # Errors
 /// [`TrainError`]: options out of range, too few samples, too many latent coordinates, no stable model, cancelled

@@ -43,9 +43,9 @@ impl ScaleOptions {
         }
     }
 
-    /// State and torques 0.1, forces 0.005, so that both kinds of input are of one size; moments 0.05 in the
-    /// body's axes, with which they are of that size too, and 0.02 in the world's: about the body's origin moments
-    /// of a jump nearly cancel, and what remains is the least exact part of the input.
+    /// State and torques 0.1, forces 0.005, so that both kinds of input are of one size; moments 0.05 in the body's
+    /// axes, with which they are of that size too, and 0.02 in the world's: about the body's origin moments of a jump
+    /// nearly cancel, and what remains is the least exact part of the input.
     pub fn in_frame(frame: WrenchFrame) -> Self {
         Self {
             state: 0.1,

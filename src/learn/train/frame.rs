@@ -84,8 +84,8 @@ impl Frame {
     }
 }
 
-/// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`:
-/// abductions mostly turn the other way on the other side.
+/// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`: abductions
+/// mostly turn the other way on the other side.
 fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
     let pairs = [
         (Leg::FrontRight, Leg::FrontLeft),
@@ -108,9 +108,9 @@ fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
 /// Rows of the centre of mass forwards and upwards, as columns, `18 x 2`: `x + c_x^T q` and `z + c_z^T q` over the
 /// joints `q`, of the body alone where the recordings have no flight.
 ///
-/// Nothing pushes the robot in flight, so its centre of mass falls freely: `ddx + c_x^T ddq = 0` and
-/// `ddz + c_z^T ddq = -g`. The regression of the body's accelerations on those of the joints (mirrored, ridge) over
-/// all flights therefore tells the part `c` that the legs have in the centre of mass, to first order in `q`.
+/// Nothing pushes the robot in flight, so its centre of mass falls freely: `ddx + c_x^T ddq = 0` and `ddz + c_z^T ddq =
+/// -g`. The regression of the body's accelerations on those of the joints (mirrored, ridge) over all flights therefore
+/// tells the part `c` that the legs have in the centre of mass, to first order in `q`.
 fn centre_of_mass(training: &Dataset, robot: &Robot) -> DMatrix<f64> {
     let all: Vec<usize> = (0..JOINT_DIM).collect();
     let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));

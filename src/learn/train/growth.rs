@@ -1,9 +1,9 @@
 //! A bound on the growth of deviations: dynamics that run away are not regressed in the first place.
 //!
 //! About the mean state of a phase a deviation moves by `A = [0 I; d ddz/dz  d ddz/d dz]`, so it grows at most at the
-//! largest real part of the eigenvalues of `A`. Through phases of durations `T_1 ... T_k` it is multiplied by
-//! `M = e^(A_k T_k) ... e^(A_1 T_1)`, which makes rates `ln|mu| / sum T` of the eigenvalues `mu` of `M`: feedback that
-//! is stable in every phase may still grow through their sequence. Both are smooth in Xi but where eigenvalues meet.
+//! largest real part of the eigenvalues of `A`. Through phases of durations `T_1 ... T_k` it is multiplied by `M =
+//! e^(A_k T_k) ... e^(A_1 T_1)`, which makes rates `ln|mu| / sum T` of the eigenvalues `mu` of `M`: feedback that is
+//! stable in every phase may still grow through their sequence. Both are smooth in Xi but where eigenvalues meet.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -133,8 +133,8 @@ impl Growth {
         each.map(|&step| transition(lower, step)).collect()
     }
 
-    /// The eigenvalues that grow faster than what is aimed at: those of the phases, and those of the sequence once every
-    /// phase keeps the bound.
+    /// The eigenvalues that grow faster than what is aimed at: those of the phases, and those of the sequence once
+    /// every phase keeps the bound.
     fn modes(&self, lower: &[DMatrix<f64>]) -> Vec<Mode> {
         let mut all = Vec::new();
         for phase in 0..lower.len() {
@@ -262,8 +262,8 @@ fn mean_of(phase: usize, set: EncodedSet<'_>) -> Vec<f64> {
         .collect()
 }
 
-/// `d theta / d (z, dz)` (`library_dim x 2 latent_dim`) at a state and input, by central differences; 0 where a term has
-/// no finite one.
+/// `d theta / d (z, dz)` (`library_dim x 2 latent_dim`) at a state and input, by central differences; 0 where a term
+/// has no finite one.
 fn slopes_at(mean: &[f64], features: &Features) -> DMatrix<f64> {
     let d = features.latent_dim();
     let largest = mean.iter().fold(1.0, |most: f64, v| most.max(v.abs()));

@@ -80,8 +80,8 @@ impl<'a> Judge<'a> {
         0..self.set.dataset.jumps.len().div_ceil(JUMPS)
     }
 
-    /// Scaled errors of 0.1 s predictions and of whole jumps of a part, every [`THINNED`]th sample;
-    /// none if a rollout diverges.
+    /// Scaled errors of 0.1 s predictions and of whole jumps of a part, every [`THINNED`]th sample; none if a rollout
+    /// diverges.
     pub(super) fn errors(&self, xi: &[Xi], part: usize) -> Option<[DVector<f64>; 2]> {
         let errors = [SHORT, LONG].map(|kind| {
             let mut errors = Vec::new();

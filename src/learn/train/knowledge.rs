@@ -52,8 +52,8 @@ impl Knowledge {
     /// wherever it and the legs are (Newton's second law): no term of `ddz1` and `ddz2` depends on a position, and each
     /// keeps its own velocity, with a coefficient of at most 0. With feet on the ground `ddz2` depends on its own force
     /// and velocity alone, and keeps its constant: gravity, less what the ground carries of the legs' weight, which
-    /// forces that come from torques leave out. In flight `ddz1 = 0`, `ddz2 = -g`, and there are no forces that any term
-    /// could depend on. An input acts on its own coordinate.
+    /// forces that come from torques leave out. In flight `ddz1 = 0`, `ddz2 = -g`, and there are no forces that any
+    /// term could depend on. An input acts on its own coordinate.
     pub(super) fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
         let (p, d) = (features.library_dim(), features.latent_dim());
         let each = training.phases.patterns.iter();

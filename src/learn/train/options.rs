@@ -61,8 +61,8 @@ pub struct TrainOptions {
     pub n_seeds: usize,
     /// Factors from SI to scaled units.
     pub scaling: ScaleOptions,
-    /// What the joints take of the recorded torques before they count as input; none if the motors'
-    /// torques count as they are.
+    /// What the joints take of the recorded torques before they count as input; none if the motors' torques count as
+    /// they are.
     pub actuators: Option<Actuators>,
     /// Axes of the force and moment in the inputs.
     pub wrench_frame: WrenchFrame,
@@ -110,8 +110,8 @@ pub enum Transfer {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EncoderOptions {
-    /// Weight of the input energy which the latent input cannot carry, against the reconstruction error in scaled
-    /// units (the lift loss); 0 leaves the lift to chance.
+    /// Weight of the input energy which the latent input cannot carry, against the reconstruction error in scaled units
+    /// (the lift loss); 0 leaves the lift to chance.
     pub lift_weight: f64,
     /// Weight of the three body positions in the reconstruction error; the other coordinates have 1.
     pub body_weight: f64,
@@ -130,8 +130,8 @@ pub struct EncoderOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
-    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right;
-    /// the dynamics obey what is known of them.
+    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right; the
+    /// dynamics obey what is known of them.
     Named,
     /// Any rows over all coordinates that move or are actuated.
     Free,
@@ -177,8 +177,9 @@ impl TrainOptions {
         InputRule::new(robot, self.actuators.clone(), self.wrench_frame)
     }
 
-    /// The settings of the paper: motors' torques, forces in the body's axes, one scale for everything, no mask, no lift loss, all coordinates alike, Xi starting
-    /// at ones, the published library and transfer steps, accelerations as recorded.
+    /// The settings of the paper: motors' torques, forces in the body's axes, one scale for everything, no mask, no
+    /// lift loss, all coordinates alike, Xi starting at ones, the published library and transfer steps, accelerations
+    /// as recorded.
     pub fn paper(name: impl Into<String>, latent_dim: usize) -> Self {
         let plain = Self::new(name, latent_dim);
         Self {

@@ -1,8 +1,8 @@
 //! Refining coefficients by what their rollouts predict: Gauss-Newton on the errors of 0.1 s predictions and of whole
 //! jumps, from the coefficients of a regression.
 //!
-//! A regression fits accelerations, each sample for itself, so nothing bounds what its errors add up to. Predictions
-//! of whole jumps do: coefficients under which a phase, or the sequence of phases, runs away predict badly (the
+//! A regression fits accelerations, each sample for itself, so nothing bounds what its errors add up to. Predictions of
+//! whole jumps do: coefficients under which a phase, or the sequence of phases, runs away predict badly (the
 //! prediction-error method, Ljung, System Identification, 2nd ed. 1999, section 7.2).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};

@@ -73,9 +73,9 @@ pub(super) fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
 
 /// Latent positions predicted in every row, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
 ///
-/// RK4 with the recorded sampling; the latent input is interpolated linearly between samples, the phase is the
-/// recorded one of the sample a step starts from. Values beyond 1e6 are set to infinity and stay there. What is
-/// computed for a row does not depend on the others.
+/// RK4 with the recorded sampling; the latent input is interpolated linearly between samples, the phase is the recorded
+/// one of the sample a step starts from. Values beyond 1e6 are set to infinity and stay there. What is computed for a
+/// row does not depend on the others.
 pub(super) fn predict(
     candidate: Candidate<'_>,
     set: EncodedSet<'_>,

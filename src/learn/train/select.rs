@@ -44,8 +44,8 @@ pub struct Choice {
     pub window: usize,
     pub ridge: f64,
     pub pruning: Pruning,
-    /// Validation score: root mean square error of the latent state in standard deviations, of 0.1 s predictions
-    /// plus 0.2 times that of whole jumps.
+    /// Validation score: root mean square error of the latent state in standard deviations, of 0.1 s predictions plus
+    /// 0.2 times that of whole jumps.
     pub score: f64,
     pub active: usize,
 }
@@ -270,8 +270,8 @@ const ROUNDS: usize = 3;
 type RankedTerm = (f64, usize, usize, usize);
 
 impl Refiner<'_> {
-    /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as
-    /// the score stays within `limit`. One attempt a term.
+    /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as the
+    /// score stays within `limit`. One attempt a term.
     fn sweep(&self, trial: &mut Trial<'_>, limit: f64, monitor: &mut Monitor<'_>) {
         let mut order = trial.places(Regression::losses);
         order.sort_by(|a, b| a.0.total_cmp(&b.0));

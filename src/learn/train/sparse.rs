@@ -219,8 +219,8 @@ impl Regression {
         change
     }
 
-    /// For every active term of a column that may go: its row, and the share of the acceleration's energy lost
-    /// without it.
+    /// For every active term of a column that may go: its row, and the share of the acceleration's energy lost without
+    /// it.
     pub(super) fn losses(&self, column: usize, support: &Support, ridge: f64) -> Vec<(usize, f64)> {
         let energy = self.energy(column);
         let fit = self.support_fit(column, self.active_terms(column, support), ridge);

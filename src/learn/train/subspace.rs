@@ -1,8 +1,8 @@
 //! The encoder's row space: which directions of the state the latent state sees and the lift can push.
 //!
-//! Reconstruction and lift depend on `W_e` only through the space its rows span, so the search runs over
-//! orthonormal bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`); [`varimax`] then chooses the basis inside the space:
-//! the same space, described by as few coordinates a latent as possible.
+//! Reconstruction and lift depend on `W_e` only through the space its rows span, so the search runs over orthonormal
+//! bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`); [`varimax`] then chooses the basis inside the space: the same
+//! space, described by as few coordinates a latent as possible.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -40,12 +40,12 @@ const ITERATIONS: usize = 2000;
 /// Finds the row space of least `reconstruction + lift_weight * lift_loss`: an orthonormal basis, in which the rows of
 /// resting coordinates are zero. The frame must have as many directions as the space has dimensions.
 ///
-/// With the state covariance `C`, the coordinate weights `D` (diagonal), the input second moment `U` and an
-/// orthonormal basis `Q` of the active coordinates: `reconstruction = (tr DC - tr((Q^T C Q)^-1 Q^T C D C Q)) / n` is
-/// the weighted mean square error of the least-squares decoder and `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T) u||^2 / ||u||^2`.
-/// Rows that the frame holds are taken as seen: `C` is then the covariance given them. The basis returned is that of
-/// the other rows. Descent along the exact gradient on the Stiefel manifold from several starting points, some of which
-/// are random; the best is kept.
+/// With the state covariance `C`, the coordinate weights `D` (diagonal), the input second moment `U` and an orthonormal
+/// basis `Q` of the active coordinates: `reconstruction = (tr DC - tr((Q^T C Q)^-1 Q^T C D C Q)) / n` is the weighted
+/// mean square error of the least-squares decoder and `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T)
+/// u||^2 / ||u||^2`. Rows that the frame holds are taken as seen: `C` is then the covariance given them. The basis
+/// returned is that of the other rows. Descent along the exact gradient on the Stiefel manifold from several starting
+/// points, some of which are random; the best is kept.
 pub(super) fn find_subspace(
     moments: &Moments,
     frame: &Frame,
@@ -230,8 +230,8 @@ fn leading(symmetric: DMatrix<f64>, count: usize) -> DMatrix<f64> {
 /// Orthogonal `latent_dim x latent_dim` matrix `T` for which `loadings * T` is simplest in the varimax sense.
 ///
 /// `loadings` is `state_dim x latent_dim` (here `diag(std) Q`); the sum over columns of the variance of the squared
-/// entries is increased by planar rotations until none moves a pair by more than `1e-12` rad
-/// (Kaiser 1958, The varimax criterion for analytic rotation in factor analysis, without row normalisation).
+/// entries is increased by planar rotations until none moves a pair by more than `1e-12` rad (Kaiser 1958, The varimax
+/// criterion for analytic rotation in factor analysis, without row normalisation).
 pub(super) fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
     let n_columns = loadings.ncols();
     let n_rows = loadings.nrows() as f64;
@@ -258,8 +258,8 @@ pub(super) fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// Columns reordered by decreasing weight on the coordinates in `order_by`, each with a positive dominant entry.
 ///
-/// The first coordinate of `order_by` takes the column that weighs it most, then the next one, so that a reader
-/// meets body x as z1 and body z as z2 whenever the space holds them.
+/// The first coordinate of `order_by` takes the column that weighs it most, then the next one, so that a reader meets
+/// body x as z1 and body z as z2 whenever the space holds them.
 pub(super) fn order_and_sign(
     loadings: &DMatrix<f64>,
     order_by: &[usize],

@@ -1,5 +1,6 @@
 //! One training as every method sees it, checked before any map is learned: from learned maps to the numbers of a model
-//! (latent basis, chosen dynamics, metrics of the fit), and the model that they make, which carries where it comes from.
+//! (latent basis, chosen dynamics, metrics of the fit), and the model that they make, which carries where it comes
+//! from.
 
 use std::path::Path;
 

@@ -48,10 +48,10 @@ pub(super) fn check_terms(
 
 /// Rows of `theta` and `target` of one phase, averaged over windows of `window` samples.
 ///
-/// Integrating `ddz = theta Xi` once and twice over a window of length `T` gives two equations a window,
-/// `(dz(T) - dz(0)) / T = mean of theta Xi` and `2 (z(T) - z(0) - T dz(0)) / T^2 = weighted mean of theta Xi`
-/// (the integral form of Schaeffer and McCalla 2017, here of second order). They need no accelerations and weigh
-/// coefficients by what they do to a prediction. A `window` of 0 gives the smoothed accelerations themselves.
+/// Integrating `ddz = theta Xi` once and twice over a window of length `T` gives two equations a window, `(dz(T) -
+/// dz(0)) / T = mean of theta Xi` and `2 (z(T) - z(0) - T dz(0)) / T^2 = weighted mean of theta Xi` (the integral form
+/// of Schaeffer and McCalla 2017, here of second order). They need no accelerations and weigh coefficients by what they
+/// do to a prediction. A `window` of 0 gives the smoothed accelerations themselves.
 pub(super) fn windowed_samples(
     set: EncodedSet<'_>,
     features: &Features,

@@ -1,7 +1,7 @@
 //! The grammar of the model file, as serde types.
 //!
-//! Only types and spelling are settled here; shapes, ranks and names are checked when the parts
-//! become a [`ReducedModel`](crate::model::ReducedModel).
+//! Only types and spelling are settled here; shapes, ranks and names are checked when the parts become a
+//! [`ReducedModel`](crate::model::ReducedModel).
 
 use std::fmt;
 
@@ -24,8 +24,8 @@ use crate::robot_file::{self, RobotEntry};
 /// Name and version of the format of a model without the keys of [`SCHEMA_2`].
 pub(crate) const SCHEMA: &str = "romc-model/1";
 
-/// The format with `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a
-/// `robot` that is described.
+/// The format with `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a `robot` that is
+/// described.
 pub(crate) const SCHEMA_2: &str = "romc-model/2";
 
 #[derive(Serialize, Deserialize)]

@@ -1,5 +1,4 @@
-//! JSON as people like to read and compare it: one key, or one row of a matrix, a line; lists of
-//! words fill lines.
+//! JSON as people like to read and compare it: one key, or one row of a matrix, a line; lists of words fill lines.
 
 use serde_json::Value;
 

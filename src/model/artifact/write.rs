@@ -1,5 +1,5 @@
-//! From a model to a file that appears whole or not at all, and to the digest by which generated
-//! files name the model that they come from.
+//! From a model to a file that appears whole or not at all, and to the digest by which generated files name the model
+//! that they come from.
 
 use std::path::Path;
 use std::{fmt, fs, io};
@@ -12,8 +12,7 @@ use super::read::ArtifactError;
 use crate::files::{Overwrite, Place, hex, write_whole};
 use crate::model::ReducedModel;
 
-/// The model file as text: equal for equal models, numbers in the shortest form that reads back to
-/// the same bits.
+/// The model file as text: equal for equal models, numbers in the shortest form that reads back to the same bits.
 pub fn to_text(model: &ReducedModel) -> String {
     let value = serde_json::to_value(Manifest::of(model))
         .expect("a manifest is strings, finite numbers and string-keyed maps");
@@ -59,8 +58,8 @@ pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<
 
 /// SHA-256 of a model in the form in which [`write()`] writes it.
 ///
-/// The layout of the file that was read does not matter. For a file that romc wrote the digest is
-/// what `sha256sum` prints.
+/// The layout of the file that was read does not matter. For a file that romc wrote the digest is what `sha256sum`
+/// prints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Digest([u8; 32]);
 

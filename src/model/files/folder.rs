@@ -69,11 +69,10 @@ pub fn write_files(
     write_files_since(&Emitted::of(folder)?, folder, files, overwrite)
 }
 
-/// Writes the files into `folder`, which is made if it does not exist. Every file is first
-/// written beside its place, then moved there; nothing is moved before all are written.
-/// Files of earlier runs that are no longer emitted stay. Runs at the same time into one folder
-/// move their files one after the other, under the lock of its list; of two that write other contents under one name,
-/// the second is refused, unless it may replace.
+/// Writes the files into `folder`, which is made if it does not exist. Every file is first written beside its place,
+/// then moved there; nothing is moved before all are written. Files of earlier runs that are no longer emitted stay.
+/// Runs at the same time into one folder move their files one after the other, under the lock of its list; of two that
+/// write other contents under one name, the second is refused, unless it may replace.
 ///
 /// # Errors
 /// [`FolderError::Foreign`], [`FolderError::Changed`] and [`FolderError::Concurrent`] before anything is written,

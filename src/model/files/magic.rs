@@ -1,7 +1,7 @@
 //! Formats of other programs, recognised by content or file name extension, with the commands that convert them.
 //!
-//! `magic.toml` is the one table. Readers of recordings ask for a text table or a log ([`recognised`]), readers of models
-//! for arrays.
+//! `magic.toml` is the one table. Readers of recordings ask for a text table or a log ([`recognised`]), readers of
+//! models for arrays.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -113,7 +113,8 @@ pub fn arrays_by_ending(path: &Path) -> Option<OtherFormat> {
     row.of_arrays(path)
 }
 
-/// The same of a path that is no file: the common stem of a TensorFlow checkpoint's files, or the folder of a SavedModel.
+/// The same of a path that is no file: the common stem of a TensorFlow checkpoint's files, or the folder of a
+/// SavedModel.
 pub fn arrays_by_neighbours(path: &Path) -> Option<OtherFormat> {
     let index = PathBuf::from(format!("{}.index", path.display()));
     let parts = [index, path.join("saved_model.pb")];

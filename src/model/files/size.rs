@@ -106,8 +106,8 @@ pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))
 }
 
-/// Most tables and dotted keys of a file, by their signs: a parsed table takes several hundred times the two bytes that it
-/// has in a file.
+/// Most tables and dotted keys of a file, by their signs: a parsed table takes several hundred times the two bytes that
+/// it has in a file.
 const MOST_TABLES: usize = 20_000;
 
 pub fn read_toml(path: &Path) -> io::Result<String> {

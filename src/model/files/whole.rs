@@ -45,9 +45,9 @@ impl Overwrite {
 /// Makes `path` of what `fill` writes, in one step, or replaces it.
 ///
 /// # Errors
-/// [`io::ErrorKind::AlreadyExists`] for a file that may not be replaced, also one that appears meanwhile, and those of the
-/// file system; then `path` is as it was, and nothing is left beside it. What a process that was killed has left there
-/// is removed by the next call.
+/// [`io::ErrorKind::AlreadyExists`] for a file that may not be replaced, also one that appears meanwhile, and those of
+/// the file system; then `path` is as it was, and nothing is left beside it. What a process that was killed has left
+/// there is removed by the next call.
 pub fn write_whole(
     path: &Path,
     overwrite: Overwrite,

@@ -83,8 +83,8 @@ impl Activation {
         }
     }
 
-    /// `phi(a)` with its first three derivatives; of elu at zero, where those from the second on jump, the ones of
-    /// the negative side.
+    /// `phi(a)` with its first three derivatives; of elu at zero, where those from the second on jump, the ones of the
+    /// negative side.
     pub fn jet(self, a: f64) -> [f64; 4] {
         match self {
             Self::Linear => [a, 1.0, 0.0, 0.0],
@@ -221,9 +221,9 @@ pub const DENSITY_AT_ZERO: f64 = 0.398_942_280_401_432_7;
 
 /// Probability that a normal number is below `a`.
 ///
-/// With `x = |a|/sqrt(2)` and `t = 2/(2 + x)` the tail is `exp(-x^2) t q(2 t - 1) / 2`, where `q` is
-/// the Chebyshev interpolation of `exp(x^2) erfc(x) / t`. Its error is below 1e-15 of the tail, and
-/// it needs no branch, so that generated code computes the same.
+/// With `x = |a|/sqrt(2)` and `t = 2/(2 + x)` the tail is `exp(-x^2) t q(2 t - 1) / 2`, where `q` is the Chebyshev
+/// interpolation of `exp(x^2) erfc(x) / t`. Its error is below 1e-15 of the tail, and it needs no branch, so that
+/// generated code computes the same.
 fn normal_cumulative(a: f64) -> f64 {
     let t = 2.0 / (2.0 + a.abs() * std::f64::consts::FRAC_1_SQRT_2);
     let w = 2.0 * t - 1.0;

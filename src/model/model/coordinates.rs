@@ -10,8 +10,8 @@ const MAX_TEXT_LEN: usize = 64;
 
 /// Names and units of the coordinates of a vector, in order.
 ///
-/// They reach comments and tables of generated files, so [`ReducedModel`](super::ReducedModel)
-/// accepts only characters which mean nothing in C, Rust and CSV.
+/// They reach comments and tables of generated files, so [`ReducedModel`](super::ReducedModel) accepts only characters
+/// which mean nothing in C, Rust and CSV.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoordinateNames {

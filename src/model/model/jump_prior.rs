@@ -1,10 +1,10 @@
 //! What a model keeps of the jumps that it was learned from, so that others can be planned.
 //!
-//! A jump is cut at its landmarks into parts (crouch, thrust, flight, landing), each with nodes at
-//! equal shares of its duration. The prior is a regression over the [`GOAL_DIM`] numbers of a goal:
-//! with the features `phi = (1, g_1, g_2, g_3)`, `g = (goal - mean) / std`, the value of a
-//! coordinate at a node is `c . phi`. Per part, `Xi` of deviations says how accelerations change
-//! with what is changed about such a trajectory: `delta ddz = Xi^T (delta z, delta dz, delta u_lat)`.
+//! A jump is cut at its landmarks into parts (crouch, thrust, flight, landing), each with nodes at equal shares of its
+//! duration. The prior is a regression over the [`GOAL_DIM`] numbers of a goal: with the features `phi = (1, g_1, g_2,
+//! g_3)`, `g = (goal - mean) / std`, the value of a coordinate at a node is `c . phi`. Per part, `Xi` of deviations
+//! says how accelerations change with what is changed about such a trajectory: `delta ddz = Xi^T (delta z, delta dz,
+//! delta u_lat)`.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -131,8 +131,8 @@ pub struct JumpPart {
     /// Covariance of the training's latent inputs in the part, `latent_dim x latent_dim`.
     #[serde(with = "listed")]
     pub input_covariance: DMatrix<f64>,
-    /// Standard deviation over the jumps of the mean acceleration that `xi` leaves unexplained in a
-    /// jump that it was not fitted to, `latent_dim`.
+    /// Standard deviation over the jumps of the mean acceleration that `xi` leaves unexplained in a jump that it was
+    /// not fitted to, `latent_dim`.
     #[serde(with = "listed")]
     pub acceleration_std: DVector<f64>,
 }

@@ -167,8 +167,8 @@ impl Library {
         })
     }
 
-    /// Refuses a library in which a term equals an earlier one under another spelling: its
-    /// coefficients cannot be learned.
+    /// Refuses a library in which a term equals an earlier one under another spelling: its coefficients cannot be
+    /// learned.
     pub fn check_distinct(&self) -> Result<(), ModelError> {
         let mut first_use = HashMap::new();
         for (second, term) in self.terms.iter().enumerate() {
@@ -206,8 +206,8 @@ impl Library {
         standard.unwrap_or_else(|| LibraryChoice::Terms(texts()))
     }
 
-    /// The standard library that has the same terms in whatever order, and for each of its terms in
-    /// romc's order the row of this library; none for other terms.
+    /// The standard library that has the same terms in whatever order, and for each of its terms in romc's order the
+    /// row of this library; none for other terms.
     pub fn as_standard(&self) -> Option<(StandardLibrary, Vec<usize>)> {
         if let Some(standard) = self.standard {
             return Some((standard, (0..self.len()).collect()));

@@ -60,8 +60,8 @@ impl ReducedModel {
         self.require(projection, "encoder", "projecting inputs")
     }
 
-    /// The model with encoder and decoder linearised: the encoder about the state `x`, the decoder about
-    /// `z = E(s_x x)`. The dynamics and linear maps stay the same.
+    /// The model with encoder and decoder linearised: the encoder about the state `x`, the decoder about `z = E(s_x
+    /// x)`. The dynamics and linear maps stay the same.
     ///
     /// Positions, velocities and inputs of the two models agree at `x` and differ elsewhere.
     pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel, ModelError> {
@@ -166,8 +166,7 @@ fn tangent(tensor: &str, map: &StateMap, at: &DVector<f64>) -> Result<AffineMap,
 /// An encoder has full row rank if its smallest singular value is above this share of the largest.
 pub(crate) const RANK_TOLERANCE: f64 = 1e-10;
 
-/// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`:
-/// `pinv(W_e^T) = U S^-1 V^T`.
+/// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`: `pinv(W_e^T) = U S^-1 V^T`.
 pub(super) fn pinv_of_transpose(
     weights: &DMatrix<f64>,
     matrix: &str,
@@ -203,8 +202,8 @@ pub(super) fn pinv_of_transpose(
     Ok(projection)
 }
 
-/// Reduces the error of the iterative SVD, which can be 1e-10 even for well-conditioned matrices, by
-/// one Newton step on `P W_e^T = I`, which squares the residual.
+/// Reduces the error of the iterative SVD, which can be 1e-10 even for well-conditioned matrices, by one Newton step on
+/// `P W_e^T = I`, which squares the residual.
 fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
     const NEGLIGIBLE: f64 = 1e-13;
     let dim = projection.nrows();

@@ -1,8 +1,8 @@
 //! The reduced-order model: encoder, decoder, library, coefficients, phases.
 //!
-//! What enters: matrices, candidate terms as text, phases; what leaves: a [`ReducedModel`] whose
-//! every shape, rank, name and number has been checked, so that no later stage has to doubt it.
-//! Read `rom.rs` first: it states the equations and the units.
+//! What enters: matrices, candidate terms as text, phases; what leaves: a [`ReducedModel`] whose every shape, rank,
+//! name and number has been checked, so that no later stage has to doubt it. Read `rom.rs` first: it states the
+//! equations and the units.
 //!
 //! ```
 //! use nalgebra::{DMatrix, DVector};

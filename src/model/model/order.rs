@@ -14,9 +14,9 @@ const KINDS: [&str; LEG_JOINT_DIM] = ["hx", "hy", "kn"];
 
 /// An order of the 18 coordinates of a robot and, alike, of its inputs.
 ///
-/// Written as names separated by commas: coordinates (`fr.hx`, `body.z`), or groups of them in
-/// romc's order: a leg (`fr`), a kind of joint over the legs fr fl rr rl (`kn`), `joints`, `body`.
-/// Forces and moments stand where their coordinates of the body do.
+/// Written as names separated by commas: coordinates (`fr.hx`, `body.z`), or groups of them in romc's order: a leg
+/// (`fr`), a kind of joint over the legs fr fl rr rl (`kn`), `joints`, `body`. Forces and moments stand where their
+/// coordinates of the body do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoordinateOrder {
     text: String,
@@ -45,8 +45,8 @@ impl CoordinateOrder {
         sorted
     }
 
-    /// The orders that are common: body first or last, legs in any order, joints by leg or by kind;
-    /// first those in which legs go in pairs from the front.
+    /// The orders that are common: body first or last, legs in any order, joints by leg or by kind; first those in
+    /// which legs go in pairs from the front.
     pub fn common() -> Vec<Self> {
         let mut orders = Vec::new();
         for legs in leg_orders() {

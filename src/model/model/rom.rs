@@ -1,7 +1,7 @@
 //! The hybrid reduced-order model.
 //!
-//! Robot state `x` and generalised input `u = [tau; F_lin; F_ang]` are in SI units; `z`, `dz` and
-//! `u_lat` in scaled units. With the scale factors `s_x`, `s_u` (scaled = factor times SI):
+//! Robot state `x` and generalised input `u = [tau; F_lin; F_ang]` are in SI units; `z`, `dz` and `u_lat` in scaled
+//! units. With the scale factors `s_x`, `s_u` (scaled = factor times SI):
 //!
 //! - `z = W_e (s_x x) + b_e`, `dz = W_e (s_x dx)`: positions take the bias, velocities do not;
 //! - `x = (W_d z + b_d) / s_x`, `dx = (W_d dz) / s_x`;
@@ -10,8 +10,8 @@
 //!
 //! `project(lift(u_lat)) == u_lat`, because an encoder has full row rank; the reverse does not hold.
 //!
-//! These are the linear maps. A nonlinear encoder or decoder ([`StateMap`]) has a Jacobian `J` at a
-//! state instead of `W`; `maps.rs` states what becomes of the equations.
+//! These are the linear maps. A nonlinear encoder or decoder ([`StateMap`]) has a Jacobian `J` at a state instead of
+//! `W`; `maps.rs` states what becomes of the equations.
 //!
 //! A function that needs a part which the model lacks returns [`ModelError::Missing`]; one that gets a vector of the
 //! wrong length, [`ModelError::Invalid`].
@@ -198,8 +198,8 @@ impl ReducedModel {
         self.require(found, "input_statistics", purpose)
     }
 
-    /// Latent acceleration `ddz = Xi^T Theta(z, dz, u_lat)` of one phase, term by term in library
-    /// order: the slow and plain evaluation which compiled programs are tested against.
+    /// Latent acceleration `ddz = Xi^T Theta(z, dz, u_lat)` of one phase, term by term in library order: the slow and
+    /// plain evaluation which compiled programs are tested against.
     pub fn ddz(
         &self,
         phase: usize,
@@ -217,8 +217,8 @@ impl ReducedModel {
         }))
     }
 
-    /// Active terms of one output of a phase with their coefficients, in library order (the order
-    /// in which the paper prints them).
+    /// Active terms of one output of a phase with their coefficients, in library order (the order in which the paper
+    /// prints them).
     pub fn active_terms(
         &self,
         phase: usize,

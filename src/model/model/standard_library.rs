@@ -14,8 +14,8 @@ pub(crate) const MAX_DEGREE: u32 = 8;
 
 /// The shorthand of the model file: which groups of terms a library has.
 ///
-/// Order: constant; z; dz; monomials of degree 2 to `degree` over `(z, dz)`, graded, each with
-/// indices `i <= j <= k`; sin z; sin dz; cos z; cos dz; u.
+/// Order: constant; z; dz; monomials of degree 2 to `degree` over `(z, dz)`, graded, each with indices `i <= j <= k`;
+/// sin z; sin dz; cos z; cos dz; u.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandardLibrary {
@@ -126,8 +126,8 @@ impl LibraryOrder {
         self.named().map(|(name, _)| name)
     }
 
-    /// Orders that trainers may have: those with names first, then others in which the constant or
-    /// the inputs stand elsewhere, cosines come first, or each z is followed by its dz.
+    /// Orders that trainers may have: those with names first, then others in which the constant or the inputs stand
+    /// elsewhere, cosines come first, or each z is followed by its dz.
     pub fn common() -> Vec<Self> {
         use Group::{Constant, Higher, Inputs, Linear, Trigonometric};
         let middle = [

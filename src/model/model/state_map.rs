@@ -1,8 +1,7 @@
 //! Chains of affine layers with activations: encoders and decoders, linear or not.
 //!
-//! With `a_k = W_k y_(k-1) + b_k` and `y_k = phi_k(a_k)`, the map takes `y_0` to `y_L`; its Jacobian
-//! is `J = D_L W_L ... D_1 W_1` with `D_k = diag(phi_k'(a_k))`. An affine map is the chain of one
-//! linear layer.
+//! With `a_k = W_k y_(k-1) + b_k` and `y_k = phi_k(a_k)`, the map takes `y_0` to `y_L`; its Jacobian is `J = D_L W_L
+//! ... D_1 W_1` with `D_k = diag(phi_k'(a_k))`. An affine map is the chain of one linear layer.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -18,8 +17,8 @@ pub const MAX_LAYER_WIDTH: usize = 1024;
 
 /// The map `x -> W x + b`, in scaled units.
 ///
-/// As an encoder `W_e` is `latent_dim x state_dim`, as a decoder `W_d` is `state_dim x latent_dim`.
-/// Positions take the bias, velocities and accelerations do not.
+/// As an encoder `W_e` is `latent_dim x state_dim`, as a decoder `W_d` is `state_dim x latent_dim`. Positions take the
+/// bias, velocities and accelerations do not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AffineMap {
     weights: DMatrix<f64>,
@@ -83,8 +82,8 @@ pub struct Layer {
 
 /// A smooth map between scaled coordinates: an encoder or a decoder.
 ///
-/// Positions go through [`StateMap::apply`]; velocities and accelerations through its first and
-/// second time derivative ([`StateMap::apply_rates`]), which for a linear map are `W dx` and `W ddx`.
+/// Positions go through [`StateMap::apply`]; velocities and accelerations through its first and second time derivative
+/// ([`StateMap::apply_rates`]), which for a linear map are `W dx` and `W ddx`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "MapKeys", into = "MapKeys")]
 pub struct StateMap {
@@ -300,8 +299,7 @@ impl StateMap {
         Ok(())
     }
 
-    /// No layer of an encoder may be narrower than the latent space, or its Jacobian never has full
-    /// rank.
+    /// No layer of an encoder may be narrower than the latent space, or its Jacobian never has full rank.
     pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
         let widths = self.layers.iter().map(|layer| layer.map.output_dim());
         for (layer, width) in widths.enumerate() {

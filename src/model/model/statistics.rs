@@ -7,8 +7,8 @@ use super::error::{ModelError, check, check_tensor};
 use super::given_state::InputGivenState;
 use super::listed;
 
-/// Largest asymmetry, and most negative eigenvalue, that count as rounding: relative to the
-/// largest entry, and to the largest eigenvalue.
+/// Largest asymmetry, and most negative eigenvalue, that count as rounding: relative to the largest entry, and to the
+/// largest eigenvalue.
 const ROUNDING: f64 = 1e-9;
 
 /// Mean and covariance of the generalised input `u = [torques; F_lin; F_ang]` in one phase, SI.
@@ -46,8 +46,8 @@ impl InputStatistics {
         (projection * &self.mean, covariance)
     }
 
-    /// Complains unless mean and covariance are those of some distribution over `dim` inputs, and
-    /// over `latent_dim` latent ones.
+    /// Complains unless mean and covariance are those of some distribution over `dim` inputs, and over `latent_dim`
+    /// latent ones.
     pub(super) fn check(
         &self,
         phase: &str,

@@ -22,8 +22,7 @@ struct File {
 /// Share by which the gravity that was identified with the losses may differ from the earth's.
 const GRAVITY_SHARE: f64 = 0.25;
 
-/// Joint losses as files and programs write them: twelve numbers each, or three (hx, hy, kn) that hold
-/// for every leg.
+/// Joint losses as files and programs write them: twelve numbers each, or three (hx, hy, kn) that hold for every leg.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorsEntry {

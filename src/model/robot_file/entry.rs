@@ -102,8 +102,7 @@ impl JointEntry {
 }
 
 impl RobotEntry {
-    /// The entry that gives this robot again, bit for bit: signs and offsets are in its axes and
-    /// links.
+    /// The entry that gives this robot again, bit for bit: signs and offsets are in its axes and links.
     pub fn of(robot: &Robot) -> Self {
         let leg = Leg::ALL.map(|leg| {
             let chain = robot.geometry(leg).chain();

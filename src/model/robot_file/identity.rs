@@ -34,8 +34,8 @@ pub(super) fn namesake(robot: &Robot) -> Option<String> {
     (known != robot).then(|| differences(robot, known))
 }
 
-/// The robot of an entry from a file. Numbers other than those of romc's robot of that name make it another robot,
-/// with the kind of the file in its name.
+/// The robot of an entry from a file. Numbers other than those of romc's robot of that name make it another robot, with
+/// the kind of the file in its name.
 pub(super) fn identified(
     mut entry: RobotEntry,
     places: &Places<'_>,

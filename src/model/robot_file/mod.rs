@@ -1,10 +1,9 @@
 //! Robots from files: TOML, URDF, the object in a model file; those that romc brings; and tables of joint losses.
 //!
-//! What enters: a name, or the path or text of a file. What leaves: a checked [`Robot`] with its legs
-//! in romc's order, or file, place, what was found and what was expected. Legs are matched by where
-//! their first joints stand, joints by their order from the trunk.
-//! Read `entry.rs` first, the grammar; `legs.rs` makes a robot of it, `urdf` finds the legs of a
-//! tree, `identity.rs` compares with romc's own robots and doubts numbers. `docs/robots.md` describes the file.
+//! What enters: a name, or the path or text of a file. What leaves: a checked [`Robot`] with its legs in romc's order,
+//! or file, place, what was found and what was expected. Legs are matched by where their first joints stand, joints by
+//! their order from the trunk. Read `entry.rs` first, the grammar; `legs.rs` makes a robot of it, `urdf` finds the legs
+//! of a tree, `identity.rs` compares with romc's own robots and doubts numbers. `docs/robots.md` describes the file.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};

@@ -18,8 +18,8 @@ pub type RobotFileError = Located<Fault>;
 /// What a command says of a robot's file besides its path.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RobotOptions<'a> {
-    /// Links of the four feet of a URDF, each with a point in its frame where that is not the foot
-    /// (`LINK:x,y,z`); empty to find them.
+    /// Links of the four feet of a URDF, each with a point in its frame where that is not the foot (`LINK:x,y,z`);
+    /// empty to find them.
     pub feet: &'a [String],
     pub name: Option<&'a str>,
 }

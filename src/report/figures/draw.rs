@@ -98,8 +98,7 @@ fn legend_marks(figure: &Figure) -> Vec<Mark> {
     marks
 }
 
-/// Draws one panel in the given size, the first mark below the others; `x_label` stands below its
-/// axis.
+/// Draws one panel in the given size, the first mark below the others; `x_label` stands below its axis.
 pub(crate) fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     let title = panel.title.as_str();
     match &panel.drawing {
@@ -168,8 +167,8 @@ fn draw_lines(
     marks
 }
 
-/// Values that the range of y follows: a prediction that runs away does not flatten the record,
-/// a limit is always in sight.
+/// Values that the range of y follows: a prediction that runs away does not flatten the record, a limit is always in
+/// sight.
 fn visible(series: &[Series]) -> impl Iterator<Item = f64> {
     let recorded = (series.iter()).find(|series| series.role == Role::Recorded);
     let bounds = recorded.map(|series| padded(series.points.iter().filter_map(|p| p.1)));

@@ -18,8 +18,8 @@ pub(crate) enum Role {
     Limit,
 }
 
-/// Of each role the class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the lengths of
-/// dashes and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
+/// Of each role the class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the
+/// lengths of dashes and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
 pub(crate) const STYLES: [(&str, [u8; 3], &str); 6] = [
     ("recorded", [31, 95, 168], ""),
     ("full", [194, 87, 12], "6 2.5"),

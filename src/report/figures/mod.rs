@@ -1,8 +1,7 @@
 //! Figures: data that draws itself as SVG and PDF and lists itself as CSV.
 //!
-//! A [`Figure`] holds numbers and words. `draw.rs` turns its panels into a list of marks, once;
-//! `svg.rs` and `pdf.rs` spell the same marks; `sticks.rs` turns states of a robot into lines. Start with
-//! `figure.rs`.
+//! A [`Figure`] holds numbers and words. `draw.rs` turns its panels into a list of marks, once; `svg.rs` and `pdf.rs`
+//! spell the same marks; `sticks.rs` turns states of a robot into lines. Start with `figure.rs`.
 
 mod draw;
 mod figure;

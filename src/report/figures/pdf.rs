@@ -95,8 +95,8 @@ fn width(text: &str) -> f64 {
     FONT * text.chars().map(of).sum::<f64>()
 }
 
-/// A text between parentheses; a minus becomes a dash of its width, indices stand on the line, and other letters outside
-/// Latin-1 become question marks.
+/// A text between parentheses; a minus becomes a dash of its width, indices stand on the line, and other letters
+/// outside Latin-1 become question marks.
 fn escaped(text: &str) -> String {
     let letter = |letter: char| match letter {
         '(' | ')' | '\\' => format!("\\{letter}"),

@@ -151,8 +151,8 @@ pub(crate) fn floor_m(robot: &Robot, segment: &Segment) -> f64 {
     feet.get(feet.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Motions at `n_frames` instants, evenly chosen from the first to the last of `time_s`, side by side to one scale, seen
-/// from the right of a robot that looks along `heading_rad`.
+/// Motions at `n_frames` instants, evenly chosen from the first to the last of `time_s`, side by side to one scale,
+/// seen from the right of a robot that looks along `heading_rad`.
 pub(crate) fn film_strip(
     robot: &Robot,
     (id, caption): (String, String),
@@ -200,8 +200,8 @@ const MOST_FRAMES: usize = 72;
 pub(crate) struct Film {
     /// An `svg` element with a `g` for each motion, which holds a polyline for each of [`Sticks::NAMES`].
     pub svg: String,
-    /// JSON: `{"time": [s], "lines": [[motion][instant]]}` with the points of all lines of a motion at an instant, joined
-    /// by semicolons as `polyline` takes them; empty where there is no prediction.
+    /// JSON: `{"time": [s], "lines": [[motion][instant]]}` with the points of all lines of a motion at an instant,
+    /// joined by semicolons as `polyline` takes them; empty where there is no prediction.
     pub frames: String,
     /// The instant that the drawing shows: the highest point of the first motion.
     pub shown: usize,

@@ -19,8 +19,8 @@ pub(crate) struct Items<'a> {
     pub(crate) structs: BTreeMap<String, Struct>,
     pub(crate) enums: BTreeMap<String, (Vec<String>, Vec<String>)>,
     pub(crate) constants: BTreeMap<String, Constant>,
-    /// By owner and name; functions without one have an empty owner. The trait `Real` is the scalar; any other is a struct of
-    /// C, its required methods are functions that whoever includes the C defines.
+    /// By owner and name; functions without one have an empty owner. The trait `Real` is the scalar; any other is a
+    /// struct of C, its required methods are functions that whoever includes the C defines.
     pub(crate) functions: BTreeMap<(String, String), Function>,
 }
 

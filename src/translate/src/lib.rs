@@ -1,8 +1,8 @@
 //! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in.
 //!
-//! In: sources, a prefix for names, the functions that the C is for. Out: the text of these functions, of all
-//! that they call, and of the types and constants that they need, with their comments. `cargo run -p romc-translate` writes
-//! the C under `templates/controller_c/`; a test of `tests/controller_c.rs` compares it byte for byte. Read `function` first.
+//! In: sources, a prefix for names, the functions that the C is for. Out: the text of these functions, of all that they
+//! call, and of the types and constants that they need, with their comments. `cargo run -p romc-translate` writes the C
+//! under `templates/controller_c/`; a test of `tests/controller_c.rs` compares it byte for byte. Read `function` first.
 //!
 //! | Rust | C |
 //! |---|---|
@@ -17,8 +17,9 @@
 //! | assignment of arrays; `x.sqrt()` | `memcpy`; `SQRT(x)` |
 //! | `while`, `loop`, `for` over ranges, also reversed or in steps; `if`, also as a value | the same |
 //!
-//! Anything else is a [`Fault`] with file and line, where the C needs it. Indices are not checked in C: the Rust's tests have to
-//! reach them. A sum or product keeps the order that it has in Rust, so that both have the same bits without contraction.
+//! Anything else is a [`Fault`] with file and line, where the C needs it. Indices are not checked in C: the Rust's
+//! tests have to reach them. A sum or product keeps the order that it has in Rust, so that both have the same bits
+//! without contraction.
 
 mod call;
 mod definitions;

@@ -51,8 +51,8 @@ pub(super) fn in_world(angles: &DMatrix<f64>, velocities: &DMatrix<f64>) -> DMat
     out
 }
 
-/// Rates of roll, pitch and yaw from an angular velocity about the body's or the world's axes, or from themselves. An error
-/// is the first sample at which the trunk points straight up or down.
+/// Rates of roll, pitch and yaw from an angular velocity about the body's or the world's axes, or from themselves. An
+/// error is the first sample at which the trunk points straight up or down.
 pub(super) fn angle_rates(
     angles: &DMatrix<f64>,
     angular: &DMatrix<f64>,

@@ -111,8 +111,8 @@ impl Quantity {
 /// Elements of a quaternion, the real part first.
 pub(super) const QUATERNION: [&str; 4] = ["w", "x", "y", "z"];
 
-/// The elements that the words of an order name, in that order: single names, names with `*` for every leg or
-/// joint (`*.hx`, `fl.*`), a word of single letters (`wxyz`, `rpy`, `xyz`).
+/// The elements that the words of an order name, in that order: single names, names with `*` for every leg or joint
+/// (`*.hx`, `fl.*`), a word of single letters (`wxyz`, `rpy`, `xyz`).
 pub(super) fn ordered(words: &[String], elements: &[&str]) -> Result<Vec<usize>, String> {
     let mut out = Vec::new();
     for word in words {

@@ -22,8 +22,8 @@ const STENCIL: usize = 5;
 /// How much longer than the shortest step of a stencil its longest may be: beyond, polynomials swing.
 const UNEVEN: f64 = 4.0;
 
-/// Values at `times_s`, one column a time, of rows known at `own_s`; `slopes` are their derivatives at `own_s`,
-/// those of polynomials through five samples unless known. Every time is within the clock's own range.
+/// Values at `times_s`, one column a time, of rows known at `own_s`; `slopes` are their derivatives at `own_s`, those
+/// of polynomials through five samples unless known. Every time is within the clock's own range.
 pub(super) fn at_times(
     own_s: &[f64],
     values: &DMatrix<f64>,

@@ -168,8 +168,8 @@ impl ColumnMap {
     /// Reads a map.
     ///
     /// # Errors
-    /// [`RecordingFault::Text`] with line, key and what was expected; [`RecordingFault::Unexpected`] for
-    /// a key that does not apply to its table.
+    /// [`RecordingFault::Text`] with line, key and what was expected; [`RecordingFault::Unexpected`] for a key that
+    /// does not apply to its table.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let text = read_toml(path)
             .map_err(|source| RecordingFault::unreadable("read", source).of(path))?;

@@ -1,8 +1,8 @@
 //! MCAP files as logs, one log per topic and set of names; the only file that reads with the `mcap` crate.
 //!
-//! Records are read one by one and chunks unpacked one at a time. Checksums that are there are compared. A file that ends
-//! early, as after a loss of power, gives what its whole records and chunks hold. Folders of ROS 2 bags have the MCAP files
-//! that one recording was split into.
+//! Records are read one by one and chunks unpacked one at a time. Checksums that are there are compared. A file that
+//! ends early, as after a loss of power, gives what its whole records and chunks hold. Folders of ROS 2 bags have the
+//! MCAP files that one recording was split into.
 
 use std::borrow::Cow;
 use std::fs::{self, File};

@@ -25,8 +25,8 @@ pub struct Balance {
     pub fall_by_height_m_s2: Option<f64>,
     /// Impulse of the feet over what the robot's weight and change of velocity need.
     pub weight_share: Option<f64>,
-    /// Slope of each hip's abduction torque over its lever times the force along the leg; 1 for a force in the plane
-    /// of the leg.
+    /// Slope of each hip's abduction torque over its lever times the force along the leg; 1 for a force in the plane of
+    /// the leg.
     pub hip_share: [Option<f64>; FOOT_DIM],
     /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2, after its axis.
     #[serde(serialize_with = "without_axis")]
@@ -115,8 +115,8 @@ impl Sums {
     }
 }
 
-/// Torque of a hip's abduction that holds the part of a foot's force (body axes, N) in the plane of the leg: its lever is
-/// the distance of the plane from the axis of abduction.
+/// Torque of a hip's abduction that holds the part of a foot's force (body axes, N) in the plane of the leg: its lever
+/// is the distance of the plane from the axis of abduction.
 pub(in crate::recording) fn hip_torque(
     robot: &Robot,
     leg: Leg,

@@ -76,8 +76,8 @@ pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
     median(heights.into_iter())
 }
 
-/// Lowest height of the trunk's origin over the floor, m, and largest angle of its z axis to the vertical while feet are
-/// on the ground, rad.
+/// Lowest height of the trunk's origin over the floor, m, and largest angle of its z axis to the vertical while feet
+/// are on the ground, rad.
 const TRUNK: (f64, f64) = (0.05, 1.6);
 const LIES_S: f64 = 0.1; // shortest time that it lies, s
 

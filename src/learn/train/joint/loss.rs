@@ -1,7 +1,7 @@
 //! The losses (16) to (20) with the lift loss and the window (41), and their exact gradient.
 //!
-//! With the encoder's Jacobian `J` at each sample: `z = phi(x)`, `dz = J dx`, `ddz = J ddx + (dJ/dt) dx`,
-//! `u_lat = pinv(J^T) u`; the decoder takes `(z, dz, Theta Xi)` to the decoded position and acceleration the same way.
+//! With the encoder's Jacobian `J` at each sample: `z = phi(x)`, `dz = J dx`, `ddz = J ddx + (dJ/dt) dx`, `u_lat =
+//! pinv(J^T) u`; the decoder takes `(z, dz, Theta Xi)` to the decoded position and acceleration the same way.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -269,8 +269,8 @@ impl<'a> JointLoss<'a> {
         (bptt, onto_variables)
     }
 
-    /// The lift loss; adds to the gradient what the adjoints of `z`, `dz`, `ddz` (`3n x d`) and of the variables
-    /// (`n x 3d`) mean for the encoder.
+    /// The lift loss; adds to the gradient what the adjoints of `z`, `dz`, `ddz` (`3n x d`) and of the variables (`n x
+    /// 3d`) mean for the encoder.
     fn encoder_adjoint(
         &mut self,
         parameters: &Parameters,

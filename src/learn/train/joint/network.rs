@@ -53,8 +53,8 @@ pub(super) struct Jacobians {
 }
 
 impl Network {
-    /// Layers between `widths`, all but the last with `activation`: weights uniform within
-    /// `sqrt(6 / (fan in + fan out))` (Glorot and Bengio 2010), biases 0.
+    /// Layers between `widths`, all but the last with `activation`: weights uniform within `sqrt(6 / (fan in + fan
+    /// out))` (Glorot and Bengio 2010), biases 0.
     pub(super) fn random(widths: &[usize], activation: Activation, random: &mut Random) -> Self {
         let last = widths.len().saturating_sub(2);
         let layers = widths.windows(2).enumerate().map(|(index, pair)| {

@@ -42,8 +42,8 @@ impl InputProjections {
     /// Adjoint of the Jacobians (`(d n) x 18`), given the one of `u_lat` (`n x d`), plus `-lift` times the gradient of
     /// [`Self::carried`].
     ///
-    /// With `w = (J J^T)^-1 adjoint`, `v = u_lat` and the rest `r = u - J^T v` it is
-    /// `w r^T - v (J^T w)^T - 2 lift v r^T`.
+    /// With `w = (J J^T)^-1 adjoint`, `v = u_lat` and the rest `r = u - J^T v` it is `w r^T - v (J^T w)^T - 2 lift v
+    /// r^T`.
     pub(super) fn adjoint(
         &self,
         rows: &DMatrix<f64>,

@@ -23,9 +23,9 @@ use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///
-/// Every seed is trained on its own, on as many threads as the options say; the one of least score is kept, and a
-/// seed without a model (no stable dynamics, numbers that are not finite) is left out. A cancelled training ends with
-/// the seeds begun by then. Deterministic for a seed, on any number of threads.
+/// Every seed is trained on its own, on as many threads as the options say; the one of least score is kept, and a seed
+/// without a model (no stable dynamics, numbers that are not finite) is left out. A cancelled training ends with the
+/// seeds begun by then. Deterministic for a seed, on any number of threads.
 ///
 /// # Errors
 /// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
@@ -267,8 +267,8 @@ impl Trainer<'_> {
         Ok((encoder, StateMap::new("decoder", layers)?))
     }
 
-    /// The latent basis in which `J J^T` is the identity in the mean, rotated by varimax of the mean Jacobian, with
-    /// the latents in canonical order and their mean at 0.
+    /// The latent basis in which `J J^T` is the identity in the mean, rotated by varimax of the mean Jacobian, with the
+    /// latents in canonical order and their mean at 0.
     fn basis(&self, encoder: &StateMap) -> LatentBasis {
         let (d, training) = (self.task.options.latent_dim, &self.task.training);
         let x = training.states(None);

@@ -86,8 +86,8 @@ struct Stage {
 impl Unroll {
     /// Mean over starts, coordinates and (decaying) steps of `(z_pred - z)^2`; 0 for a batch shorter than the window.
     ///
-    /// Adds `weight` times its gradient to `adjoints`. Inputs are those recorded at the time of each stage, or the sample
-    /// before it.
+    /// Adds `weight` times its gradient to `adjoints`. Inputs are those recorded at the time of each stage, or the
+    /// sample before it.
     pub(super) fn evaluate(
         &self,
         samples: Window<'_>,

@@ -1,9 +1,9 @@
 //! How accelerations change with what is changed about a trajectory of the prior.
 //!
-//! Over one interval between nodes of a jump, with `delta` the difference to the prior at the jump's
-//! own goal and a bar the mean of both ends: `delta (dz_(k+1) - dz_k) / h = Xi^T (bar delta z, bar
-//! delta dz, bar delta u_lat)`, the very equation that a plan is made of. Ridge on normalised
-//! columns. Shifting the robot forwards changes nothing: that direction of `delta z` is left out.
+//! Over one interval between nodes of a jump, with `delta` the difference to the prior at the jump's own goal and a bar
+//! the mean of both ends: `delta (dz_(k+1) - dz_k) / h = Xi^T (bar delta z, bar delta dz, bar delta u_lat)`, the very
+//! equation that a plan is made of. Ridge on normalised columns. Shifting the robot forwards changes nothing: that
+//! direction of `delta z` is left out.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -67,8 +67,8 @@ pub(super) struct Deviations {
     pub xi: DMatrix<f64>,
     /// Standard deviation over the jumps of the mean residual, each jump left out of the fit.
     pub acceleration_std: DVector<f64>,
-    /// Coefficient of determination of the accelerations' deviations from the prior, over all latent
-    /// coordinates, each jump left out of prior and fit; 0 is what the prior alone explains.
+    /// Coefficient of determination of the accelerations' deviations from the prior, over all latent coordinates, each
+    /// jump left out of prior and fit; 0 is what the prior alone explains.
     pub ddz_r2: f64,
 }
 

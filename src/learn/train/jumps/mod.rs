@@ -1,9 +1,8 @@
 //! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
 //!
-//! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than
-//! [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts each jump into parts and
-//! samples these at equal shares of their durations; `deviations` fits nodes and durations over the goals, and
-//! how accelerations change about such a trajectory.
+//! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than [`LEAST_JUMPS`] of them are of
+//! one kind. `landmarks` cuts each jump into parts and samples these at equal shares of their durations; `deviations`
+//! fits nodes and durations over the goals, and how accelerations change about such a trajectory.
 
 mod deviations;
 mod landmarks;
@@ -145,8 +144,8 @@ fn part_of(
     (part, score)
 }
 
-/// Covariance of the inputs at the nodes of a part over all jumps, with a floor for directions in
-/// which they never moved.
+/// Covariance of the inputs at the nodes of a part over all jumps, with a floor for directions in which they never
+/// moved.
 fn input_covariance(all: &[&PartNodes]) -> DMatrix<f64> {
     /// Share of the mean variance that is added to every variance.
     const FLOOR: f64 = 1e-4;

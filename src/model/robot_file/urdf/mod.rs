@@ -1,8 +1,8 @@
 //! The legs of a URDF.
 //!
 //! `element` reads elements and attributes, `tree` links and joints, `limbs` finds trunk, legs and feet: a limb begins
-//! at a moving joint with fixed joints alone between it and the body. The body's frame is that of the trunk, the heaviest
-//! of the links that all four legs are below, wherever the root is.
+//! at a moving joint with fixed joints alone between it and the body. The body's frame is that of the trunk, the
+//! heaviest of the links that all four legs are below, wherever the root is.
 
 mod element;
 mod limbs;

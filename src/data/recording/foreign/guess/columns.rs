@@ -29,8 +29,8 @@ impl Group {
         self.family.iter().filter(|word| !is_quantity(word))
     }
 
-    /// Whether its legs are only counted, as an arm's twelve joints are among others; a low-level state of Unitree's counts
-    /// legs in romc's order.
+    /// Whether its legs are only counted, as an arm's twelve joints are among others; a low-level state of Unitree's
+    /// counts legs in romc's order.
     pub(super) fn is_unnamed(&self, logs: &[Log]) -> bool {
         let is_motor = |channel: &Channel| {
             let name = &channel.name;
@@ -47,8 +47,8 @@ pub(super) struct Clock {
     pub unit: &'static str,
 }
 
-/// The quantities that the names say: of several complete families of columns those that were measured, of the log and the
-/// words of the others, sampled most often.
+/// The quantities that the names say: of several complete families of columns those that were measured, of the log and
+/// the words of the others, sampled most often.
 pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
     let rates: Vec<Option<i32>> = logs.iter().map(rate_class).collect();
     let all = complete(&families(logs, robot));

@@ -36,7 +36,8 @@ const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date"
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Reading {
     pub quantity: Quantity, // the quantity; a quaternion and angles are both orientations
-    /// The element, in romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from 1.
+    /// The element, in romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from
+    /// 1.
     pub element: usize,
     pub is_quaternion: bool,
     pub is_counted: bool,

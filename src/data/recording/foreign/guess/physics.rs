@@ -32,8 +32,8 @@ const FITS_M: f64 = 0.05; // largest movement of feet on the ground in a reading
 
 pub(super) type NamedUnit = (&'static str, f64);
 
-/// How columns are read: units of the trunk's position and the joints' angles, whether joints are grouped by their kind,
-/// and the sign of each joint in romc's order.
+/// How columns are read: units of the trunk's position and the joints' angles, whether joints are grouped by their
+/// kind, and the sign of each joint in romc's order.
 #[derive(Debug, Clone)]
 pub(super) struct Reading {
     pub position: NamedUnit,
@@ -59,8 +59,8 @@ impl Reading {
         }
     }
 
-    /// Whether it is better than a plainer one by more than chance: feet move less compared with what they would on stiff
-    /// legs, whatever the units.
+    /// Whether it is better than a plainer one by more than chance: feet move less compared with what they would on
+    /// stiff legs, whatever the units.
     pub(crate) fn beats(&self, other: &Self) -> bool {
         let figure = |reading: &Self| match reading.motion_m > LEAST_MOTION_M {
             true => reading.slip_m / reading.motion_m,
@@ -225,8 +225,8 @@ impl<'a> View<'a> {
         squares.sum()
     }
 
-    /// Signs of the torques in romc's order and their unit: those under which feet carry the body; none where they carry
-    /// nothing. Signs of the reading that feet in place do not show become those of the torques.
+    /// Signs of the torques in romc's order and their unit: those under which feet carry the body; none where they
+    /// carry nothing. Signs of the reading that feet in place do not show become those of the torques.
     pub(crate) fn torques(&self, reading: &mut Reading) -> Option<([f64; JOINT_DIM], NamedUnit)> {
         let blocks = self.blocks(reading);
         let explained = |signs: [f64; 2]| {
@@ -261,7 +261,8 @@ impl<'a> View<'a> {
             let of_kind = [hips[i / 3], signs[0], signs[1]];
             reading.signs[i] * of_kind[i % 3]
         });
-        // An axis that points the other way turns angles and torques; one sign of all torques is that of who pushes whom.
+        // An axis that points the other way turns angles and torques; one sign of all torques is that of who pushes
+        // whom.
         if !reading.shown[0] && signs[0] == signs[1] {
             for leg in 0..4 {
                 reading.signs[3 * leg] *= hips[leg] * signs[1];
@@ -334,8 +335,8 @@ impl<'a> View<'a> {
         Some((map, std::array::from_fn(torque)))
     }
 
-    /// Signs of the hips' torques by leg: feet are held on their own side of the body; those of the knees where that is not
-    /// clear. Axes of the hips may be mirrored from right to left; other patterns come from feet that stick.
+    /// Signs of the hips' torques by leg: feet are held on their own side of the body; those of the knees where that is
+    /// not clear. Axes of the hips may be mirrored from right to left; other patterns come from feet that stick.
     fn hips(&self, reading: &Reading, signs: [f64; 2]) -> [f64; 4] {
         let mut sums = [(0.0, 0.0); 4];
         for (segment, leg, samples) in &self.stances {
