@@ -51,7 +51,7 @@ mod error;
 pub mod import;
 pub mod report;
 pub mod simplify;
-pub mod study;
+pub(crate) mod study;
 
 #[doc(inline)]
 pub use romc_cas as symbolic;

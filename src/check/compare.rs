@@ -68,7 +68,7 @@ pub struct Difference {
 
 /// A term and its coefficient in both files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TermDifference {
+pub(crate) struct TermDifference {
     /// The term in the grammar of candidate terms.
     pub term: String,
     /// Coefficient in the first file, 0 without the term.

@@ -8,7 +8,7 @@ use crate::model::{LatentVariable, MAX_LATENT_DIM};
 
 /// A range per variable and phase; -1 to 1 where there is none.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct CheckDomain {
+pub(crate) struct CheckDomain {
     phases: BTreeMap<String, BTreeMap<String, [f64; 2]>>,
 }
 
@@ -38,7 +38,7 @@ impl CheckDomain {
     }
 
     /// The first phase or variable that is none of these: its ranges would be without effect.
-    pub(crate) fn foreign(&self, phases: &[&str], latent_dim: usize) -> Option<String> {
+    pub fn foreign(&self, phases: &[&str], latent_dim: usize) -> Option<String> {
         let foreign = self.phases.iter().find_map(|(phase, ranges)| {
             if !phases.contains(&phase.as_str()) {
                 return Some(format!("[{phase}]"));

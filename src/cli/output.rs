@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::args::ReadingArguments;
 use crate::Error;
 use crate::files::{Overwrite, is_invisible, read_toml, write_whole};
-pub(super) use crate::files::{
+pub use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
 use crate::model::ReducedModel;

@@ -47,7 +47,7 @@ impl Target {
     }
 
     /// The name on the command line.
-    pub fn name(self) -> String {
+    pub(crate) fn name(self) -> String {
         let value = self.to_possible_value().expect("no target is hidden");
         value.get_name().to_owned()
     }

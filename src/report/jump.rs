@@ -103,7 +103,7 @@ impl<'a> Jump<'a> {
 
     /// The robot as it moved and as the model predicts it over the whole jump, as a strip and as an animation; none for
     /// a model without a robot.
-    pub(crate) fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
+    pub fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
         let robot = self.model.robot().ok()?;
         let segment = self.run.segment;
         let predicted = Motion {

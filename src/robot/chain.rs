@@ -31,7 +31,7 @@ pub struct Moved<T> {
 }
 
 /// A number of the formulas: a float, or a value of a program that is being built.
-pub trait Value: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+pub(crate) trait Value: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
 
 impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Value for T {}
 
@@ -111,7 +111,7 @@ impl ChainLeg {
 
     /// Area that thigh and calf span, with its sign, in m^2, and lever of the first joint along the normal of their
     /// plane, in m; their product is `det J`.
-    pub fn levers(&self, q: &[f64; 3]) -> [f64; 2] {
+    pub(crate) fn levers(&self, q: &[f64; 3]) -> [f64; 2] {
         self.moved(q).levers()
     }
 

@@ -69,7 +69,7 @@ impl LegGeometry {
     }
 
     /// Foot position from the first joint, in the body's axes, m, at joint angles `q` in rad.
-    pub fn foot_position(&self, q: &[f64; 3]) -> Vector3<f64> {
+    pub(crate) fn foot_position(&self, q: &[f64; 3]) -> Vector3<f64> {
         match self {
             LegGeometry::Planar(leg) => leg.foot_position(q),
             LegGeometry::Chain(leg) => leg.foot_position(q),

@@ -43,7 +43,7 @@ pub const BODY_NAMES: [&str; BODY_DIM] = [
 ];
 
 /// Names of the body wrench's entries, which follow the torques in the input.
-pub const WRENCH_NAMES: [&str; BODY_DIM] = [
+pub(crate) const WRENCH_NAMES: [&str; BODY_DIM] = [
     "force.x", "force.y", "force.z", "moment.x", "moment.y", "moment.z",
 ];
 

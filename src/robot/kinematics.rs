@@ -69,7 +69,7 @@ impl PlanarLeg {
     ///
     /// `|det J|` is the area that thigh and calf span times the height of the foot in the plane of the leg; the hip
     /// offset does not enter.
-    pub fn manipulability(&self, q: &[f64; 3]) -> f64 {
+    pub(crate) fn manipulability(&self, q: &[f64; 3]) -> f64 {
         let plane = self.in_plane(q);
         let area = plane.forward * plane.calf_up - plane.up * plane.calf_forward;
         (area * plane.up).abs() / volume_m3([self.thigh_m, self.calf_m])

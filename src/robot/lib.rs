@@ -22,13 +22,13 @@
 
 pub mod actuators;
 pub mod chain;
-pub mod feet;
-pub mod geometry;
+pub(crate) mod feet;
+pub(crate) mod geometry;
 pub mod input_rule;
 pub mod joints;
 pub mod kinematics;
-pub mod registry;
-pub mod wrench;
+pub(crate) mod registry;
+pub(crate) mod wrench;
 
 mod error;
 
@@ -38,10 +38,7 @@ pub use error::RobotError;
 pub use feet::FeetRule;
 pub use geometry::{LegGeometry, LegLinks};
 pub use input_rule::{InputRule, WrenchFrame};
-pub use joints::{
-    BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
-    JOINT_NAMES, Leg, STATE_DIM,
-};
+pub use joints::{BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
 pub use kinematics::{PlanarLeg, SINGULAR_BOUND};
 pub use registry::Robot;
 

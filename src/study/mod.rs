@@ -4,13 +4,15 @@
 //! study goes on where it was and parts computed on several machines can be joined; and their `Summary`. Read `plan`
 //! first, then `run`.
 
-pub(crate) mod plan;
+pub mod plan;
 
 mod run;
 mod store;
 mod summary;
 
-pub(crate) use plan::{CellId, FOLDS, Plan, Shard, StudyError};
+pub(crate) use plan::{CellId, FOLDS, Shard, StudyError};
+pub use plan::Plan;
 pub(crate) use run::run;
 pub(crate) use store::Store;
-pub(crate) use summary::{Cell, DimensionSummary, Outcome, Spread, Summary, cell_table};
+pub(crate) use summary::{Cell, DimensionSummary, Spread, cell_table};
+pub use summary::{Outcome, Summary};

@@ -15,7 +15,7 @@ pub(crate) const FOLDS: usize = 5;
 /// The trainings of a study; parts of one study have equal plans.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Plan {
+pub struct Plan {
     pub latent_dims: Vec<usize>,
     /// Seeds, counted from 1.
     pub seeds: usize,
@@ -39,7 +39,7 @@ pub(crate) struct CellId {
 }
 
 impl Plan {
-    pub(crate) fn check(&self) -> Result<(), StudyError> {
+    pub fn check(&self) -> Result<(), StudyError> {
         let refuse =
             |found: String, expected: &'static str| Err(StudyError::Range { found, expected });
         if self.latent_dims.is_empty() || self.seeds == 0 {
@@ -65,7 +65,7 @@ impl Plan {
 
 /// Part `index` (from 1) of `count` parts of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
+pub(crate) struct Shard {
     index: usize,
     count: usize,
 }
@@ -92,7 +92,7 @@ impl Shard {
 }
 
 #[derive(Debug, thiserror::Error)]
-pub enum StudyError {
+pub(crate) enum StudyError {
     #[error("{found}, expected {expected}")]
     Range {
         found: String,

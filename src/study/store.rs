@@ -46,7 +46,7 @@ impl Store {
         Ok(Self { folder, plan })
     }
 
-    pub(crate) fn plan(&self) -> &Plan {
+    pub fn plan(&self) -> &Plan {
         &self.plan
     }
 

@@ -17,7 +17,7 @@ pub(crate) struct Cell {
 /// Metrics, or the reason why there are none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Outcome {
+pub enum Outcome {
     Trained(Metrics),
     /// Training refused, for this reason; the same settings would refuse again.
     Refused(String),
@@ -54,7 +54,7 @@ impl Metrics {
         }
     }
 
-    pub(crate) fn is_finite(&self) -> bool {
+    pub fn is_finite(&self) -> bool {
         let [x, z] = [self.prediction_x_m, self.prediction_z_m];
         let values = [x, z, self.decoder_mse, self.torque_r2];
         values.into_iter().all(f64::is_finite)
@@ -105,7 +105,7 @@ pub(crate) struct DimensionSummary {
 
 /// A whole study by latent dimension.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Summary {
+pub struct Summary {
     /// Weight of the complexity in (29).
     pub lambda: f64,
     /// Ascending; dimensions without any model are left out.

@@ -171,7 +171,7 @@ impl Dialect {
         }
     }
 
-    pub(crate) fn table(&self, name: &Ident, table: &Table) -> String {
+    pub fn table(&self, name: &Ident, table: &Table) -> String {
         let [open, between, close] = self.spelling.rows;
         let row = |row: &[f64]| {
             let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();

@@ -4,7 +4,7 @@ use super::dialect::Spelling;
 use crate::ir::Unary;
 
 /// C99. Reserved are the keywords of C and C++, and the library names that generated files use.
-pub(crate) const C: Spelling = Spelling {
+pub const C: Spelling = Spelling {
     reserved: "
     auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union

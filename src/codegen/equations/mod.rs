@@ -35,7 +35,6 @@ mod unit;
 
 pub use exact::ExactStep;
 pub(crate) use exact::summand_words;
-pub(crate) use physical::LatentUnits;
-pub use physical::PhysicalError;
+pub use physical::{LatentUnits, PhysicalError};
 pub use system::{Equations, PhaseEquations};
-pub(crate) use unit::Unit;
+pub use unit::Unit;

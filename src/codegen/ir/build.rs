@@ -61,7 +61,7 @@ impl ProgramBuilder {
     }
 
     /// A constant.
-    pub fn constant(&mut self, value: f64) -> ValueId {
+    pub(crate) fn constant(&mut self, value: f64) -> ValueId {
         self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
     }
 
@@ -71,7 +71,7 @@ impl ProgramBuilder {
     }
 
     /// A scalar operation on two values.
-    pub fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
+    pub(crate) fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
         let (low, high) = match op {
             Binary::Add | Binary::Mul => (a.min(b), a.max(b)),
             Binary::Sub | Binary::Div | Binary::Pow => (a, b),

@@ -23,8 +23,7 @@ mod interpret;
 mod program;
 pub mod sin_cos;
 
-pub(crate) use build::IrError;
-pub use build::ProgramBuilder;
+pub use build::{IrError, ProgramBuilder};
 pub use interpret::Interpreter;
 pub(crate) use program::Table;
 pub use program::{Binary, Program, Slot, Statement, Unary, ValueId};

@@ -35,7 +35,7 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     /// Computes all sines and cosines that occur in the expressions, as few array statements as their nesting allows.
-    pub fn prepare(&mut self, roots: &[ExprId]) {
+    pub(crate) fn prepare(&mut self, roots: &[ExprId]) {
         let mut levels: BTreeMap<usize, Vec<ExprId>> = BTreeMap::new();
         let mut nesting: HashMap<ExprId, usize> = HashMap::new();
         let mut seen = HashSet::new();

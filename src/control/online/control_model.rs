@@ -111,7 +111,7 @@ impl ControlModel {
     }
 
     /// Whether the maps depend on the state.
-    pub fn is_nonlinear(&self) -> bool {
+    pub(crate) fn is_nonlinear(&self) -> bool {
         self.nonlinear.is_some()
     }
 
@@ -190,7 +190,7 @@ impl ControlModel {
     }
 
     /// `dz = J_E s_x dx` with the encoder's Jacobian at `x`; SI units (18), `dz` is overwritten.
-    pub fn encode_velocity(&self, x: &[f64], dx: &[f64], dz: &mut [f64]) {
+    pub(crate) fn encode_velocity(&self, x: &[f64], dx: &[f64], dz: &mut [f64]) {
         dz.fill(0.0);
         match &self.nonlinear {
             None => add_product(&self.parts.encoder, dx, dz),
@@ -199,7 +199,7 @@ impl ControlModel {
     }
 
     /// Joint positions, rad, that the decoder gives for `z`.
-    pub fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
+    pub(crate) fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
         if let Some(maps) = &self.nonlinear {
             let x = maps.decode(z);
             return std::array::from_fn(|joint| x[joint]);

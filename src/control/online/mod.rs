@@ -22,7 +22,7 @@ mod dense;
 mod effectiveness;
 mod engine;
 mod error;
-pub mod estimate;
+pub(crate) mod estimate;
 mod fallback;
 mod horizon;
 pub mod interface;
@@ -61,12 +61,10 @@ pub use estimate::InputGivenState;
 pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
 pub use linearise::LatentDynamics;
 pub use plan::Plan;
-pub use problem::{to_upright, upright};
+pub use problem::to_upright;
+pub(crate) use problem::upright;
 pub use prune::needed_rows;
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, SparseColumns, sparse};
 pub use reference::{Reference, ReferenceSamples};
-pub use settings::{
-    Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput,
-    MpcSettings, RowSelection, Solver,
-};
+pub use settings::{Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput, MpcSettings, RowSelection, Solver};
 pub use structured::MAX_STRUCTURED_DIM;

@@ -49,19 +49,19 @@ impl Plan {
     }
 
     /// Phase of the first stage.
-    pub fn phase(&self) -> usize {
+    pub(crate) fn phase(&self) -> usize {
         self.phase
     }
 
     /// The stage that a time belongs to, counted from the plan's first; none before the plan or without one.
-    pub fn stage_at(&self, time_s: f64) -> Option<usize> {
+    pub(crate) fn stage_at(&self, time_s: f64) -> Option<usize> {
         let passed = (time_s - self.start_s?) / self.step_s;
         // A time that is a stage's beginning but for rounding belongs to that stage.
         (passed > -0.5).then(|| (passed + 1e-6).floor().max(0.0) as usize)
     }
 
     /// The instant whose posture is commanded for a stage, s; none without a plan.
-    pub fn posture_s(&self, stage: usize) -> Option<f64> {
+    pub(crate) fn posture_s(&self, stage: usize) -> Option<f64> {
         Some(self.start_s? + (stage as f64 + POSTURE_SHARE) * self.step_s)
     }
 
@@ -71,7 +71,7 @@ impl Plan {
     }
 
     /// State at the beginning of a stage.
-    pub fn start(&self, stage: usize) -> &[f64] {
+    pub(crate) fn start(&self, stage: usize) -> &[f64] {
         &self.states[stage]
     }
 
@@ -81,7 +81,7 @@ impl Plan {
     }
 
     /// State and input that the plan has at a time, beyond its end those of its last stage; none without a plan.
-    pub fn at(&self, time_s: f64) -> Option<(&[f64], &[f64])> {
+    pub(crate) fn at(&self, time_s: f64) -> Option<(&[f64], &[f64])> {
         let stage = self.stage_at(time_s)?.min(self.inputs.len() - 1);
         Some((self.start(stage), self.input(stage)))
     }

@@ -90,7 +90,7 @@ pub struct StageRows {
 
 /// Rows of the body force that a latent input is lifted to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BodyFriction {
+pub(crate) struct BodyFriction {
     /// Friction coefficient.
     pub coefficient: f64,
     /// Force over the robot's weight along x, y and z of the model's frame, `3 × latent_dim` row-major.
@@ -114,7 +114,7 @@ impl BodyFriction {
     }
 
     /// Writes the cone's rows `(μ F_z, F_x, F_y)` of the force turned upright into `out`.
-    pub fn turned(&self, attitude_rad: [f64; 2], out: &mut [f64]) {
+    pub(crate) fn turned(&self, attitude_rad: [f64; 2], out: &mut [f64]) {
         let rotation = to_upright(self.frame, attitude_rad);
         let d = self.force.len() / 3;
         turn_force(
@@ -249,7 +249,7 @@ impl StageRows {
     ///
     /// Joint limits are soft and positions in commands are clamped, so what is given up is only that a plan from far
     /// away bends around limits that its reference is nowhere near.
-    pub fn near(mut self, reference: &Reference) -> Self {
+    pub(crate) fn near(mut self, reference: &Reference) -> Self {
         let deviation = reference.deviation();
         let matters = |row: &Row| reference.comes_near(&row.row, row.bound, deviation);
         self.joint.retain(matters);
@@ -321,7 +321,7 @@ pub fn to_upright(frame: WrenchFrame, attitude: [f64; 2]) -> [[f64; 3]; 3] {
 }
 
 /// Rotation from the body frame to an upright frame with the same heading, `R_y(pitch) R_x(roll)`, row-major.
-pub fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
+pub(crate) fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
     let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) =
         (attitude[0].sin_cos(), attitude[1].sin_cos());
     [

@@ -49,7 +49,7 @@ impl Reference {
     /// [`ControlError::ReferenceLen`] below two samples, [`ControlError::ReferenceShape`] if array lengths disagree,
     /// [`ControlError::ReferenceValue`] for values that are not finite, [`ControlError::ReferenceTime`] if time does
     /// not increase and [`ControlError::ReferencePhase`] if a foot pattern selects no phase.
-    pub fn new(plant: &ControlModel, samples: ReferenceSamples<'_>) -> Result<Self, ControlError> {
+    pub(crate) fn new(plant: &ControlModel, samples: ReferenceSamples<'_>) -> Result<Self, ControlError> {
         check(plant, &samples)?;
         let d = plant.latent_dim();
         let count = samples.time_s.len();
@@ -88,13 +88,13 @@ impl Reference {
     }
 
     /// Whether the trajectory has an input, its own or an estimate.
-    pub fn has_input(&self) -> bool {
+    pub(crate) fn has_input(&self) -> bool {
         self.input.is_some()
     }
 
     /// Standard deviation of each of `(z, dz)` over the trajectory, never below a hundredth of the largest position's
     /// or velocity's; for one that stands still, the scale of a small motion of the joints.
-    pub fn deviation(&self) -> &[f64] {
+    pub(crate) fn deviation(&self) -> &[f64] {
         &self.deviation
     }
 

@@ -263,7 +263,7 @@ pub struct Residuals<T> {
 
 impl<T: Real> Residuals<T> {
     /// Whether all are numbers of at most `limit`.
-    pub fn within(&self, limit: T) -> bool {
+    pub(crate) fn within(&self, limit: T) -> bool {
         self.primal <= limit && self.dual <= limit && self.gap <= limit
     }
 }

@@ -155,7 +155,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
 
     /// Residuals of the optimality conditions at the present point, from the program's own numbers.
     #[inline(always)]
-    pub fn residuals(&mut self, x0: &[T; NX]) -> Residuals<T> {
+    pub(crate) fn residuals(&mut self, x0: &[T; NX]) -> Residuals<T> {
         let horizon = self.stages.len();
         let shape = self.shape;
         let mut primal = T::ZERO;
@@ -258,7 +258,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// # Safety
     /// The processor must have AVX2.
     #[target_feature(enable = "avx2")]
-    pub fn prepare_avx2(&mut self) -> bool {
+    pub(crate) fn prepare_avx2(&mut self) -> bool {
         self.prepare()
     }
 
@@ -267,7 +267,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// # Safety
     /// The processor must have AVX2.
     #[target_feature(enable = "avx2")]
-    pub fn solve_avx2(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
+    pub(crate) fn solve_avx2(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
         self.solve(x0, is_warm, settings)
     }
 }

@@ -17,7 +17,7 @@ pub struct PerKind {
 }
 
 impl PerKind {
-    pub fn from_array([hx, hy, kn]: [f64; LEG_JOINT_DIM]) -> Self {
+    pub(crate) fn from_array([hx, hy, kn]: [f64; LEG_JOINT_DIM]) -> Self {
         Self { hx, hy, kn }
     }
 
@@ -26,7 +26,7 @@ impl PerKind {
     }
 
     /// Means of a value of all twelve joints over the legs.
-    pub fn mean(joints: &[f64; JOINT_DIM]) -> Self {
+    pub(crate) fn mean(joints: &[f64; JOINT_DIM]) -> Self {
         Self::from_array(std::array::from_fn(|kind| {
             let legs = joints.iter().skip(kind).step_by(LEG_JOINT_DIM);
             legs.sum::<f64>() / (JOINT_DIM / LEG_JOINT_DIM) as f64

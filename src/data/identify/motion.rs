@@ -13,11 +13,11 @@ use crate::robot::{JOINT_DIM, Leg, LegLinks, Robot};
 /// Directions of a leg in the world, or their derivatives: from the axis of abduction to the plane of the leg (side),
 /// from hip to knee (thigh), from knee to foot (calf), in front of the thigh, in front of the calf. The equations'
 /// moments of a leg have this order.
-pub type Directions = [Vector3<f64>; 5];
+pub(crate) type Directions = [Vector3<f64>; 5];
 
 /// Axes and directions of one leg in the world, unit vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LegFrame {
+pub(crate) struct LegFrame {
     /// Axis of abduction.
     pub abduction: Vector3<f64>,
     /// Axis of flexion and of the knee.
@@ -94,7 +94,7 @@ impl Motion {
     }
 
     /// Acceleration of the trunk's origin, m/s^2.
-    pub fn body(&self, sample: usize) -> Vector3<f64> {
+    pub(crate) fn body(&self, sample: usize) -> Vector3<f64> {
         let rows = self.coordinates.fixed_view::<3, 1>(JOINT_DIM, sample);
         rows.into_owned()
     }
@@ -104,7 +104,7 @@ impl Motion {
     }
 
     /// Second derivatives of a leg's directions, 1/s^2.
-    pub fn leg(&self, leg: Leg, sample: usize) -> Directions {
+    pub(crate) fn leg(&self, leg: Leg, sample: usize) -> Directions {
         let first = TRUNK_ROWS + LEG_ROWS * leg.index();
         let of = |row| self.direction(first + row, sample);
         [of(0), of(3), of(6), of(9), of(12)]

@@ -49,7 +49,7 @@ impl SavitzkyGolay {
     }
 
     /// Samples of the window.
-    pub fn window(&self) -> usize {
+    pub(crate) fn window(&self) -> usize {
         self.window
     }
 

@@ -136,7 +136,7 @@ impl OdeSystem for PendulumSpan<'_> {
 }
 
 /// Body x and z, m, that the pendulum predicts for each sample of a segment; none after a divergence.
-pub type AslipRollout = Vec<Option<Vector2<f64>>>;
+pub(crate) type AslipRollout = Vec<Option<Vector2<f64>>>;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AslipSums {

@@ -67,7 +67,7 @@ impl FitSums {
     }
 
     /// Coefficient of determination of all pairs added so far, see [`Fit::r2`].
-    pub fn r2(&self) -> Option<f64> {
+    pub(crate) fn r2(&self) -> Option<f64> {
         self.fit()?.r2
     }
 }

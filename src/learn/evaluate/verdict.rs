@@ -109,7 +109,7 @@ impl VerdictRow {
         }
     }
 
-    pub fn is_failed(&self) -> bool {
+    pub(crate) fn is_failed(&self) -> bool {
         self.counts && self.passed == Some(false)
     }
 
@@ -172,7 +172,7 @@ impl Verdict {
         failed.any(|of| [TORQUES, CONTROL].contains(&of.as_str()))
     }
 
-    pub fn failures(&self) -> impl Iterator<Item = &VerdictRow> {
+    pub(crate) fn failures(&self) -> impl Iterator<Item = &VerdictRow> {
         self.rows.iter().filter(|row| row.is_failed())
     }
 }

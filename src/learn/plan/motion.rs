@@ -33,7 +33,7 @@ pub struct Margins {
 
 /// The motion of a point and its margins: samples at equal distances from the start to the planned end, as close to
 /// `sample_time_s` apart as a whole number of steps allows.
-pub(crate) fn motion(
+pub fn motion(
     task: &Task<'_>,
     y: &[f64],
     sample_time_s: f64,

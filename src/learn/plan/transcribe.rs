@@ -43,7 +43,7 @@ const FAR_JOINT_RAD: f64 = 0.3;
 
 /// Bounds whose violation is a variable of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Bound {
+pub enum Bound {
     Torque,
     /// Joint angles, rad.
     Joint,

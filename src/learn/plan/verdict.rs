@@ -57,7 +57,7 @@ pub(crate) struct Findings<'a> {
     pub start_lost: Vec<String>,
 }
 
-pub(crate) fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
+pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
     let refused = refusals(settings, found);
     if !refused.is_empty() {
         return Verdict::Refused(refused);

@@ -66,7 +66,7 @@ impl LatentSegment {
         self.time_s.len()
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
 
@@ -91,7 +91,7 @@ fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimErro
 }
 
 /// The rule by which training and evaluation assign samples to the phases of a model.
-pub fn phase_rule(model: &ReducedModel) -> PhaseRule {
+pub(crate) fn phase_rule(model: &ReducedModel) -> PhaseRule {
     let patterns = model.phases().iter().map(|phase| PhasePattern {
         name: phase.name.clone(),
         feet: phase.feet.clone(),

@@ -94,7 +94,7 @@ fn at_scale(recorded: &LatentSegment) -> IntegrationOptions {
 }
 
 /// Ranges of samples between restarts; a restart falls on the first sample not before its time.
-pub fn restart_windows(time_s: &[f64], restart: Restart) -> Vec<Range<usize>> {
+pub(crate) fn restart_windows(time_s: &[f64], restart: Restart) -> Vec<Range<usize>> {
     let interval_s = match restart {
         Restart::Never => f64::INFINITY,
         Restart::Every(interval_s) => interval_s,
@@ -146,7 +146,7 @@ fn roll_window(
 /// are reached, and when they left every bound, if they did.
 ///
 /// `of_stretch` integrates one from a state over its times, which end at the first sample of the next.
-pub fn integrate_stretches(
+pub(crate) fn integrate_stretches(
     initial: &[f64],
     time_s: &[f64],
     window: Range<usize>,

@@ -34,7 +34,7 @@ pub struct ScaleOptions {
 
 impl ScaleOptions {
     /// One factor for everything, as the paper has it.
-    pub fn uniform(factor: f64) -> Self {
+    pub(crate) fn uniform(factor: f64) -> Self {
         Self {
             state: factor,
             torque: factor,

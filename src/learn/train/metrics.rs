@@ -15,7 +15,7 @@ use crate::recording::Recording;
 use crate::robot::JOINT_DIM;
 use crate::sim::{Restart, phase_rule};
 
-pub(super) use crate::robot::{BODY_X, BODY_Z};
+pub use crate::robot::{BODY_X, BODY_Z};
 
 /// Rows of the state that say where the robot is on the floor and which way it looks: x, y, yaw.
 pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5];

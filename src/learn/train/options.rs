@@ -218,7 +218,7 @@ impl TrainOptions {
         }
     }
 
-    pub fn seeds(&self) -> Vec<u64> {
+    pub(crate) fn seeds(&self) -> Vec<u64> {
         let count = self.n_seeds.max(1) as u64;
         (0..count).map(|i| self.seed.wrapping_add(i)).collect()
     }
@@ -227,7 +227,7 @@ impl TrainOptions {
     ///
     /// # Errors
     /// [`TrainError::Model`] for a term that does not parse or a latent dimension out of range.
-    pub fn library(&self) -> Result<Library, TrainError> {
+    pub(crate) fn library(&self) -> Result<Library, TrainError> {
         let library = Library::of(self.latent_dim, self.library.clone())?;
         library.check_distinct()?;
         Ok(library)

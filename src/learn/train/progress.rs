@@ -30,7 +30,7 @@ impl<'a> Monitor<'a> {
     }
 
     /// Whether the training should end with what it has.
-    pub fn cancelled(&self) -> bool {
+    pub(crate) fn cancelled(&self) -> bool {
         self.cancel.load(Ordering::Relaxed)
     }
 
@@ -39,11 +39,11 @@ impl<'a> Monitor<'a> {
         self.cancel
     }
 
-    pub fn stage(&mut self, name: &'static str, steps: usize) {
+    pub(crate) fn stage(&mut self, name: &'static str, steps: usize) {
         (self.listener)(Progress::Stage { name, steps });
     }
 
-    pub fn done(&mut self, steps: usize, text: String) {
+    pub(crate) fn done(&mut self, steps: usize, text: String) {
         (self.listener)(Progress::Done { steps, text });
     }
 }

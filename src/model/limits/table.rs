@@ -7,7 +7,7 @@ macro_rules! ranges {
         $($(#[$doc])* pub const $name: Range = $range;)*
 
         /// All ranges; of two with one name that of `romc train` comes first.
-        pub static ALL: &[Range] = &[$($name),*];
+        pub(crate) static ALL: &[Range] = &[$($name),*];
     };
 }
 

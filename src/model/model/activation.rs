@@ -67,7 +67,7 @@ impl Activation {
         self.jet(a)[0]
     }
 
-    pub fn slope(self, a: f64) -> f64 {
+    pub(crate) fn slope(self, a: f64) -> f64 {
         self.derivative(a, 1)
     }
 

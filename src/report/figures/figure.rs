@@ -4,7 +4,7 @@ use super::sticks::{Extent, Sticks};
 
 /// The meaning of a line, which selects its colour and dashes in every figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Role {
+pub enum Role {
     /// Measured, or encoded from what was measured.
     Recorded,
     /// Predicted over the whole recording.

@@ -69,7 +69,7 @@ fn is_plain(character: char) -> bool {
 /// use romc::typeset::latex::label;
 /// assert_eq!(label(r"rear stance_2}\b%"), "rear-stance-2--b-");
 /// ```
-pub fn label(name: &str) -> String {
+pub(crate) fn label(name: &str) -> String {
     name.chars()
         .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
         .collect()

@@ -37,6 +37,7 @@ mod nomenclature;
 mod table;
 
 pub use document::emit;
-pub use escape::{label, tex_text};
+pub(crate) use escape::label;
+pub use escape::tex_text;
 pub use lines::tex_cases;
 pub(crate) use math::{tex, tex_symbol, tex_unit};

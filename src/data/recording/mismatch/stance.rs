@@ -151,7 +151,7 @@ pub(super) struct Slip {
 
 impl Slip {
     /// Over all segments of a recording.
-    pub fn of(recording: &Recording, robot: &Robot) -> Self {
+    pub(crate) fn of(recording: &Recording, robot: &Robot) -> Self {
         Self::read(recording, robot, AS_RECORDED)
     }
 

@@ -14,6 +14,7 @@ mod run;
 mod unroll;
 
 pub use descent::Schedule;
-pub use loss::{LossWeights, Losses};
+pub use loss::LossWeights;
+pub(crate) use loss::Losses;
 pub use run::joint;
 pub use unroll::{Integrator, Unroll};

@@ -111,7 +111,7 @@ impl<'x> Element<'x> {
     }
 
     /// The attribute `name`, without which nothing can refer to the element.
-    pub fn name(&self) -> Result<&'x str, RobotFileError> {
+    pub(crate) fn name(&self) -> Result<&'x str, RobotFileError> {
         let name = self.attribute("name").filter(|name| !name.is_empty());
         name.ok_or_else(|| self.fault("", "no name", "name=\"...\""))
     }
