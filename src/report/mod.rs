@@ -24,7 +24,10 @@ pub(crate) use introduction::{Introduction, introduction};
 pub use json::{assessment_json, plan_json};
 pub(crate) use page::{PageOptions, page};
 pub(crate) use plan::{plan_figures, reach_figure};
-pub(crate) use tables::{NamedRun, baseline_table, body_rms, control_table, coordinate_table, dynamics_table, failed_runs, failures, invariance_table, phase_table, run_table, verdict_lines};
+pub(crate) use tables::{
+    NamedRun, baseline_table, body_rms, control_table, coordinate_table, dynamics_table,
+    failed_runs, failures, invariance_table, phase_table, run_table, verdict_lines,
+};
 
 use std::path::{Path, PathBuf};
 

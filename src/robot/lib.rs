@@ -38,7 +38,10 @@ pub use error::RobotError;
 pub use feet::FeetRule;
 pub use geometry::{LegGeometry, LegLinks};
 pub use input_rule::{InputRule, WrenchFrame};
-pub use joints::{BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
+pub use joints::{
+    BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
+    JOINT_NAMES, Leg, STATE_DIM,
+};
 pub use kinematics::{PlanarLeg, SINGULAR_BOUND};
 pub use registry::Robot;
 

@@ -10,8 +10,8 @@ mod run;
 mod store;
 mod summary;
 
-pub(crate) use plan::{CellId, FOLDS, Shard, StudyError};
 pub use plan::Plan;
+pub(crate) use plan::{CellId, FOLDS, Shard, StudyError};
 pub(crate) use run::run;
 pub(crate) use store::Store;
 pub(crate) use summary::{Cell, DimensionSummary, Spread, cell_table};

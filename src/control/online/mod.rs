@@ -66,5 +66,8 @@ pub(crate) use problem::upright;
 pub use prune::needed_rows;
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, SparseColumns, sparse};
 pub use reference::{Reference, ReferenceSamples};
-pub use settings::{Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput, MpcSettings, RowSelection, Solver};
+pub use settings::{
+    Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput,
+    MpcSettings, RowSelection, Solver,
+};
 pub use structured::MAX_STRUCTURED_DIM;

@@ -49,7 +49,10 @@ impl Reference {
     /// [`ControlError::ReferenceLen`] below two samples, [`ControlError::ReferenceShape`] if array lengths disagree,
     /// [`ControlError::ReferenceValue`] for values that are not finite, [`ControlError::ReferenceTime`] if time does
     /// not increase and [`ControlError::ReferencePhase`] if a foot pattern selects no phase.
-    pub(crate) fn new(plant: &ControlModel, samples: ReferenceSamples<'_>) -> Result<Self, ControlError> {
+    pub(crate) fn new(
+        plant: &ControlModel,
+        samples: ReferenceSamples<'_>,
+    ) -> Result<Self, ControlError> {
         check(plant, &samples)?;
         let d = plant.latent_dim();
         let count = samples.time_s.len();

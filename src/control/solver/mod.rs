@@ -67,5 +67,7 @@ mod scalar;
 mod solve;
 
 pub use links::Links;
-pub use problem::{Cost, Outcome, Pairs, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};
+pub use problem::{
+    Cost, Outcome, Pairs, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage,
+};
 pub use scalar::Real;

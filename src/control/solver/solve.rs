@@ -267,7 +267,12 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// # Safety
     /// The processor must have AVX2.
     #[target_feature(enable = "avx2")]
-    pub(crate) fn solve_avx2(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
+    pub(crate) fn solve_avx2(
+        &mut self,
+        x0: &[T; NX],
+        is_warm: bool,
+        settings: &Settings<T>,
+    ) -> Report<T> {
         self.solve(x0, is_warm, settings)
     }
 }

@@ -10,7 +10,7 @@ mod latent;
 mod rollout;
 
 pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
-pub use latent::{LatentSegment, SimError, with_input_statistics};
 pub(crate) use latent::phase_rule;
+pub use latent::{LatentSegment, SimError, with_input_statistics};
 pub use rollout::{Restart, Rollout, Window, rollout};
 pub(crate) use rollout::{integrate_stretches, restart_windows};

@@ -40,7 +40,10 @@ pub use dataset::{MIN_SAMPLES, ScaleOptions};
 pub use error::TrainError;
 pub use joint::{Integrator, Unroll, joint};
 pub use metrics::{PartScore, PhaseTerms, SeedReport, SetMetrics, TrainReport, Trained, assess};
-pub use options::{Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions, Transfer};
+pub use options::{
+    Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions,
+    Transfer,
+};
 pub use progress::{Monitor, Progress};
 pub use split::Split;
 pub use task::{Origin, Recordings, SourceFile, sha256};

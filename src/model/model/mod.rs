@@ -59,8 +59,12 @@ pub use error::ModelError;
 pub use evaluation::{Step, Tape};
 pub use given_state::InputGivenState;
 pub use identifier::{Identifier, IdentifierError, check_name};
-pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks};
-pub use library::{CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN};
+pub use jump_prior::{
+    FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks,
+};
+pub use library::{
+    CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN,
+};
 pub use maps::{Tangent, complement};
 pub use order::CoordinateOrder;
 pub use rom::{Phase, ReducedModel};

@@ -10,8 +10,8 @@ mod sticks;
 mod svg;
 
 pub(crate) use draw::{range, subscript};
-pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Series};
 pub use figure::Role;
+pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Series};
 pub(crate) use sticks::{Film, Motion, film, film_strip, floor_m};
 pub(crate) use svg::panel_svg;
 
