@@ -107,7 +107,7 @@ impl Encoded {
         let mut rows = jacobians.rows.clone();
         frame.scale_jacobian(&mut rows);
         Self {
-            projections: InputProjections::new(&rows, &batch.u),
+            projections: InputProjections::new(&rows, &batch.u, stack.ncols()),
             stack,
             jacobians,
             rows,
@@ -230,8 +230,9 @@ impl<'a> JointLoss<'a> {
             }
         }
         let own = &mut self.gradient.decoder;
-        let onto_stack = (parameters.decoder).backward(&self.decoder_tape, leaving, &[], own);
-        (reconstruction, ddx, onto_stack / frame.latent)
+        let at_first = (parameters.decoder).backward(&self.decoder_tape, leaving, &[], own);
+        let onto_stack = parameters.decoder.onto_input(&at_first) / frame.latent;
+        (reconstruction, ddx, onto_stack)
     }
 
     /// From the adjoint of the predicted `ddz` to those of Xi and `(z, dz, u_lat)`; (41), if it has a weight, is

@@ -39,14 +39,15 @@ pub(super) struct Tape {
 #[derive(Clone, Debug)]
 struct Recorded {
     entering: DMatrix<f64>,         // stack x inputs
-    affine: DMatrix<f64>,           // stack x outputs: a, da, dda
+    affine: DMatrix<f64>,           // stack x outputs: a, da, dda; empty for a linear layer
     derivatives: [DMatrix<f64>; 3], // samples x outputs: phi', phi'', phi'''
 }
 
-/// Jacobians of all samples, with the records for the reverse sweep.
+/// Jacobians of all samples, or the one of linear maps, with the records for the reverse sweep.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Jacobians {
-    /// Row `i n + s` is the gradient of output `i` at sample `s`: `(outputs n) x inputs`.
+    /// Row `i m + s` is the gradient of output `i` at sample `s`: `(outputs m) x inputs`; `m` is 1 for linear maps, whose
+    /// Jacobian is the same everywhere, and the number of samples else.
     pub rows: DMatrix<f64>,
     at_affine: Vec<DMatrix<f64>>, // per layer: derivative of every output with respect to a
     at_output: Vec<DMatrix<f64>>, // the same with respect to phi(a); empty for the last layer
@@ -104,18 +105,26 @@ impl Network {
             for (mut column, bias) in affine.column_iter_mut().zip(layer.bias.iter()) {
                 column.rows_mut(0, samples).add_scalar_mut(*bias);
             }
-            let (leaving, derivatives) = activate(layer.activation, &affine, samples);
-            tape.layers.push(Recorded {
-                entering: std::mem::replace(&mut y, leaving),
-                affine,
-                derivatives,
-            });
+            let mut recorded = Recorded {
+                entering: y,
+                affine: DMatrix::zeros(0, 0),
+                derivatives: std::array::from_fn(|_| DMatrix::zeros(0, 0)),
+            };
+            y = match layer.activation {
+                Activation::Linear => affine,
+                phi => {
+                    let (leaving, derivatives) = activate(phi, &affine, samples);
+                    (recorded.affine, recorded.derivatives) = (affine, derivatives);
+                    leaving
+                }
+            };
+            tape.layers.push(recorded);
         }
         y
     }
 
     /// Adds to `gradient` the share of the layers, given the adjoint of the result of [`Self::forward`]; returns the
-    /// adjoint of the input.
+    /// adjoint of the first layer's `a`, see [`Self::onto_input`].
     ///
     /// `at_affine` (one matrix per layer, or none) is added to the adjoint of `a`; it comes from
     /// [`Self::jacobian_adjoint`].
@@ -130,23 +139,34 @@ impl Network {
         for (index, (layer, recorded)) in self.layers.iter().zip(&tape.layers).enumerate().rev() {
             if layer.activation != Activation::Linear {
                 deactivate(recorded, tape.samples, &mut adjoint);
-            }
-            if let Some(extra) = at_affine.get(index) {
-                let mut values = adjoint.rows_mut(0, tape.samples);
-                values += extra;
+                if let Some(extra) = at_affine.get(index) {
+                    let mut values = adjoint.rows_mut(0, tape.samples);
+                    values += extra;
+                }
             }
             let own = &mut gradient.layers[index];
             add_transposed(&mut own.weights, &recorded.entering, &adjoint);
             for (bias, column) in own.bias.iter_mut().zip(adjoint.column_iter()) {
                 *bias += column.rows(0, tape.samples).sum();
             }
-            adjoint = product(&adjoint, &layer.weights.transpose());
+            if index > 0 {
+                adjoint = product(&adjoint, &layer.weights.transpose());
+            }
         }
         adjoint
     }
 
+    /// The adjoint of the input, of that of the first layer's `a`.
+    pub(super) fn onto_input(&self, at_first: &DMatrix<f64>) -> DMatrix<f64> {
+        product(at_first, &self.layers[0].weights.transpose())
+    }
+
     pub(super) fn jacobian(&self, tape: &Tape) -> Jacobians {
-        let n = tape.samples;
+        let is_linear = |layer: &Dense| layer.activation == Activation::Linear;
+        let n = match self.layers.iter().all(is_linear) {
+            true => 1,
+            false => tape.samples,
+        };
         let outputs = self.layers.last().map_or(0, |layer| layer.bias.len());
         let mut at_affine = vec![DMatrix::zeros(0, 0); self.layers.len()];
         let mut at_output = at_affine.clone();
@@ -189,7 +209,7 @@ impl Network {
             adjoint = product(&adjoint, &layer.weights);
             let [slopes, curvatures, _] = &recorded.derivatives;
             if layer.activation == Activation::Linear {
-                onto_affine.push(DMatrix::zeros(tape.samples, layer.bias.len()));
+                onto_affine.push(DMatrix::zeros(0, 0));
                 continue;
             }
             let bent = adjoint.component_mul(&jacobians.at_output[index]);
@@ -223,12 +243,9 @@ fn summed(stack: &DMatrix<f64>, n: usize) -> DMatrix<f64> {
     sum
 }
 
-/// `phi` on a stack, and its derivatives at the values; no derivatives for a linear layer.
+/// `phi` on a stack, and its derivatives at the values.
 fn activate(phi: Activation, affine: &DMatrix<f64>, n: usize) -> (DMatrix<f64>, [DMatrix<f64>; 3]) {
     let mut leaving = affine.clone();
-    if phi == Activation::Linear {
-        return (leaving, std::array::from_fn(|_| DMatrix::zeros(0, 0)));
-    }
     let mut derivatives: [_; 3] = std::array::from_fn(|_| DMatrix::zeros(n, affine.ncols()));
     for (index, mut column) in leaving.column_iter_mut().enumerate() {
         for s in 0..n {
@@ -373,8 +390,10 @@ mod tests {
                 assert!((row(1) - dy).amax() < 1e-14);
                 assert!((row(2) - ddy).amax() < 1e-13);
                 let jacobian = map.jacobian(&x).unwrap();
+                let samples = jacobians.rows.nrows() / 2;
                 for i in 0..2 {
-                    assert!((jacobians.rows.row(i * N + s) - jacobian.row(i)).amax() < 1e-14);
+                    let row = jacobians.rows.row(i * samples + s % samples);
+                    assert!((row - jacobian.row(i)).amax() < 1e-14);
                 }
             }
         }

@@ -1,7 +1,11 @@
 //! Latent inputs of a batch, forwards and backwards: `u_lat = pinv(J^T) u = (J J^T)^-1 J u` with the Jacobian `J` of
 //! the encoder at every sample; directions that are nearly dependent are damped.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
+
+use super::network::{add_transposed, product};
 
 /// Added to the diagonal of `J J^T`; of the trace where that is not enough.
 const DAMPING: f64 = 1e-12;
@@ -13,22 +17,25 @@ pub(super) struct InputProjections {
     pub u_lat: DMatrix<f64>,
     /// Sum over samples of `(J u) . u_lat`: the energy of the inputs that the latent inputs carry.
     pub carried: f64,
-    inverses: Vec<DMatrix<f64>>, // of J J^T at each sample, d x d
+    inverses: Vec<DMatrix<f64>>, // of J J^T for each Jacobian, d x d
 }
 
 impl InputProjections {
-    /// Projects `u` (`n x 18`) by the Jacobians whose rows are stacked in `rows` (`(d n) x 18`).
-    pub(super) fn new(rows: &DMatrix<f64>, u: &DMatrix<f64>) -> Self {
-        let n = u.nrows();
-        let d = rows.nrows() / n.max(1);
-        let (mut u_lat, mut carried) = (DMatrix::zeros(n, d), 0.0);
-        let inverses = (0..n).map(|sample| {
-            let jacobian = rows.rows_with_step(sample, d, n - 1).into_owned();
+    /// Projects `u` (`n x 18`) by the Jacobians whose rows are stacked in `rows`: one for each sample, `(d n) x 18`, or one
+    /// for all.
+    pub(super) fn new(rows: &DMatrix<f64>, u: &DMatrix<f64>, d: usize) -> Self {
+        let (mut u_lat, mut carried) = (DMatrix::zeros(u.nrows(), d), 0.0);
+        let count = rows.nrows() / d;
+        let inverses = (0..count).map(|index| {
+            let (jacobian, samples) = (jacobian(rows, index, d), samples(u.nrows(), count, index));
             let inverse = inverse(&jacobian * jacobian.transpose());
-            let onto = &jacobian * u.row(sample).transpose();
-            let latent = &inverse * &onto;
+            let onto = product(
+                &u.rows_range(samples.clone()).into_owned(),
+                &jacobian.transpose(),
+            );
+            let latent = product(&onto, &inverse);
             carried += onto.dot(&latent);
-            u_lat.row_mut(sample).tr_copy_from(&latent);
+            u_lat.rows_range_mut(samples).copy_from(&latent);
             inverse
         });
         let inverses = inverses.collect();
@@ -39,11 +46,11 @@ impl InputProjections {
         }
     }
 
-    /// Adjoint of the Jacobians (`(d n) x 18`), given the one of `u_lat` (`n x d`), plus `-lift` times the gradient of
+    /// Adjoint of the Jacobians, stacked as `rows`, given the one of `u_lat` (`n x d`), plus `-lift` times the gradient of
     /// [`Self::carried`].
     ///
-    /// With `w = (J J^T)^-1 adjoint`, `v = u_lat` and the rest `r = u - J^T v` it is `w r^T - v (J^T w)^T - 2 lift v
-    /// r^T`.
+    /// With `w = (J J^T)^-1 adjoint`, `v = u_lat` and the rest `r = u - J^T v` it is the sum over the samples of a
+    /// Jacobian of `w r^T - v (J^T w)^T - 2 lift v r^T`.
     pub(super) fn adjoint(
         &self,
         rows: &DMatrix<f64>,
@@ -52,16 +59,36 @@ impl InputProjections {
         lift: f64,
     ) -> DMatrix<f64> {
         let (n, d) = self.u_lat.shape();
-        let mut onto = DMatrix::zeros(d * n, u.ncols());
-        for (sample, inverse) in self.inverses.iter().enumerate() {
-            let jacobian = rows.rows_with_step(sample, d, n - 1).into_owned();
-            let v = self.u_lat.row(sample).transpose();
-            let w = inverse * onto_u_lat.row(sample).transpose();
-            let rest = u.row(sample) - v.transpose() * &jacobian;
-            let own = (&w - &v * (2.0 * lift)) * rest - &v * (w.transpose() * &jacobian);
-            onto.rows_with_step_mut(sample, d, n - 1).copy_from(&own);
+        let count = self.inverses.len();
+        let mut onto = DMatrix::zeros(rows.nrows(), rows.ncols());
+        for (index, inverse) in self.inverses.iter().enumerate() {
+            let (jacobian, samples) = (jacobian(rows, index, d), samples(n, count, index));
+            let v = self.u_lat.rows_range(samples.clone()).into_owned();
+            let w = product(
+                &onto_u_lat.rows_range(samples.clone()).into_owned(),
+                inverse,
+            );
+            let rest = u.rows_range(samples) - product(&v, &jacobian);
+            let mut own = DMatrix::zeros(d, rows.ncols());
+            add_transposed(&mut own, &(&w - &v * (2.0 * lift)), &rest);
+            add_transposed(&mut own, &-v, &product(&w, &jacobian));
+            onto.rows_with_step_mut(index, d, count - 1).copy_from(&own);
         }
         onto
+    }
+}
+
+/// The Jacobian of one sample, `d x 18`.
+fn jacobian(rows: &DMatrix<f64>, index: usize, d: usize) -> DMatrix<f64> {
+    let count = rows.nrows() / d;
+    rows.rows_with_step(index, d, count - 1).into_owned()
+}
+
+/// Samples that a Jacobian belongs to: its own, or all `n` if it is the only one.
+fn samples(n: usize, count: usize, index: usize) -> Range<usize> {
+    match count {
+        1 => 0..n,
+        _ => index..index + 1,
     }
 }
 
