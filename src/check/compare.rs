@@ -68,7 +68,7 @@ pub struct Difference {
 
 /// A term and its coefficient in both files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct TermDifference {
+pub struct TermDifference {
     /// The term in the grammar of candidate terms.
     pub term: String,
     /// Coefficient in the first file, 0 without the term.

@@ -8,7 +8,7 @@ use crate::model::{LatentVariable, MAX_LATENT_DIM};
 
 /// A range per variable and phase; -1 to 1 where there is none.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct CheckDomain {
+pub struct CheckDomain {
     phases: BTreeMap<String, BTreeMap<String, [f64; 2]>>,
 }
 

@@ -20,7 +20,7 @@ const DIGITS: usize = 9;
 
 /// A reference of a controller: samples in columns, SI units.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct PlannedJump {
+pub struct PlannedJump {
     /// Time of each sample, s.
     pub time_s: Vec<f64>,
     /// States, 18 x n.

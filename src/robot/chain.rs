@@ -31,10 +31,7 @@ pub struct Moved<T> {
 }
 
 /// A number of the formulas: a float, or a value of a program that is being built.
-pub(crate) trait Value:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
-{
-}
+pub trait Value: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
 
 impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Value for T {}
 

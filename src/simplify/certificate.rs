@@ -36,7 +36,7 @@ impl std::iter::Sum for BeforeAfter {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum ChangeKind {
+pub enum ChangeKind {
     Dropped,
     Constant,
     /// A straight line took its place: multiples of variables, perhaps with a constant.

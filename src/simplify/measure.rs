@@ -13,7 +13,7 @@ use crate::typeset::{Decimal, Rounding};
 
 /// How large an error is at recorded samples (scaled units per second squared).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(crate) struct Measured {
+pub struct Measured {
     pub max: f64,
     pub rms: f64,
 }

@@ -14,7 +14,7 @@ const BODY: &str = "body.";
 
 /// Errors of a model's rollouts in the robot's body coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct RolloutErrors {
+pub struct RolloutErrors {
     /// Root mean squares of each coordinate: whole jumps, restarted.
     pub rms: Vec<[Option<f64>; 2]>,
     /// Windows that diverged: whole jumps, restarted.

@@ -92,7 +92,7 @@ impl Shard {
 }
 
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum StudyError {
+pub enum StudyError {
     #[error("{found}, expected {expected}")]
     Range {
         found: String,

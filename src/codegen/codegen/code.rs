@@ -70,7 +70,7 @@ pub enum Role {
 
 /// A parameter of a generated function, in a language or, with a text for a name, in any.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Parameter<N = Ident> {
+pub struct Parameter<N = Ident> {
     pub name: N,
     /// Number of elements; an output may have none.
     pub len: usize,

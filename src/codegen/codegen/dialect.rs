@@ -9,7 +9,7 @@ use super::options::Precision;
 use crate::ir::{Table, Unary};
 
 /// The patterns of a language. Those with two entries are for double and single precision.
-pub(crate) struct Spelling {
+pub struct Spelling {
     /// Words that no variable may be called, with blanks between them.
     pub reserved: &'static str,
     pub reals: [&'static str; 2],

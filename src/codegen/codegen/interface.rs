@@ -10,7 +10,7 @@ use crate::model::{ModelError, ReducedModel};
 
 /// A function to be generated from a program.
 #[derive(Clone, Debug)]
-pub(crate) struct FunctionSpec {
+pub struct FunctionSpec {
     pub name: String,
     pub program: Program,
     pub parameters: Vec<Parameter<String>>,

@@ -211,7 +211,7 @@ fn accumulate<T: Real>(table: &Table<T>, weights: &[ValueId], first: usize, valu
 /// A number that programs compute with: `f64` or `f32`.
 ///
 /// Each operator rounds once, as generated code does with contraction off.
-pub(crate) trait Real:
+pub trait Real:
     Copy
     + Debug
     + PartialEq

@@ -32,7 +32,7 @@ pub struct Equation {
 
 /// Every candidate term that is printed somewhere, with its coefficients.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct CoefficientTable {
+pub struct CoefficientTable {
     /// Column heads: the acceleration, with the phase it belongs to, and its unit where that is physical.
     pub columns: Vec<(String, Symbol, Option<Unit>)>,
     /// In library order.
@@ -41,7 +41,7 @@ pub(crate) struct CoefficientTable {
 
 /// One candidate term and its coefficient in each column.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct CoefficientRow {
+pub struct CoefficientRow {
     pub term: Math,
     /// Unit of the term, for equations in physical units; that of a coefficient is the column's over this.
     pub unit: Option<Unit>,

@@ -76,7 +76,7 @@ pub struct Symbol {
 
 /// A letter or word inside a symbol.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) enum Glyph {
+pub enum Glyph {
     /// One Latin letter, italic.
     Letter(char),
     /// A Greek letter, by its place in `GREEK`.

@@ -9,7 +9,7 @@ use super::table::{rounded, rounded_up};
 use super::tree::{Math, Signed};
 
 /// How a sentence spells words from outside and mathematics.
-pub(crate) trait Spelling {
+pub trait Spelling {
     /// Text, so that it shows as it is.
     fn text(text: &str) -> String;
     /// Mathematics within a line or cell, which `text` spells in the library's syntax.

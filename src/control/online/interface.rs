@@ -246,7 +246,7 @@ impl<const D: usize> Handle<D> {
     }
 
     /// Forgets plan and past measurements, but not the reference.
-    pub(crate) fn reset(&mut self) {
+    pub fn reset(&mut self) {
         let controller = &mut self.controller;
         if catch_unwind(AssertUnwindSafe(|| controller.reset())).is_err() {
             self.is_broken = true;

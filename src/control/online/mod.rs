@@ -62,7 +62,6 @@ pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
 pub use linearise::LatentDynamics;
 pub use plan::Plan;
 pub use problem::to_upright;
-pub(crate) use problem::upright;
 pub use prune::needed_rows;
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, SparseColumns, sparse};
 pub use reference::{Reference, ReferenceSamples};

@@ -90,7 +90,7 @@ pub struct StageRows {
 
 /// Rows of the body force that a latent input is lifted to.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct BodyFriction {
+pub struct BodyFriction {
     /// Friction coefficient.
     pub coefficient: f64,
     /// Force over the robot's weight along x, y and z of the model's frame, `3 × latent_dim` row-major.

@@ -17,7 +17,7 @@ pub(crate) type Directions = [Vector3<f64>; 5];
 
 /// Axes and directions of one leg in the world, unit vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LegFrame {
+pub struct LegFrame {
     /// Axis of abduction.
     pub abduction: Vector3<f64>,
     /// Axis of flexion and of the knee.

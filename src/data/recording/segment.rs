@@ -182,7 +182,7 @@ impl Segment {
     }
 
     /// Whether there is no sample.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
 

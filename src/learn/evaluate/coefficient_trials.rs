@@ -20,7 +20,7 @@ const UNNAMED: f64 = 4.0;
 const NO_RESIDUAL: f64 = 1e-9;
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CoefficientSlip {
+pub struct CoefficientSlip {
     /// The option that states another order of the terms.
     pub order: Option<String>,
     /// Two phases that have each other's coefficients.

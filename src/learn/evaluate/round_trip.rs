@@ -39,7 +39,7 @@ pub struct RoundTrip {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum AccelerationSlip {
+pub enum AccelerationSlip {
     Coefficients(CoefficientSlip),
     InputFactor(f64),
     /// The mean of the training has to be taken off states; the maps hide it where they reproduce it.
@@ -48,7 +48,7 @@ pub(crate) enum AccelerationSlip {
 
 /// What a foreign model is easily given wrong: order or scaling of the coordinates, or both.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Slip {
+pub struct Slip {
     order: Option<CoordinateOrder>,
     scaling: Option<ScalingSlip>,
 }

@@ -171,10 +171,6 @@ impl Verdict {
         let mut failed = self.failed.iter();
         failed.any(|of| [TORQUES, CONTROL].contains(&of.as_str()))
     }
-
-    pub(crate) fn failures(&self) -> impl Iterator<Item = &VerdictRow> {
-        self.rows.iter().filter(|row| row.is_failed())
-    }
 }
 
 /// The verdict on a model from its rollouts and the controller's figures along each recording; without these, torques

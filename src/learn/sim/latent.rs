@@ -66,7 +66,7 @@ impl LatentSegment {
         self.time_s.len()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
 

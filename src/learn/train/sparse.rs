@@ -28,7 +28,7 @@ pub(super) struct Regression {
 /// When a term of the library is dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Pruning {
+pub enum Pruning {
     /// Sequential thresholding: drop every term whose contribution `|xi| rms(term) / rms(ddz)` is below this, solve
     /// again, until none is.
     Threshold(f64),

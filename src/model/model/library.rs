@@ -196,7 +196,7 @@ impl Library {
     }
 
     /// Never true of a library that was built.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }
 

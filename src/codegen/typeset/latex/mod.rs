@@ -37,7 +37,6 @@ mod nomenclature;
 mod table;
 
 pub use document::emit;
-pub(crate) use escape::label;
 pub use escape::tex_text;
 pub use lines::tex_cases;
 pub(crate) use math::{tex, tex_symbol, tex_unit};

@@ -52,7 +52,7 @@ impl Default for LossWeights {
 
 /// Values of the terms, unweighted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub(crate) struct Losses {
+pub struct Losses {
     /// Mean square of `x - x_dec` (16), with coordinate weights if there are any.
     pub decoder: f64,
     /// Mean square of `ddz - ddz_pred` (17).
