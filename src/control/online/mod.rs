@@ -8,12 +8,13 @@
 // Loops over indices are what C is made of.
 #![allow(
     clippy::assign_op_pattern,
+    clippy::manual_clamp,
     clippy::manual_memcpy,
+    clippy::manual_range_contains,
     clippy::needless_range_loop,
     clippy::too_many_arguments,
     clippy::unnecessary_cast
 )]
-
 mod command;
 mod conic;
 mod control_model;

@@ -43,7 +43,7 @@ impl Value {
     }
 
     /// The same in the place of a real: a whole number for a literal that is one, else its nearest real.
-    fn as_real(self) -> Self {
+    fn into_real(self) -> Self {
         if self.ty != Type::Double || !self.is_literal() {
             return self;
         }
@@ -143,7 +143,7 @@ impl Writer<'_> {
     ) -> Found {
         let value = self.value_of(here, expression, expected)?;
         Ok(match expected {
-            Some(Type::Real) => value.as_real(),
+            Some(Type::Real) => value.into_real(),
             _ => value,
         })
     }
@@ -303,9 +303,9 @@ impl Writer<'_> {
             self.value(here, &binary.right)?,
         );
         if left.ty == Type::Real {
-            right = right.as_real();
+            right = right.into_real();
         } else if right.ty == Type::Real {
-            left = left.as_real();
+            left = left.into_real();
         }
         let Some((sign, rank, is_condition)) = operator(&binary.op) else {
             return Err(self.outside(here, binary, "this operator"));
