@@ -329,13 +329,15 @@ vectorised! {
 #[inline(always)]
 fn dot(left: &[f64], right: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
-    let (a, b) = (left.chunks_exact(LANES), right.chunks_exact(LANES));
-    let rest = a.remainder().iter().zip(b.remainder());
-    let rest: f64 = rest.map(|(x, y)| x * y).sum();
-    for (a, b) in a.zip(b) {
-        for ((sum, x), y) in sums.iter_mut().zip(a).zip(b) {
-            *sum += x * y;
+    let ((a, left), (b, right)) = (left.as_chunks::<LANES>(), right.as_chunks::<LANES>());
+    for (index, a) in a.iter().enumerate() {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[index][lane];
         }
+    }
+    let mut rest = 0.0;
+    for (index, x) in left.iter().enumerate() {
+        rest += x * right[index];
     }
     rest + sums.iter().sum::<f64>()
 }

@@ -1,6 +1,7 @@
 //! Latent inputs of a batch, forwards and backwards: `u_lat = pinv(J^T) u = (J J^T)^-1 J u` with the Jacobian `J` of
 //! the encoder at every sample; directions that are nearly dependent are damped.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
@@ -29,10 +30,7 @@ impl InputProjections {
         let inverses = (0..count).map(|index| {
             let (jacobian, samples) = (jacobian(rows, index, d), samples(u.nrows(), count, index));
             let inverse = inverse(&jacobian * jacobian.transpose());
-            let onto = product(
-                &u.rows_range(samples.clone()).into_owned(),
-                &jacobian.transpose(),
-            );
+            let onto = product(&part(u, &samples), &jacobian.transpose());
             let latent = product(&onto, &inverse);
             carried += onto.dot(&latent);
             u_lat.rows_range_mut(samples).copy_from(&latent);
@@ -63,15 +61,12 @@ impl InputProjections {
         let mut onto = DMatrix::zeros(rows.nrows(), rows.ncols());
         for (index, inverse) in self.inverses.iter().enumerate() {
             let (jacobian, samples) = (jacobian(rows, index, d), samples(n, count, index));
-            let v = self.u_lat.rows_range(samples.clone()).into_owned();
-            let w = product(
-                &onto_u_lat.rows_range(samples.clone()).into_owned(),
-                inverse,
-            );
-            let rest = u.rows_range(samples) - product(&v, &jacobian);
+            let v = part(&self.u_lat, &samples);
+            let w = product(&part(onto_u_lat, &samples), inverse);
+            let rest = part(u, &samples).as_ref() - product(&v, &jacobian);
             let mut own = DMatrix::zeros(d, rows.ncols());
-            add_transposed(&mut own, &(&w - &v * (2.0 * lift)), &rest);
-            add_transposed(&mut own, &-v, &product(&w, &jacobian));
+            add_transposed(&mut own, &(&w - v.as_ref() * (2.0 * lift)), &rest);
+            add_transposed(&mut own, &-v.as_ref(), &product(&w, &jacobian));
             onto.rows_with_step_mut(index, d, count - 1).copy_from(&own);
         }
         onto
@@ -89,6 +84,14 @@ fn samples(n: usize, count: usize, index: usize) -> Range<usize> {
     match count {
         1 => 0..n,
         _ => index..index + 1,
+    }
+}
+
+/// Rows of a matrix, which are copied unless they are all.
+fn part<'m>(matrix: &'m DMatrix<f64>, samples: &Range<usize>) -> Cow<'m, DMatrix<f64>> {
+    match samples.len() == matrix.nrows() {
+        true => Cow::Borrowed(matrix),
+        false => Cow::Owned(matrix.rows_range(samples.clone()).into_owned()),
     }
 }
 
