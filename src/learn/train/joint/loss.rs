@@ -104,10 +104,10 @@ impl Encoded {
         let mut stack = (parameters.encoder).forward(frame.enter(batch), batch.samples(), tape);
         stack *= frame.latent;
         let jacobians = parameters.encoder.jacobian(tape);
-        let mut rows = jacobians.rows.clone();
+        let mut rows = jacobians.at_samples(batch.samples(), stack.ncols());
         frame.scale_jacobian(&mut rows);
         Self {
-            projections: InputProjections::new(&rows, &batch.u, stack.ncols()),
+            projections: InputProjections::new(&rows, &batch.u),
             stack,
             jacobians,
             rows,
@@ -292,7 +292,8 @@ impl<'a> JointLoss<'a> {
         self.frame.scale_jacobian(&mut onto_rows);
         let (encoder, tape) = (&parameters.encoder, &self.encoder_tape);
         let own = &mut self.gradient.encoder;
-        let at_affine = encoder.jacobian_adjoint(tape, &encoded.jacobians, &onto_rows, own);
+        let onto_jacobians = encoded.jacobians.of_samples(&onto_rows, n);
+        let at_affine = encoder.jacobian_adjoint(tape, &encoded.jacobians, &onto_jacobians, own);
         encoder.backward(tape, onto_stack * self.frame.latent, &at_affine, own);
         1.0 - projections.carried / total
     }

@@ -6,6 +6,8 @@
 //! sweep in the other direction ([`Network::jacobian`]), one for each output, stacked the same way. The reverse sweeps
 //! of both are exact; of elu at zero, where `phi''` jumps, the derivatives of the negative side are taken.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Activation;
@@ -51,6 +53,38 @@ pub(super) struct Jacobians {
     pub rows: DMatrix<f64>,
     at_affine: Vec<DMatrix<f64>>, // per layer: derivative of every output with respect to a
     at_output: Vec<DMatrix<f64>>, // the same with respect to phi(a); empty for the last layer
+}
+
+impl Jacobians {
+    /// The rows for each of `n` samples, `(outputs n) x inputs`.
+    pub(super) fn at_samples(&self, n: usize, outputs: usize) -> DMatrix<f64> {
+        let own = self.rows.nrows() / outputs;
+        let mut rows = DMatrix::zeros(outputs * n, self.rows.ncols());
+        for (mut column, from) in rows.column_iter_mut().zip(self.rows.column_iter()) {
+            let blocks = column.as_mut_slice().chunks_exact_mut(n);
+            for (block, from) in blocks.zip(from.as_slice().chunks_exact(own)) {
+                match from {
+                    [same] => block.fill(*same),
+                    _ => block.copy_from_slice(from),
+                }
+            }
+        }
+        rows
+    }
+
+    /// The adjoint of [`Self::rows`], of that of the rows [at `n` samples](Self::at_samples).
+    pub(super) fn of_samples<'m>(
+        &self,
+        adjoint: &'m DMatrix<f64>,
+        n: usize,
+    ) -> Cow<'m, DMatrix<f64>> {
+        if self.rows.nrows() == adjoint.nrows() {
+            return Cow::Borrowed(adjoint);
+        }
+        let sum = |i: usize, k: usize| adjoint.column(k).as_slice()[i * n..][..n].iter().sum();
+        let (outputs, inputs) = self.rows.shape();
+        Cow::Owned(DMatrix::from_fn(outputs, inputs, sum))
+    }
 }
 
 impl Network {
