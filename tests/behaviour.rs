@@ -49,16 +49,20 @@ fn for_all<T: Send>(entries: &[Entry], work: impl Fn(&Entry) -> T + Sync) -> Vec
 fn commands_print_and_write_what_they_did() {
     let path = folder().join("recorded.txt.gz");
     let mut entries = entries(&folder().join("commands.txt"));
+    let wanted = std::env::var("ROMC_COMMANDS").unwrap_or_default();
     if std::env::var("ROMC_RECORD").is_ok() {
-        let recorded = for_all(&entries, |entry| {
+        let mut recorded = read_recorded(&path);
+        entries.retain(|entry| entry.name.contains(&wanted));
+        let anew = for_all(&entries, |entry| {
             let [first, second, third] = [(); 3].map(|()| entry.run().0);
             first.masked(&second).masked(&third)
         });
-        return write_recorded(&path, &recorded);
+        recorded.extend(anew.into_iter().map(|entry| (entry.name.clone(), entry)));
+        return write_recorded(&path, recorded.values());
     }
     let recorded = read_recorded(&path);
     let pairs = changed(&folder().join("changed.txt"));
-    if let Ok(wanted) = std::env::var("ROMC_COMMANDS") {
+    if !wanted.is_empty() {
         entries.retain(|entry| entry.name.contains(&wanted));
     } else if !tools::is_thorough() {
         // The test command stays within minutes: trainings, studies, plans and pages run where everything is asked for.

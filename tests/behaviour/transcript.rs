@@ -313,7 +313,7 @@ pub fn read_recorded(path: &Path) -> BTreeMap<String, Transcript> {
         .collect()
 }
 
-pub fn write_recorded(path: &Path, recorded: &[Transcript]) {
+pub fn write_recorded<'t>(path: &Path, recorded: impl IntoIterator<Item = &'t Transcript>) {
     let mut file = GzEncoder::new(File::create(path).expect("a file"), Compression::best());
     for transcript in recorded {
         writeln!(
