@@ -21,7 +21,7 @@ const LONGEST_TEXT: usize = 40_000;
 /// Lines of one entry: `$ command`, `1 ` and `2 ` before what went to stdout and stderr, `exit CODE`, `file PATH` with
 /// `| ` before its text.
 pub struct Transcript {
-    name: String,
+    pub name: String,
     lines: Vec<String>,
 }
 
