@@ -2,7 +2,7 @@
 //!
 //! [`Equations`](crate::equations::Equations) enter [`emit()`]; files in memory leave, which
 //! [`write_files`](crate::files::write_files) puts into a folder. Equations come from `typeset`, code from `codegen`;
-//! `controller` adds the sources of `mpc/online` and `robot` and the model's numbers. Read `emit` first.
+//! `controller` adds the sources of `romc-control` and `romc-robot` and the model's numbers. Read `emit` first.
 
 /// Templates of whole files, each a struct of its first line and the `Facts` of its module. The caller writes the
 /// derive: askama looks for files from where it stands.
