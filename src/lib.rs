@@ -9,7 +9,7 @@
 //! |---|---|---|
 //! | [`recording`] | CSV files | [`Recording`](recording::Recording): segments of samples in SI units |
 //! | [`identify`] | recordings | gravity, mass and the joints' losses, with standard errors |
-//! | [`train`], [`study`] | recordings | a [`ReducedModel`](model::ReducedModel) |
+//! | [`train`] | recordings | a [`ReducedModel`](model::ReducedModel) |
 //! | [`artifact`], [`import`] | a model file; tensors or equations of other tools | the same |
 //! | [`equations`] | a model | [`Equations`](equations::Equations): its accelerations as expressions of [`symbolic`] |
 //! | [`simplify`] | a model, a domain, a tolerance | a shorter model with a certificate |

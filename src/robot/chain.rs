@@ -62,7 +62,7 @@ impl<T: Value> Moved<T> {
         }
     }
 
-    /// See [`ChainLeg::levers`].
+    /// See `ChainLeg::levers`.
     pub fn levers(&self) -> [T; 2] {
         let [first, second, third] = self.columns;
         let area = dot(cross(second, third), self.normal);

@@ -93,7 +93,7 @@ impl LegGeometry {
         }
     }
 
-    /// Jacobian of [`Self::foot_position`]: `J[i][j] = d p_i / d q_j`, in m.
+    /// Jacobian of `Self::foot_position`: `J[i][j] = d p_i / d q_j`, in m.
     pub fn foot_jacobian(&self, q: &[f64; 3]) -> Matrix3<f64> {
         match self {
             LegGeometry::Planar(leg) => leg.foot_jacobian(q),

@@ -84,7 +84,7 @@ impl Table {
         }
     }
 
-    /// Starts a table with a row for each item; columns follow by [`Rows::column`].
+    /// Starts a table with a row for each item; columns follow by `Rows::column`.
     pub fn of<T>(items: impl IntoIterator<Item = T>) -> Rows<T> {
         let items: Vec<T> = items.into_iter().collect();
         let table = Self {

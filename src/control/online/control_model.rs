@@ -65,7 +65,7 @@ pub struct ControlPhase {
 
 /// A nonlinear encoder and decoder with their Jacobians, in SI units on the robot's side.
 ///
-/// The matrices of a [`ControlModel`] are then those at one state, and [`ControlModel::tangent_at`] gives the plant of
+/// The matrices of a [`ControlModel`] are then those at one state, and `ControlModel::tangent_at` gives the plant of
 /// another.
 pub trait NonlinearMaps: Debug + Send + Sync {
     /// Writes `z = E(s_x x)`.

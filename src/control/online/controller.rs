@@ -160,7 +160,7 @@ impl Controller {
     /// This sets up the solver anew, for the rows that matter near the trajectory.
     ///
     /// # Errors
-    /// As [`Reference::new`] and [`QpSolver::new`]; the old reference stays.
+    /// As `Reference::new` and [`QpSolver::new`]; the old reference stays.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), ControlError> {
         let mut reference = Reference::new(&self.plant, samples)?;
         if self.plant.is_nonlinear() {

@@ -24,7 +24,7 @@
 //!   the model is the drift; otherwise `e_k = x_r,k+1 − F(x_r,k, u_r,k)`, so that the reference is
 //!   itself a trajectory and the model answers for deviations only.
 //! - Without a recorded input `u_r` is estimated from the reference's accelerations
-//!   ([`estimate`](super::estimate)) or, if asked for, the phase's mean training input.
+//!   (`estimate`) or, if asked for, the phase's mean training input.
 //! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`; `R` turns a force in the body's axes
 //!   upright by the reference's roll and pitch, and leaves one in the world's as it is. `ℓ_k` is what
 //!   the joints take of the motors' torques along the reference, zero in a model without actuators.

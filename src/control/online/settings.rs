@@ -38,7 +38,7 @@ pub enum Drift {
 /// What stands for the input of a reference that comes without one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MissingInput {
-    /// What the model finds behind the reference's accelerations, see [`estimate`](super::estimate).
+    /// What the model finds behind the reference's accelerations, see `estimate`.
     Estimate,
     /// The mean training input of each phase: the optimisation has to find the rest.
     Mean,

@@ -1,12 +1,11 @@
 //! Jumps that nobody recorded: a goal in, a trajectory of the model's coordinates out.
 //!
-//! In: a model with landmarks and prior of its training jumps ([`JumpPrior`]), a [`Goal`]. Out: a [`Plan`], which is a
+//! In: a model with landmarks and prior of its training jumps (`JumpPrior`), a [`Goal`]. Out: a [`Plan`], which is a
 //! recording that every other part of romc takes, and how far it is from what was recorded. Read `transcribe` first,
 //! which states the program; `seed` makes the trajectory it starts from, `solve` solves it by sequential convex
-//! programs on [`QpSolver`], `motion` samples the result and checks it between the nodes, `verdict` says whether to
+//! programs on `QpSolver`, `motion` samples the result and checks it between the nodes, `verdict` says whether to
 //! trust it.
 //!
-//! [`JumpPrior`]: crate::model::JumpPrior [`QpSolver`]: crate::mpc::QpSolver
 //!
 //! ```
 //! use romc::plan::Goal;
