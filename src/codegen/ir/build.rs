@@ -71,7 +71,7 @@ impl ProgramBuilder {
     }
 
     /// A scalar operation on two values.
-    pub(crate) fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
+    pub fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
         let (low, high) = match op {
             Binary::Add | Binary::Mul => (a.min(b), a.max(b)),
             Binary::Sub | Binary::Div | Binary::Pow => (a, b),

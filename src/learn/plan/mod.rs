@@ -6,7 +6,6 @@
 //! programs on `QpSolver`, `motion` samples the result and checks it between the nodes, `verdict` says whether to
 //! trust it.
 //!
-//!
 //! ```
 //! use romc::plan::Goal;
 //!

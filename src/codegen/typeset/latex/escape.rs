@@ -64,11 +64,6 @@ fn is_plain(character: char) -> bool {
 }
 
 /// A name reduced to what a `\label` and a file name can hold: ASCII letters and digits, everything else a hyphen.
-///
-/// ```
-/// use romc::typeset::latex::label;
-/// assert_eq!(label(r"rear stance_2}\b%"), "rear-stance-2--b-");
-/// ```
 pub(crate) fn label(name: &str) -> String {
     name.chars()
         .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
