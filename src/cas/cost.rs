@@ -64,7 +64,7 @@ impl Costs {
 }
 
 impl ExprPool {
-    /// How long `expr` is to a reader, in characters weighed by what they cost to take in; see the module's table.
+    /// The length of `expr` in weighted characters; the weights stand in the module's table.
     /// Saturates.
     pub fn cost(&self, expr: ExprId) -> u64 {
         Costs::default().of(self, expr)

@@ -186,8 +186,8 @@ impl ExprPool {
         self.combine_angles(inside)
     }
 
-    /// `1/(a + b*sin(x)) = (a - b*sin(x))/(a^2 - b^2*(1 - cos(x)^2))`, for the first angle of a sum with sines to the
-    /// first power.
+    /// `1/(a + b*sin(x)) = (a - b*sin(x))/(a^2 - b^2*(1 - cos(x)^2))`, if `x` is the first angle in the sum and all its
+    /// sines have the power 1.
     pub(super) fn without_sine_below(&mut self, expr: ExprId) -> ExprId {
         let Some((base, -1)) = self.sum_power(expr) else {
             return expr;

@@ -93,7 +93,7 @@ pub(crate) fn read_sides(
 }
 
 impl Side {
-    /// Reads a file in memory; the ending of its name says what it is. `known` are names of phases that labels of LaTeX
+    /// Reads the text of a file, whose format follows from the ending of its name. `known` are names of phases that labels of LaTeX
     /// may end in, besides `contact` and `flight`.
     ///
     /// # Errors

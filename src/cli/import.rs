@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
     let fault = fault.as_deref();
     let mut text = describe(&report) + &lines("note: ", &axes);
     let check = check.map(|check| describe_check(&check, fault));
-    let (words, check) = check.unwrap_or_default();
+    let (words, check) = check.unwrap_or_default(); // nothing, and null, without recordings
     text += &words;
     let (output, name) = (arguments.output.display().to_string(), model.name());
     let _ = writeln!(text, "{output}: model `{name}`");
@@ -257,8 +257,8 @@ fn describe_check(check: &RoundTrip, fault: Option<&str>) -> (String, Value) {
         text.extend(r2.map(|r2| format!("; R^2 of ddz in {phase} {r2:.3}")));
         phases.insert(phase.clone(), json!(r2));
     }
-    for (order, r2) in &check.trials.by_order {
-        let name = order.name().unwrap_or_default();
+    let by_order = check.trials.by_order.iter();
+    for (name, r2) in by_order.filter_map(|(order, r2)| Some((order.name()?, r2))) {
         words.push(format!("{r2:.3} in the order {name}"));
         orders.insert(name.to_owned(), json!(r2));
     }

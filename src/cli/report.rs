@@ -31,6 +31,7 @@ pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     progress.set_message("running the controller");
     let can_control = without_statistics(&model).is_none();
     let runs = can_control.then(|| run_with_both_lifts(&model, &recordings));
+    // Without statistics of the inputs there are no runs, and the page says so.
     let [plain, consistent] = runs.transpose()?.unwrap_or_default();
     progress.set_message("drawing");
     let paths = recordings.iter().map(|recording| &recording.path);

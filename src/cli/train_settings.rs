@@ -128,7 +128,7 @@ impl TrainSettings {
                 "torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
             ));
         });
-        options.actuators = found.ok();
+        options.actuators = found.ok(); // the note has the reason
         Ok(())
     }
 

@@ -249,3 +249,31 @@ fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
     let count = counted(table.len(), "jump");
     Ok(table.captioned(format!("{count} of the recordings")))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn headline_lists_what_a_model_is_fit_for_and_what_not() {
+        let uses = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        let of = |fit: &[&str], failed: &[&str]| {
+            let verdict = Verdict {
+                fit_for: uses(fit),
+                failed: uses(failed),
+                rows: Vec::new(),
+            };
+            headline(&verdict, false)
+        };
+        let predictions = ["0.1 s", "whole motion"];
+        assert_eq!(
+            of(&predictions, &["torques", "control"]),
+            "Fit for predictions over 0.1 s and predictions of the whole motion; not fit for torques and control."
+        );
+        assert_eq!(of(&["control"], &[]), "Fit for control.");
+        assert_eq!(of(&[], &["torques"]), "Not fit for torques.");
+        assert!(of(&[], &[]).starts_with("Not judged"));
+        let doubtful = headline(&Verdict::default(), true);
+        assert!(doubtful.starts_with("Do not rely on it here"), "{doubtful}");
+    }
+}

@@ -236,3 +236,57 @@ fn halves(
     }
     halves
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ranges(terms: &[&str], lo: f64, hi: f64) -> Ranges {
+        let mut pool = ExprPool::new();
+        let exprs: Vec<ExprId> = (terms.iter())
+            .map(|text| pool.parse(text, &|_| true).expect("terms parse"))
+            .collect();
+        let symbols: std::collections::BTreeSet<SymbolId> = exprs
+            .iter()
+            .flat_map(|&expr| pool.symbols_of(expr))
+            .collect();
+        let domain = symbols.into_iter().map(|s| (s, Interval::new(lo, hi)));
+        let domain = domain.collect();
+        Ranges::new(pool, domain, exprs)
+    }
+
+    #[test]
+    fn coefficients_anywhere_in_their_intervals_are_covered() {
+        let mut ranges = ranges(&["sin(x)", "x"], -1.0, 1.0);
+        let parts = [(0, Interval::new(0.9, 1.1)), (1, Interval::new(-1.0, -0.8))];
+        let range = ranges.combination(&parts);
+        let largest = 1.1 * 1f64.sin() - 0.8;
+        assert!(
+            range.contains(largest) && range.contains(-largest),
+            "{range}"
+        );
+    }
+
+    #[test]
+    fn many_terms_that_share_variables_are_bounded_no_worse_than_one_by_one() {
+        let texts = ["x", "sin(x)", "x*y", "y*cos(x)", "x^2*y", "y^2", "cos(x*y)"];
+        let mut ranges = ranges(&texts, -1.0, 2.0);
+        let parts = [0.3, -0.3, 0.2, -0.7, 0.1, 0.4, -0.9];
+        let parts: Vec<Part> = (parts.iter().enumerate())
+            .map(|(row, delta)| (row, Interval::point(*delta)))
+            .collect();
+        let one_by_one = (parts.iter())
+            .map(|&(row, delta)| delta * ranges.term(row))
+            .fold(Interval::point(0.0), |sum, range| sum + range);
+        let together = ranges.combination(&parts);
+        assert!(one_by_one.lo() < together.lo() && together.hi() < one_by_one.hi());
+        let corners = [(-1.0, -1.0), (2.0, 2.0), (-1.0, 2.0), (2.0, -1.0)];
+        for (x, y) in corners.into_iter().chain([(0.7, 1.3)]) {
+            let (sin, cos) = (f64::sin(x), f64::cos(x));
+            let values = [x, sin, x * y, y * cos, x * x * y, y * y, (x * y).cos()];
+            let products = parts.iter().zip(values);
+            let sum: f64 = products.map(|(part, v)| part.1.lo() * v).sum();
+            assert!(together.contains(sum), "{together} {sum}");
+        }
+    }
+}

@@ -10,7 +10,7 @@
 //! these fit, and as floats beyond.
 //!
 //! `search.rs` replaces group by group, `groups.rs` finds the groups, `forms.rs` the shortest form of one,
-//! `agreement.rs` compares it with what it replaces. Read `search.rs` first.
+//! `agreement.rs` compares the shorter form with the group in intervals and at points. Read `search.rs` first.
 
 mod agreement;
 mod forms;

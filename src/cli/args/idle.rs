@@ -58,7 +58,7 @@ impl Arguments {
 struct Needed(&'static str, bool);
 
 impl Needed {
-    /// Refuses a flag that was given, unless what it needs is there.
+    /// [`Error::Idle`] for a flag that was given without the option that it depends on.
     fn by(self, flag: &'static str, is_given: bool) -> Result<(), Error> {
         let Self(needs, is_there) = self;
         match is_given && !is_there {

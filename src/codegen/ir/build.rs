@@ -61,7 +61,7 @@ impl ProgramBuilder {
     }
 
     /// A constant.
-    pub(crate) fn constant(&mut self, value: f64) -> ValueId {
+    pub fn constant(&mut self, value: f64) -> ValueId {
         self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
     }
 

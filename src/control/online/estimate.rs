@@ -211,6 +211,57 @@ fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DM
 mod tests {
     use super::*;
 
+    /// `dz = t^2` before the edge at sample 20, 5 after it, every 2 ms.
+    struct Parabola;
+
+    impl Trajectory for Parabola {
+        fn latent_dim(&self) -> usize {
+            1
+        }
+
+        fn count(&self) -> usize {
+            40
+        }
+
+        fn time_s(&self, sample: usize) -> f64 {
+            0.002 * sample as f64
+        }
+
+        fn phase(&self, sample: usize) -> usize {
+            usize::from(sample >= 20)
+        }
+
+        fn write_position(&self, _: usize, z: &mut [f64]) {
+            z[0] = 0.0;
+        }
+
+        fn write_velocity(&self, sample: usize, dz: &mut [f64]) {
+            dz[0] = if sample < 20 {
+                self.time_s(sample).powi(2)
+            } else {
+                5.0
+            };
+        }
+
+        fn write_input(&self, _: usize, input: &mut [f64]) {
+            input[0] = 0.0;
+        }
+    }
+
+    #[test]
+    fn slope_of_a_parabola_is_its_derivative_inside_and_stops_at_the_phases_edge() {
+        let slope = |sample: usize| {
+            let mut slope = [0.0];
+            Parabola.write_acceleration(sample, &mut slope);
+            slope[0]
+        };
+        assert!((slope(10) - 0.04).abs() < 1e-12);
+        // One-sided at the edge: the slope at the middle of the eight samples before it.
+        let middle = Parabola.time_s(19) + Parabola.time_s(11);
+        assert!((slope(19) - middle).abs() < 1e-12);
+        assert!(slope(20).abs() < 1e-9);
+    }
+
     #[test]
     fn states_set_what_is_expected_and_accelerations_correct_it() {
         let number = |value: f64| DMatrix::from_element(1, 1, value);

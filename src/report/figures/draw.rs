@@ -334,3 +334,30 @@ fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
     };
     (low - margin, high + margin)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_mark_of_a_runaway_prediction_stays_inside_the_frame() {
+        let line =
+            |role, values: [f64; 3]| Series::over(role, &[0.0, 1.0, 2.0], |k| Some(values[k]));
+        let lines = vec![
+            line(Role::Recorded, [0.2, 0.3, 0.25]),
+            line(Role::Full, [0.2, 0.21, -1e9]),
+            line(Role::Limit, [3.0; 3]),
+        ];
+        let panel = Panel::shaded("body.z, m", lines, vec![(1.0, 9.0)]);
+        let marks = draw_panel(&panel, (240.0, 150.0), "time, s");
+        let lines = marks.iter().filter_map(|mark| match mark {
+            Mark::Line(points, _) => Some(points),
+            Mark::Rectangle(..) | Mark::Rule(..) | Mark::Text(..) => None,
+        });
+        let points: Vec<_> = lines.flatten().collect();
+        // three recorded, two before the prediction leaves, three of the limit
+        assert_eq!(points.len(), 8);
+        let inside = |p: &&(f64, f64)| (0.0..=240.0).contains(&p.0) && (0.0..=150.0).contains(&p.1);
+        assert!(points.iter().all(inside));
+    }
+}
