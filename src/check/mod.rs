@@ -22,13 +22,12 @@
 //! ```
 
 mod compare;
-mod domain;
 mod point;
 mod side;
 
 pub(crate) use compare::TermDifference;
 pub use compare::{Comparison, Difference, EquationComparison, PhaseComparison, Verdict, compare};
-pub(crate) use domain::CheckDomain;
+pub(crate) use point::CheckDomain;
 pub use point::Gap;
 pub(crate) use side::read_sides;
 pub use side::{CheckError, Side};

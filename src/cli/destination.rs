@@ -1,10 +1,31 @@
 //! Where a command may write: its output says its format by its ending, and is none of the files that the command
 //! reads.
+//!
+//! What every command reads, and its words and progress.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use super::args::ReadingArguments;
 use super::*;
-use crate::files::{Emitted, write_files_since};
+use crate::Error;
+use crate::files::{Emitted, Overwrite, is_invisible, read_toml, write_files_since, write_whole};
+use crate::model::ReducedModel;
+use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
 use crate::report::{Figure, figure_files};
+use crate::robot::Robot;
+use crate::train::sha256;
+
+pub use crate::files::{
+    shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
+};
 
 /// What an output file holds: the endings that it may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,4 +169,216 @@ impl<'a> Inputs<'a> {
         answer.json["figures"] = names(&written).into();
         Ok(())
     }
+}
+
+/// Writes a whole file, unless it is there, also since a moment ago, and may not be replaced.
+pub(super) fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
+    let written = write_whole(path, overwrite, |out| out.write_all(contents));
+    let path = path.to_owned();
+    written.map_err(|source| match source.kind() {
+        std::io::ErrorKind::AlreadyExists => Error::Exists(path),
+        _ => Error::Write { path, source },
+    })
+}
+
+pub(super) fn read_text(path: &Path) -> Result<String, Error> {
+    read_toml(path).map_err(|source| Error::Read {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+pub(super) fn read_settings<T: DeserializeOwned>(
+    path: &Path,
+    check: impl Fn(&T) -> Result<(), String>,
+) -> Result<T, Error> {
+    let settings = toml::from_str(&read_text(path)?)
+        .map_err(|error| Error::refused(path, error.to_string().trim_end()))?;
+    check(&settings).map_err(|message| Error::refused(path, message))?;
+    Ok(settings)
+}
+
+/// The reader that the arguments ask for, with this treatment of clocks unless they name another.
+pub(super) fn reader(
+    arguments: &ReadingArguments,
+    clocks: Clocks,
+    robot: Option<&'static Robot>,
+) -> Result<Reader, Error> {
+    let map = arguments.columns.as_deref().map(ColumnMap::read);
+    let reader = Reader::new(map.transpose()?, arguments.clock.unwrap_or(clocks));
+    Ok(match robot {
+        Some(robot) => reader.for_robot(robot),
+        None => reader,
+    })
+}
+
+pub(super) fn read_for(
+    model: &ReducedModel,
+    paths: &[PathBuf],
+    arguments: &ReadingArguments,
+) -> Result<Vec<Recording>, Error> {
+    read_recordings(paths, arguments, model.robot().ok())
+}
+
+/// The one jump of the recording after `--plan`, of a model's robot.
+pub(super) fn read_jump(
+    model: &ReducedModel,
+    path: &PathBuf,
+    arguments: &ReadingArguments,
+) -> Result<Segment, Error> {
+    let mut recording = read_for(model, std::slice::from_ref(path), arguments)?.swap_remove(0);
+    note_mismatches(&recording, model.robot()?);
+    if let found @ 2.. = recording.segments.len() {
+        let message = format!("--plan takes one jump: found {found} segments");
+        return Err(Error::refused(path, message));
+    }
+    Ok(recording.segments.swap_remove(0))
+}
+
+/// Reads recordings of a robot, if it is known, showing which; what reading did besides goes to stderr.
+pub(super) fn read_recordings(
+    paths: &[PathBuf],
+    arguments: &ReadingArguments,
+    robot: Option<&'static Robot>,
+) -> Result<Vec<Recording>, Error> {
+    note_repeated(&[("recordings", paths.iter().map(PathBuf::as_path).collect())]);
+    read_with(&reader(arguments, Clocks::Repaired, robot)?, paths)
+}
+
+pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
+    let progress = spinner("reading recordings");
+    let mut notes = ReadingNotes::default();
+    let read = (paths.iter())
+        .map(|path| {
+            progress.set_message(printable(&format!("reading {}", path.display())).into_owned());
+            let reading = reader.read(path)?;
+            notes.add(&reading);
+            Ok(reading.recording)
+        })
+        .collect();
+    progress.finish_and_clear();
+    notes.lines().iter().for_each(|line| note(line));
+    read
+}
+
+pub(super) fn note(text: &str) {
+    eprintln!("note: {}", printable(text));
+}
+
+pub(super) fn warn(text: &str) {
+    eprintln!("warning: {}", printable(text));
+}
+
+pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
+    (mismatch::notes(recording, robot).iter()).for_each(|found| note(found));
+}
+
+/// Prints on stderr which recordings are given twice, under whatever name: a jump in two sets judges nothing, and one
+/// that counts twice says less than two.
+pub(super) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
+    let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
+    let of_set = |(set, paths): &(_, Vec<_>)| paths.iter().map(|path| (*set, *path)).collect();
+    let files: Vec<(&str, &Path)> = sets.iter().flat_map::<Vec<_>, _>(of_set).collect();
+    for (set, path) in files.into_iter().filter(|(_, path)| path.is_file()) {
+        let Ok(bytes) = std::fs::read(path) else {
+            continue; // reading it as a recording says why
+        };
+        let digest = sha256(&bytes);
+        let Some((other, earlier)) = first.get(&digest) else {
+            first.insert(digest, (set, path));
+            continue;
+        };
+        let what = match *other == set {
+            true => "and counts twice".to_owned(),
+            false => format!("which is in the {other} set: its {set} figures say too much"),
+        };
+        let (path, earlier) = (path.display(), earlier.display());
+        note(&format!("{path}: the same recording as {earlier}, {what}"));
+    }
+}
+
+/// Prints a note where restarts come later than every recording ends, so that restarted rollouts are whole ones.
+pub(super) fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
+    let segments = recordings.iter().flat_map(|recording| &recording.segments);
+    let longest_s = segments.map(Segment::duration_s).fold(0.0, f64::max);
+    if restart_every_s >= longest_s {
+        note(&format!(
+            "--restart-every {restart_every_s}: no recording is longer ({longest_s:.2} s at most), so that rollouts are never restarted"
+        ));
+    }
+}
+
+/// A text for a terminal: characters that act instead of being shown, as a file's name or cell may have them, are
+/// written out. Line ends and tabs stay.
+pub(super) fn printable(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| c.escape_unicode().to_string())
+}
+
+pub(super) fn printable_json(text: &str) -> Cow<'_, str> {
+    // Those of JSON itself have been escaped, so that all of them are in strings.
+    escaped(text, |c| {
+        let units = c.encode_utf16(&mut [0; 2]).to_vec();
+        units.iter().map(|unit| format!("\\u{unit:04x}")).collect()
+    })
+}
+
+fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
+    let acts = |c: char| is_invisible(c) && !matches!(c, '\n' | '\t');
+    if !text.contains(acts) {
+        return Cow::Borrowed(text);
+    }
+    let shown = |c| if acts(c) { written(c) } else { c.into() };
+    text.chars().map(shown).collect()
+}
+
+/// Each of these on a line of its own, behind the same words.
+pub(super) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
+    let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
+    lines.collect()
+}
+
+pub(super) fn shown(path: &Option<PathBuf>) -> Option<String> {
+    path.as_ref().map(|path| path.display().to_string())
+}
+
+pub(super) fn names(paths: &[PathBuf]) -> Vec<String> {
+    let names = paths.iter().map(|path| path.display().to_string());
+    names.collect()
+}
+
+pub(super) fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
+    (1..=count).map(move |index| format!("{name}_{index}"))
+}
+
+pub(super) fn extend(object: &mut Value, more: Value) {
+    if let (Value::Object(object), Value::Object(more)) = (object, more) {
+        object.extend(more);
+    }
+}
+
+/// The name of a model: as given, or that of its file without folder and ending.
+pub(super) fn named(given: Option<&str>, output: &Path) -> String {
+    let stem = (output.file_stem()).expect("an output without a name is refused");
+    given.map_or_else(|| stem.to_string_lossy().into_owned(), str::to_owned)
+}
+
+/// A spinner on stderr, shown only when stderr is a terminal.
+pub(super) fn spinner(message: &'static str) -> ProgressBar {
+    let bar = styled(ProgressBar::new_spinner(), "{spinner} {msg} [{elapsed}]");
+    bar.enable_steady_tick(Duration::from_millis(120));
+    bar.with_message(message)
+}
+
+/// A bar on stderr for a known number of steps, shown only when stderr is a terminal.
+pub(super) fn progress_bar(message: impl Into<String>) -> ProgressBar {
+    styled(ProgressBar::new(0), "{msg} {wide_bar} {pos}/{len}").with_message(message.into())
+}
+
+fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
+    bar.with_style(ProgressStyle::with_template(template).expect("templates are constants"))
+}
+
+pub(super) fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
+    bar.set_length(total as u64);
+    bar.set_position(done as u64);
 }

@@ -15,7 +15,6 @@ mod import;
 mod inspect;
 mod manual;
 mod mpc;
-mod output;
 mod plan;
 mod prepared_recordings;
 mod report;
@@ -45,8 +44,8 @@ use crate::typeset::words::counted;
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact};
 use args::{Arguments, Command};
+use destination::*;
 use destination::{Format, Inputs};
-use output::*;
 
 /// The result of a command, for people and for programs.
 #[derive(Debug, Clone)]

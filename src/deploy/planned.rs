@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::EmitError;
-use super::controller_c::numbers::{Numbers, integers, list, nested};
+use super::controller_c::source::{Numbers, integers, list, nested};
 use crate::codegen::Precision;
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;

@@ -1,17 +1,15 @@
 //! From assigned tensors to the parts of a model.
 
 mod maps;
-mod units;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::ImportError;
 use super::assign::{Assigned, Assignment, assign};
-use super::library;
 use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
-use super::report::{ImportReport, Layout, UnusedTensor, UsedTensor};
 use super::role::{Part, Role, is_of_optimiser};
+use super::run::{ImportReport, Layout, UnusedTensor, UsedTensor};
 use super::tensors::{TensorFile, TensorInfo, shape_text};
+use super::{ImportError, library};
 use crate::files::Place;
 use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;

@@ -2,8 +2,8 @@
 
 use super::ImportError;
 use super::options::{ImportOptions, PhaseRule};
-use super::report::Chosen;
 use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};
+use super::run::Chosen;
 use super::tensors::{TensorFile, TensorInfo};
 use crate::files::Place;
 

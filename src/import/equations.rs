@@ -14,7 +14,7 @@
 //! names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
 
 use super::ImportError;
-use super::pysindy::tokens;
+use super::library::tokens;
 use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};

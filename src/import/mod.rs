@@ -31,22 +31,20 @@ mod equations;
 mod latent;
 mod latex;
 mod library;
-mod npz;
 mod options;
-mod pysindy;
-mod report;
 mod role;
 mod run;
 mod tensors;
-mod terms;
 
 pub use equations::{Equation, Section, Sections};
 pub use latex::{NameError, SymbolNames};
 pub use library::read_terms;
 pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
-pub use report::{Chosen, ImportReport, Layout, ReadEquation, UnusedTensor, UsedTensor};
 pub use role::{Mapping, Part, Role};
-pub use run::{Imported, import, import_from_bytes, import_tensors, read_equations};
+pub use run::{
+    Chosen, ImportReport, Imported, Layout, ReadEquation, UnusedTensor, UsedTensor, import,
+    import_from_bytes, import_tensors, read_equations,
+};
 pub use tensors::Tensor;
 
 /// A fault and its place: the file, a tensor with its use, a character of a text, or an option.

@@ -6,19 +6,18 @@
 //! imports is what its files import with `use super::*`.
 
 mod contents;
-mod control;
 mod figures;
 mod introduction;
 mod json;
 mod jump;
 mod page;
 mod plan;
-mod provenance;
 mod sections;
 mod tables;
 
-pub(crate) use contents::{Content, all_figures, study_figures};
-pub(crate) use control::{control_figures, without_statistics};
+pub(crate) use contents::{
+    Content, all_figures, control_figures, study_figures, without_statistics,
+};
 pub(crate) use figures::{Figure, figure_files, range};
 pub(crate) use introduction::{Introduction, introduction};
 pub use json::{assessment_json, plan_json};

@@ -20,30 +20,23 @@
 //! # Ok::<(), romc::robot::RobotError>(())
 //! ```
 
-pub mod actuators;
 pub mod chain;
-pub(crate) mod feet;
 pub(crate) mod geometry;
 pub mod input_rule;
 pub mod joints;
-pub mod kinematics;
-pub(crate) mod registry;
 pub(crate) mod wrench;
 
 mod error;
 
-pub use actuators::{Actuators, DRY_SPEED_RAD_S};
-pub use chain::ChainLeg;
+pub use chain::{ChainLeg, PlanarLeg, SINGULAR_BOUND};
 pub use error::RobotError;
-pub use feet::FeetRule;
-pub use geometry::{LegGeometry, LegLinks};
-pub use input_rule::{InputRule, WrenchFrame};
+pub use geometry::{LegGeometry, LegLinks, Robot};
+pub use input_rule::{Actuators, DRY_SPEED_RAD_S, InputRule, WrenchFrame};
 pub use joints::{
     BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
     JOINT_NAMES, Leg, STATE_DIM,
 };
-pub use kinematics::{PlanarLeg, SINGULAR_BOUND};
-pub use registry::Robot;
+pub use wrench::FeetRule;
 
 #[cfg(feature = "serde")]
 mod serialised;

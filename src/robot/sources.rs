@@ -8,7 +8,7 @@ macro_rules! sources {
 
 /// File name and text; `lib.rs` declares this module last, and what stands from there on is not for generated crates.
 pub const SOURCES: &[(&str, &str)] = sources! {
-    actuators chain error feet geometry input_rule joints kinematics lib registry wrench
+    chain error geometry input_rule joints lib wrench
 };
 
 #[cfg(test)]

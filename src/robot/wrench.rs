@@ -4,14 +4,18 @@
 //! `F_k = -J_k^-T tau_k`. Forces are expressed in axes parallel to the body's, and the arm `x_k` of the moment is the
 //! foot in its own hip frame, as in the recordings the method was published with; the moment is `x_k x F_k` (the paper
 //! prints `F_k x x_k`).
+//!
+//! Rules on which feet are on the ground.
+
+use std::fmt;
 
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
 
+use super::chain::SINGULAR_BOUND;
 use super::error::RobotError;
+use super::geometry::Robot;
 use super::input_rule::WrenchFrame;
 use super::joints::{ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg};
-use super::kinematics::SINGULAR_BOUND;
-use super::registry::Robot;
 
 impl Robot {
     /// Force of a leg in contact on the body, in N: `F = -J^-T tau` (equation 4).
@@ -56,8 +60,8 @@ impl Robot {
     ///
     /// Near a singularity small torques would mean any force: a stretched knee, or a foot at the height of its hip,
     /// where the abduction has no lever. There the levers are kept from getting shorter than
-    /// [`LEAST_SPAN`](super::kinematics::LEAST_SPAN) thigh calf over the distance of the foot and
-    /// [`LEAST_HEIGHT`](super::kinematics::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm; everywhere else the
+    /// [`LEAST_SPAN`](super::chain::LEAST_SPAN) thigh calf over the distance of the foot and
+    /// [`LEAST_HEIGHT`](super::chain::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm; everywhere else the
     /// matrix is the exact one.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
@@ -142,6 +146,58 @@ impl Robot {
                 quantity,
                 found: *found,
             }),
+        }
+    }
+}
+
+/// Which foot patterns select a phase.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FeetRule {
+    /// At least one foot in contact.
+    Any,
+    /// No foot in contact.
+    None,
+    /// Exactly one of these patterns (order fr, fl, rr, rl).
+    Patterns(Vec<ContactFlags>),
+}
+
+const N_PATTERNS: usize = 16;
+
+impl fmt::Display for FeetRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let patterns = match self {
+            FeetRule::Any => return f.write_str("any"),
+            FeetRule::None => return f.write_str("none"),
+            FeetRule::Patterns(_) if self.is_always() => return f.write_str("always"),
+            FeetRule::Patterns(patterns) => patterns,
+        };
+        let digits = |feet: &ContactFlags| feet.map(|down| if down { "1" } else { "0" }).concat();
+        f.write_str(&patterns.iter().map(digits).collect::<Vec<_>>().join(","))
+    }
+}
+
+impl FeetRule {
+    /// The rule of a phase that holds whatever the feet do: all patterns.
+    pub fn always() -> Self {
+        FeetRule::Patterns(Self::all_patterns().collect())
+    }
+
+    /// From no foot to four feet.
+    pub fn all_patterns() -> impl Iterator<Item = ContactFlags> {
+        (0..N_PATTERNS).map(|code| std::array::from_fn(|foot| (code >> foot) & 1 == 1))
+    }
+
+    /// Whether it is the rule of all patterns, each in it once.
+    pub fn is_always(&self) -> bool {
+        matches!(self, FeetRule::Patterns(patterns) if patterns.len() == N_PATTERNS)
+    }
+
+    /// Whether the rule names this pattern.
+    pub fn matches(&self, feet: ContactFlags) -> bool {
+        match self {
+            FeetRule::Any => feet.contains(&true),
+            FeetRule::None => !feet.contains(&true),
+            FeetRule::Patterns(patterns) => patterns.contains(&feet),
         }
     }
 }

@@ -5,11 +5,12 @@ use std::collections::BTreeSet;
 use nalgebra::DMatrix;
 use serde_json::{Value, json};
 
-use super::certificate::{BeforeAfter, Certificate, EquationCertificate, PhaseCertificate};
+use super::certificate::{
+    BeforeAfter, Certificate, EquationCertificate, PhaseCertificate, Tolerance,
+};
 use super::domain::{Domain, Samples, SimplifyError, check_count};
 use super::equation::{Equation, Terms, is_same_decimal};
 use super::measure::Differences;
-use super::tolerance::Tolerance;
 use super::workspace::Workspace;
 use crate::artifact;
 use crate::equations::Equations;

@@ -3,8 +3,7 @@
 use askama::Template;
 
 use super::certificate::{Certificate, Change, ChangeKind, PhaseCertificate};
-use super::measure::PrintedEquation;
-use super::rollouts::RolloutEffect;
+use super::measure::{PrintedEquation, RolloutEffect};
 use crate::artifact;
 use crate::equations::ExactStep;
 use crate::model::ReducedModel;

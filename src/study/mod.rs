@@ -4,15 +4,12 @@
 //! study goes on where it was and parts computed on several machines can be joined; and their `Summary`. Read `plan`
 //! first, then `run`.
 
-pub mod plan;
-
-mod run;
+pub mod run;
 mod store;
 mod summary;
 
-pub use plan::Plan;
-pub(crate) use plan::{CellId, FOLDS, Shard, StudyError};
-pub(crate) use run::run;
+pub use run::Plan;
+pub(crate) use run::{CellId, FOLDS, Shard, StudyError, run};
 pub(crate) use store::Store;
 pub(crate) use summary::{Cell, DimensionSummary, Spread, cell_table};
 pub use summary::{Outcome, Summary};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::plan::{CellId, Plan, StudyError};
+use super::run::{CellId, Plan, StudyError};
 use super::summary::Cell;
 use crate::files::size::{Format, read_text_capped};
 use crate::files::{Overwrite, write_whole};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::plan::CellId;
+use super::run::CellId;
 use crate::evaluate::combined_loss;
 use crate::train::{SetMetrics, TrainReport};
 use crate::typeset::Table;
@@ -214,7 +214,7 @@ fn dimension(cells: &[Cell], latent_dim: usize, lambda: f64) -> Option<Dimension
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::plan::CellId;
+    use crate::study::run::CellId;
 
     #[test]
     fn summary_means_over_seeds_and_counts_refusals() {

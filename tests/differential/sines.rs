@@ -1,6 +1,6 @@
 //! The kernel of sines and cosines against the standard library.
 
-use romc::ir::sin_cos::{LIMIT, sin_cos};
+use romc::ir::interpret::{LIMIT, sin_cos};
 use romc::ir::{Interpreter, ProgramBuilder};
 
 /// Largest magnitude that the single-precision kernel reduces itself, in rad.

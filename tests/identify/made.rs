@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use nalgebra::{DMatrix, DVector, SVector};
 
 use romc::files::Place;
+use romc::identify::equations::Motion;
 use romc::identify::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
-use romc::identify::motion::Motion;
 use romc::identify::parameters::{
     ARMATURE, CALF, CALF_SECOND, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
     THIGH_SECOND, TRUNK_FORWARD, VISCOUS,

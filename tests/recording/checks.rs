@@ -207,8 +207,8 @@ mod implausible {
 }
 
 mod conditioning {
-    use romc::recording::condition::{Accelerations, SmoothedRows, condition};
-    use romc::recording::smoothing::SavitzkyGolay;
+    use romc::recording::files::{Accelerations, SmoothedRows, condition};
+    use romc::recording::preprocess::SavitzkyGolay;
 
     use super::*;
 

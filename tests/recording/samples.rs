@@ -352,7 +352,7 @@ mod preprocessing {
 }
 
 mod smoothing {
-    use romc::recording::smoothing::{SavitzkyGolay, moving_average};
+    use romc::recording::preprocess::{SavitzkyGolay, moving_average};
 
     use super::*;
 

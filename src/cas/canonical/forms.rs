@@ -4,8 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use num_traits::ToPrimitive;
 
-use super::coefficient::{Coefficient, nearest, ratio};
-use super::polynomial::{Atom, CanonicalForm, Monomial};
+use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, nearest, ratio};
 use crate::{ExprId, ExprPool, Function, Node, Number};
 
 /// Most fractions of two arguments that are compared by multiplying out, and most such comparisons.

@@ -26,12 +26,10 @@
 //! # Ok::<(), romc::symbolic::ParseError>(())
 //! ```
 
-mod coefficient;
 mod forms;
 mod polynomial;
 mod products;
 mod roots;
 
-pub use coefficient::Coefficient;
 pub use forms::CanonicalForms;
-pub use polynomial::CanonicalForm;
+pub use polynomial::{CanonicalForm, Coefficient};

@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use num_traits::Signed;
 
-use super::coefficient::{Coefficient, Rational, nearest, ratio};
 use super::forms::CanonicalForms;
-use super::polynomial::{Atom, CanonicalForm, Monomial};
+use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, nearest, ratio};
 use crate::number::power;
 
 /// Largest power of a sum that is multiplied out, and of a single term.

@@ -6,9 +6,8 @@ use num_bigint::{BigInt, BigUint};
 use num_integer::Integer;
 use num_traits::{ToPrimitive, Zero};
 
-use super::coefficient::{Coefficient, Rational, ratio};
 use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
-use super::polynomial::{Atom, CanonicalForm, Monomial};
+use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, ratio};
 
 impl CanonicalForms<'_> {
     /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive number, forms that

@@ -10,7 +10,7 @@ use super::value::{ReadingArguments, RobotParser, count, finite, overwrite, real
 use crate::files::Overwrite;
 use crate::limits::table;
 use crate::model::Activation;
-use crate::recording::smoothing::SavitzkyGolay;
+use crate::recording::preprocess::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
 use crate::robot::{STATE_DIM, WrenchFrame};
 use crate::study::Shard;

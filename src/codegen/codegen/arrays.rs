@@ -1,7 +1,6 @@
 //! Array statements as loops and calls, and where their values live: which arrays hold them, in place or copied.
 
-use super::code::{Index, Role, Span};
-use super::dialect::Dialect;
+use super::dialect::{Dialect, Index, Role, Span};
 use super::ident::Ident;
 use super::printer::Text;
 use super::translate::Translator;

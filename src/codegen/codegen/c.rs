@@ -2,13 +2,11 @@
 
 use askama::Template;
 
-use super::code::{Function, Role};
-use super::dialect::Dialect;
+use super::dialect::{Dialect, Function, Role, braced, comment_lines, tidy};
 use super::interface::{ModelInterface, computes_angles};
-use super::languages::C;
-use super::line_wrapping::{braced, comment_lines, tidy};
 use super::model_text::{KernelText, ModelText};
 use super::options::{CodegenError, Precision, SineCosine};
+use super::script::C;
 use super::test_vectors::{N_POINTS, ParameterVectors, TOLERANCE_F64, TestVectors};
 use crate::files::EmittedFile;
 use crate::ir::{Binary, Statement, Unary};

@@ -2,8 +2,11 @@
 //!
 //! In a pattern `$name` and its like stand for what is filled in; `$model`, `$upper`, `$real` and `$f` (identifier of
 //! the model, the same in upper case, type of numbers, suffix of literals) are known everywhere.
+//!
+//! Arrays and functions of generated code, before a dialect spells them.
+//!
+//! Breaking lists and comments into lines.
 
-use super::code::{Function, Parameter, Role, Span};
 use super::ident::Ident;
 use super::options::Precision;
 use crate::ir::{Table, Unary};
@@ -216,5 +219,189 @@ impl Dialect {
             .map(|name| format!("    {}\n", mention(name)))
             .collect();
         format!("{} {{\n{unused}{}}}", self.head(function), function.body)
+    }
+}
+
+/// A subscript `offset + sum_i stride_i * name_i`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Index {
+    /// Strides and the variables that they multiply.
+    pub terms: Vec<(usize, Ident)>,
+    pub offset: usize,
+}
+
+impl Index {
+    pub(crate) fn fixed(offset: usize) -> Self {
+        Self {
+            terms: Vec::new(),
+            offset,
+        }
+    }
+
+    pub(crate) fn variable(name: &Ident) -> Self {
+        Self::fixed(0).plus(1, name)
+    }
+
+    pub(crate) fn plus(mut self, stride: usize, name: &Ident) -> Self {
+        self.terms.push((stride, name.clone()));
+        self
+    }
+
+    pub(crate) fn shifted(mut self, by: usize) -> Self {
+        self.offset += by;
+        self
+    }
+}
+
+/// `len` elements of an array from `offset` on, handed to a function.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Span {
+    pub array: Ident,
+    pub offset: usize,
+    pub len: usize,
+    pub of: usize,
+    /// Whether the array is a parameter of the function rather than a local array.
+    pub is_parameter: bool,
+}
+
+impl Span {
+    pub(crate) fn whole(array: &Ident, len: usize, is_parameter: bool) -> Self {
+        Self {
+            array: array.clone(),
+            offset: 0,
+            len,
+            of: len,
+            is_parameter,
+        }
+    }
+
+    pub(crate) fn is_whole(&self) -> bool {
+        self.offset == 0 && self.len == self.of
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    Input,
+    Output,
+    InOut,
+    Scalar,
+}
+
+/// A parameter of a generated function, in a language or, with a text for a name, in any.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter<N = Ident> {
+    pub name: N,
+    /// Number of elements; an output may have none.
+    pub len: usize,
+    pub role: Role,
+}
+
+pub struct Function {
+    pub name: Ident,
+    pub docs: Vec<String>,
+    pub parameters: Vec<Parameter>,
+    /// Parameters that the body does not mention.
+    pub unused: Vec<Ident>,
+    pub body: String,
+}
+
+/// Where parameters become results, as in scripts: one that is read and written is an argument and returned.
+impl Function {
+    fn of(&self, roles: &[Role]) -> Vec<&Parameter> {
+        let parameters = self.parameters.iter();
+        parameters.filter(|p| roles.contains(&p.role)).collect()
+    }
+
+    pub(crate) fn inputs(&self) -> Vec<&Parameter> {
+        self.of(&[Role::Input, Role::InOut, Role::Scalar])
+    }
+
+    pub(crate) fn outputs(&self) -> Vec<&Parameter> {
+        self.of(&[Role::Output, Role::InOut])
+    }
+
+    pub(crate) fn arrays(&self) -> Vec<&Parameter> {
+        self.of(&[Role::Input, Role::InOut])
+    }
+
+    pub(crate) fn copied(&self) -> Vec<&Parameter> {
+        self.of(&[Role::InOut])
+    }
+
+    /// What is returned and no argument, so that the body has to begin with it.
+    pub(crate) fn created(&self) -> Vec<&Parameter> {
+        self.of(&[Role::Output])
+    }
+
+    /// Whether a statement mentions a table or a function.
+    pub(crate) fn mentions(&self, name: &str) -> bool {
+        self.body.contains(&format!("{name}[")) || self.body.contains(&format!("{name}("))
+    }
+}
+
+/// `{a, b, c}`, broken with `indent` after every eight elements of a long list; an `indent` without a newline leaves
+/// breaking to the printer.
+pub(crate) fn braced(elements: &[String], indent: &str) -> String {
+    let lines: Vec<String> = elements.chunks(8).map(|line| line.join(", ")).collect();
+    format!("{{{}}}", lines.join(&format!(",{indent}")))
+}
+
+/// Each paragraph as [`wrapped`]; continued lines are indented by two spaces.
+pub(crate) fn comment_lines(paragraphs: &[String], width: usize) -> Vec<String> {
+    let paragraphs = paragraphs.iter();
+    paragraphs
+        .flat_map(|text| wrapped(text, width, " "))
+        .collect()
+}
+
+/// A paragraph broken at spaces into lines of at most `width` bytes where possible; continued lines begin with
+/// `indent`, which a space follows if it is not empty.
+pub fn wrapped(paragraph: &str, width: usize, indent: &str) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut line = String::new();
+    for word in paragraph.split_whitespace() {
+        if !line.is_empty() && line.len() + 1 + word.len() > width {
+            lines.push(std::mem::replace(&mut line, indent.to_owned()));
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line.push_str(word);
+    }
+    lines.push(line);
+    lines
+}
+
+/// The text without trailing spaces or several blank lines in a row, ending with one newline.
+pub fn tidy(text: &str) -> String {
+    // Line by line into one buffer: a file has up to ten megabytes.
+    let mut tidied = String::with_capacity(text.len() + 1);
+    for line in text.lines().map(str::trim_end) {
+        if !line.is_empty() || !(tidied.is_empty() || tidied.ends_with("\n\n")) {
+            tidied.push_str(line);
+            tidied.push('\n');
+        }
+    }
+    tidied.truncate(tidied.trim_end_matches('\n').len() + 1);
+    tidied
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comments_keep_paragraphs_and_tidy_text_has_single_blank_lines_and_one_newline_at_its_end() {
+        let lines = comment_lines(&["one two three".to_owned(), "four".to_owned()], 9);
+        assert_eq!(lines, ["one two", "  three", "four"]);
+        for (text, tidied) in [
+            ("", ""),
+            ("\n \n", ""),
+            ("a", "a\n"),
+            ("\n\na  \n\n \nb\n\n", "a\n\nb\n"),
+        ] {
+            assert_eq!(tidy(text), tidied, "{text:?}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
-use super::code::{Parameter, Role};
+use super::dialect::{Parameter, Role};
 use super::documentation::{equations, of_inputs, of_maps};
 use super::options::Units;
 use crate::equations::{Equations, LatentUnits};

@@ -7,16 +7,11 @@
 mod arrays;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod c;
-mod code;
 mod dialect;
 mod documentation;
 mod ident;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod interface;
-mod languages;
-#[doc(hidden)] // for `deploy`, in the crate above
-pub mod line_wrapping;
-
 mod model_text;
 mod options;
 mod printer;
@@ -24,8 +19,9 @@ mod printer;
 pub mod rust;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub mod script;
-mod test_points;
 mod test_vectors;
 mod translate;
 
+#[doc(hidden)] // for `deploy`, in the crate above
+pub use dialect::{tidy, wrapped};
 pub use options::{CodegenError, Precision, SineCosine, Units};

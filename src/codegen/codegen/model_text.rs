@@ -1,14 +1,13 @@
 //! A model in the templates.
 
-use super::code::Function;
-use super::dialect::Dialect;
+use super::dialect::{Dialect, Function};
 use super::ident::{Ident, Namer, Tables};
 use super::interface::{FunctionSpec, ModelInterface, computes_angles};
 use super::options::{Precision, SineCosine};
 use super::printer::Text;
 use super::translate::{function, lanes};
 use crate::ir::Binary;
-use crate::ir::sin_cos::{double, single};
+use crate::ir::interpret::{double, single};
 use crate::lower::JacobianPattern;
 
 /// What the files of all languages hold of a model.

@@ -1,7 +1,6 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
-use super::code::Index;
-use super::dialect::Dialect;
+use super::dialect::{Dialect, Index};
 use super::ident::Ident;
 use crate::ir::{Binary, Unary};
 

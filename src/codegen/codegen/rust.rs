@@ -3,13 +3,11 @@
 
 use askama::Template;
 
-use super::code::{Function, Role};
-use super::dialect::Dialect;
+use super::dialect::{Dialect, Function, Role, tidy, wrapped};
 use super::interface::{ModelInterface, computes_angles};
-use super::languages::RUST;
-use super::line_wrapping::{tidy, wrapped};
 use super::model_text::{KernelText, ModelText};
 use super::options::{CodegenError, Precision, SineCosine};
+use super::script::RUST;
 use super::test_vectors::{N_POINTS, ParameterVectors, TestVectors};
 use crate::files::EmittedFile;
 

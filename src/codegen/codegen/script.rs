@@ -4,19 +4,18 @@
 //! Arrays are matrices with a column per point, or a vector for one point, and every operation is element by element,
 //! so that the statements of a program serve one state and many alike. What a generated function writes into its
 //! parameters elsewhere is returned here.
+//!
+//! The spellings of C, Rust, Python on NumPy or CasADi, and MATLAB.
 
 use askama::Template;
 
-use super::code::{Function, Parameter, Role};
-use super::dialect::Dialect;
+use super::dialect::{Dialect, Function, Parameter, Role, Spelling, comment_lines, tidy};
 use super::ident::Namer;
 use super::interface::ModelInterface;
-use super::languages::{CASADI, MATLAB, NUMPY};
-use super::line_wrapping::{comment_lines, tidy};
 use super::model_text::ModelText;
 use super::options::{CodegenError, Precision};
 use crate::files::EmittedFile;
-use crate::ir::Statement;
+use crate::ir::{Statement, Unary};
 
 /// A language of scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,3 +154,177 @@ fn column(numbers: &[usize]) -> String {
     }
     format!("[{}]'", list(numbers, |number| (number + 1).to_string()))
 }
+
+/// C99. Reserved are the keywords of C and C++, and the library names that generated files use.
+pub const C: Spelling = Spelling {
+    reserved: "
+    auto break case char const continue default do double else enum extern float for goto if inline
+    int long register restrict return short signed sizeof static struct switch typedef union
+    unsigned void volatile while bool true false catch class delete explicit export friend mutable
+    namespace new noexcept nullptr operator private protected public template this throw try typeid
+    typename using virtual and or not xor main sin cos tan tanh exp log pow sqrt fabs memcpy size_t
+    uint64_t y0 y1 yn j0 j1 jn gamma signgam abs asm typeof constexpr concept requires import module
+    alignas alignof static_assert thread_local decltype div index time erf I NULL errno stdin stdout
+    stderr
+",
+    reals: ["double", "float"],
+    suffixes: ["", "f"],
+    not_finite: ["NAN", "INFINITY", "-INFINITY"],
+    scalar: "const $real $name = $value;",
+    array: "const $real $name[$n] = {$value};",
+    declaration: "$real $name[$n];",
+    assignment: "$name = $value;",
+    addition: Some("$name += $value;"),
+    loop_head: "for (size_t $name = 0; $name < $n; ++$name) {",
+    loop_end: Some("}"),
+    continuation: "",
+    operators: [" + ", " - ", "*", "/"],
+    multiply_add: None,
+    function: "$name$f($a)",
+    functions: &[(Unary::Abs, "fabs$f($a)"), (Unary::Sign, "$model_sign($a)")],
+    power: "$model_pow($a, $b)",
+    select: "$model_select($test, $zero, $other)",
+    element: "$name[$i]",
+    entry: "$name[$i][$j]",
+    first_index: 0,
+    read: ["$name", "$name", "&$name[$first]"],
+    written: ["$name", "$name", "&$name[$first]"],
+    sin_cos: "$model_sin_cos($n, $read, $written);",
+    call: "$name($read, $written);",
+    // A choice between numbers: compilers vectorise it where they do not vectorise a comparison that becomes an
+    // integer.
+    sin_cos_lane: &[
+        "$real $sine, $cosine;",
+        "$model_sin_cos_reduced($a, &$sine, &$cosine);",
+        "beyond[lane] = fabs$f($a) <= $upper_ANGLE_LIMIT ? beyond[lane] : 1.0$f;",
+    ],
+    unused_lane: None,
+    prefix: "$model_",
+    table_base: "$model_table",
+    table: "static const $real $name[$rows][$cols] = {\n$value};",
+    rows: ["    {", ",\n     ", "},"],
+    head: "void $name($value)",
+    parameters: [
+        "const $real *restrict $name",
+        "$real *restrict $name",
+        "$real $name",
+    ],
+    mention: "(void)$name;",
+};
+
+/// Rust without `std` or allocation. Reserved are its keywords and the names that generated crates use themselves.
+pub(crate) const RUST: Spelling = Spelling {
+    reserved: "
+    abstract as async await become box break const continue crate do dyn else enum extern false
+    final fn for gen if impl in let loop macro match mod move mut override priv pub ref return self
+    static struct super trait true try type typeof unsafe unsized use virtual where while yield f64
+    f32 usize std core libm math sin_cos sin_cos_reduced sign union
+",
+    reals: ["f64", "f32"],
+    suffixes: ["", ""],
+    not_finite: ["f64::NAN", "f64::INFINITY", "f64::NEG_INFINITY"],
+    scalar: "let $name = $value;",
+    array: "let $name: [$real; $n] = [$value];",
+    declaration: "let mut $name = [0.0_$real; $n];",
+    loop_head: "for $name in 0..$n {",
+    multiply_add: Some("math::mul_add"),
+    function: "math::$name($a)",
+    functions: &[],
+    power: "math::pow($a, $b)",
+    select: "math::select($test, $zero, $other)",
+    read: ["$name", "&$name", "&$name[$first..$end]"],
+    written: ["$name", "&mut $name", "&mut $name[$first..$end]"],
+    sin_cos: "sin_cos($read, $written);",
+    sin_cos_lane: &[
+        "let ($sine, $cosine) = sin_cos_reduced($a);",
+        "beyond[lane] = if math::abs($a) <= ANGLE_LIMIT { beyond[lane] } else { 1.0 };",
+    ],
+    unused_lane: Some("_"),
+    prefix: "",
+    table_base: "TABLE",
+    table: "static $name: [[$real; $cols]; $rows] = [\n$value];",
+    rows: ["    [", ",\n     ", "],"],
+    head: "pub fn $name($value)",
+    parameters: [
+        "$name: &[$real; $n]",
+        "$name: &mut [$real; $n]",
+        "$name: $real",
+    ],
+    mention: "let _ = $name;",
+    ..C
+};
+
+/// Python on arrays of NumPy. Reserved are its keywords and the names that generated modules use themselves.
+pub(crate) const NUMPY: Spelling = Spelling {
+    reserved: "
+    False None True and as assert async await break class continue def del elif else except finally
+    for from global if import in is lambda nonlocal not or pass raise return try while with yield
+    match case type np casadi range list shape zip len float print _rows _sin_cos
+",
+    scalar: "$name = $value",
+    array: "$name = [$value]",
+    declaration: "$name = [0.0] * $n",
+    assignment: "$name = $value",
+    addition: Some("$name += $value"),
+    loop_head: "for $name in range($n):",
+    loop_end: None,
+    continuation: " \\",
+    function: "np.$name($a)",
+    functions: &[],
+    power: "np.power($a, $b)",
+    select: "np.where(np.equal($test, 0.0), $zero, $other)",
+    read: ["$name", "$name", "$name[$first:$end]"],
+    written: ["$name[$first:$end]"; 3],
+    sin_cos: "$written = _sin_cos($read)",
+    call: "$written = $name($read)",
+    prefix: "",
+    table_base: "TABLE",
+    table: "$name = [\n$value]",
+    rows: ["    [", ",\n     ", "],"],
+    ..C
+};
+
+/// Python with symbolic scalars of CasADi; the expressions of a function are a private one.
+pub(crate) const CASADI: Spelling = Spelling {
+    function: "casadi.$name($a)",
+    functions: &[(Unary::Abs, "casadi.fabs($a)")],
+    power: "casadi.power($a, $b)",
+    select: "casadi.if_else(casadi.eq($test, 0.0), $zero, $other)",
+    call: "$written = _$name($read)",
+    ..NUMPY
+};
+
+/// MATLAB and Octave. Reserved are their keywords, and the names that generated files use themselves.
+pub(crate) const MATLAB: Spelling = Spelling {
+    reserved: "
+    arguments break case catch classdef continue else elseif end for function global if otherwise
+    parfor persistent return spmd switch try while do until unwind_protect end_try_catch endif
+    endfor endwhile endfunction endswitch methods properties events enumeration columns rows_of
+    model n zeros size numel repmat cell max error nargin sin cos tan tanh exp log sqrt abs sign
+    power select
+",
+    scalar: "$name = $value;",
+    array: "$name = rows_of(n, $value);",
+    declaration: "$name = zeros($n, n);",
+    addition: None,
+    loop_head: "for $name = 0:$last",
+    loop_end: Some("end"),
+    continuation: " ...",
+    operators: [" + ", " - ", ".*", "./"],
+    function: "$name($a)",
+    functions: &[],
+    power: "power($a, $b)",
+    select: "select($test, $zero, $other)",
+    element: "$name($i, :)",
+    entry: "$name($i, $j)",
+    first_index: 1,
+    read: ["$name", "$name", "$name($next:$end, :)"],
+    written: ["$name"; 3],
+    sin_cos: "$sines = sin($read); $cosines = cos($read);",
+    call: "[$written] = $name($read);",
+    prefix: "",
+    table_base: "table",
+    table: "function t = $name_entries()\n    t = [\n$value    ];\nend",
+    rows: ["        ", ", ...\n        ", ""],
+    ..C
+};

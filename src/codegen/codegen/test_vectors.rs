@@ -1,10 +1,13 @@
 //! Input and output vectors for self-tests of generated code, made by the interpreter.
+//!
+//! Points of self-tests, where possible those at which the functions have finite values.
 
-use super::code::Role;
+use super::dialect::Role;
 use super::interface::{FunctionSpec, ModelInterface, PhaseInterface};
 use super::options::Precision;
-use super::test_points::{BatchPoints, N_BATCH, Random, TestPoint, point};
-use crate::ir::{Interpreter, Slot};
+use crate::ir::{Binary, Interpreter, Slot, Statement, Unary};
+use crate::robot::JOINT_DIM;
+use crate::robot::joints::LEG_JOINT_DIM;
 use crate::typeset::rounded_up;
 
 pub(crate) const N_POINTS: usize = 6;
@@ -166,4 +169,229 @@ fn tolerances(
         (TOLERANCE_F32 * (1.0 + largest)).max(ERROR_MARGIN * error)
     };
     single.into_iter().zip(outputs).map(of_output).collect()
+}
+
+const MAX_CHANGES: usize = 600;
+
+const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
+
+/// Inputs of a function and what it computes from them.
+pub(crate) struct TestPoint {
+    pub inputs: Vec<Vec<f64>>,
+    pub outputs: Vec<Vec<f64>>,
+    undefined: usize,
+}
+
+impl TestPoint {
+    fn new(entry: &FunctionSpec, inputs: Vec<Vec<f64>>, precision: Precision) -> Self {
+        let outputs = Interpreter::new(&entry.program).results(&inputs);
+        let values = outputs.iter().flatten();
+        Self {
+            undefined: values.filter(|value| !precision.holds(**value)).count(),
+            inputs,
+            outputs,
+        }
+    }
+
+    /// The point with some arrays at zero, as a robot that stands still has them, if the function of the state has
+    /// kinks and finite results there. A slope that is not a number there although the accelerations are counts as
+    /// zero, so that the test fails.
+    pub(crate) fn at_rest(self, entry: &FunctionSpec, precision: Precision, zero: &[&str]) -> Self {
+        let is_of_state = entry.program.inputs().iter().any(|slot| slot.name == "dz");
+        if !is_of_state || !entry.program.has(has_kink) {
+            return self;
+        }
+        let mut inputs = self.inputs.clone();
+        for (slot, values) in entry.program.inputs().iter().zip(&mut inputs) {
+            if zero.contains(&slot.name.as_str()) {
+                values.fill(0.0);
+            }
+        }
+        let mut point = Self::new(entry, inputs, precision);
+        if let [values, slopes] = &mut point.outputs[..]
+            && values.iter().all(|value| value.is_finite())
+        {
+            let lost = slopes.iter_mut().filter(|slope| slope.is_nan());
+            lost.for_each(|slope| *slope = 0.0);
+        }
+        let mut results = point.outputs.iter().flatten();
+        match results.all(|value| precision.holds(*value)) {
+            true => point,
+            false => self,
+        }
+    }
+
+    pub(crate) fn is_defined(&self) -> bool {
+        self.undefined == 0
+    }
+}
+
+/// Whether a statement is not smooth where an operand is zero.
+fn has_kink(statement: &Statement) -> bool {
+    matches!(
+        statement,
+        Statement::Unary(Unary::Sqrt | Unary::Abs | Unary::Sign, _)
+            | Statement::Binary(Binary::Pow, ..)
+            | Statement::Select(_)
+    )
+}
+
+/// A point between -1 and 1. Where the function is not finite there, points around it are tried: all elements positive,
+/// all drawn again, a few of the best point changed; the best is returned.
+pub(crate) fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> TestPoint {
+    let slots = entry.program.inputs().iter();
+    let drawn = slots.map(|slot| match slot.name.as_str() {
+        "h" => vec![precision.nearest(0.002)],
+        name => (0..slot.len)
+            .map(|k| precision.nearest(element(entry, name, k, random.next())))
+            .collect(),
+    });
+    let mut best = TestPoint::new(entry, drawn.collect(), precision);
+    let elements = free_elements(entry);
+    for change in 0..MAX_CHANGES {
+        if best.is_defined() || elements.is_empty() {
+            break;
+        }
+        let reach = REACHES[change / 3 % REACHES.len()];
+        let mut inputs = best.inputs.clone();
+        let n_changed = match change % 3 {
+            0 | 1 => elements.len(),
+            _ => 1 + change % 4,
+        };
+        for position in 0..n_changed {
+            let (slot, k) = match change % 3 {
+                0 | 1 => elements[position],
+                _ => elements[random.below(elements.len())],
+            };
+            let value = random.within(reach, precision);
+            inputs[slot][k] = if change % 3 == 0 { value.abs() } else { value };
+        }
+        let changed = TestPoint::new(entry, inputs, precision);
+        if changed.undefined <= best.undefined {
+            best = changed;
+        }
+    }
+    best
+}
+
+/// The elements of inputs that may be any number: slot and position.
+fn free_elements(entry: &FunctionSpec) -> Vec<(usize, usize)> {
+    let slots = entry.program.inputs().iter().enumerate();
+    slots
+        .filter(|(_, slot)| !matches!(slot.name.as_str(), "h" | "feet"))
+        .flat_map(|(position, slot)| (0..slot.len).map(move |k| (position, k)))
+        .collect()
+}
+
+/// Element `k` of an input from a number between -1 and 1: that number, except that the function of the feet's forces
+/// gets knees that are bent and feet on the ground or in the air.
+fn element(entry: &FunctionSpec, slot: &str, k: usize, random: f64) -> f64 {
+    let has_feet = entry.parameters.iter().any(|p| p.name == "feet");
+    match (slot, k % LEG_JOINT_DIM) {
+        ("feet", _) => f64::from(u8::from(random > -0.4)),
+        ("x", joint) if has_feet && k < JOINT_DIM => {
+            let (middle, reach) = [(0.0, 0.4), (0.8, 0.4), (-1.6, 0.5)][joint];
+            middle + reach * random
+        }
+        _ => random,
+    }
+}
+
+/// Points of the batch that self-tests run.
+pub(crate) const N_BATCH: usize = 21;
+
+/// The inputs of that batch: element `i` of its arrays is `z + 0.01 (i mod 97)`, `dz - 0.01 (i mod 89)` and `u_lat +
+/// 0.01 (i mod 83)`, except for `far_angle` in point 3 of `z1` and in the last but one of `dz1`.
+pub(crate) struct BatchPoints {
+    pub z: f64,
+    pub dz: f64,
+    pub u_lat: f64,
+    /// An angle beyond the limit of the inline sine, where the accelerations do not overflow there.
+    pub far_angle: f64,
+}
+
+impl BatchPoints {
+    /// Numbers of both signs, or positive ones where the accelerations are finite at more of these.
+    pub(crate) fn new(phase: &PhaseInterface, precision: Precision) -> Self {
+        let overflows = |statement: &Statement| match statement {
+            Statement::Unary(op, _) => op.is_by_library(),
+            Statement::Binary(op, ..) => *op == Binary::Pow,
+            _ => false,
+        };
+        let statements = phase.dynamics.program.statements();
+        let far_angle = match (statements.iter().any(overflows), precision) {
+            (true, _) => 0.125,
+            (false, Precision::Double) => 9000.125,
+            (false, Precision::Single) => 160.125,
+        };
+        let [signed, positive] = [[-0.5, 0.5, -0.3], [0.0625, 0.9375, 0.0625]].map(|start| {
+            let [z, dz, u_lat] = start;
+            Self {
+                z,
+                dz,
+                u_lat,
+                far_angle,
+            }
+        });
+        let defined = |points: &Self| {
+            let at = (0..N_BATCH).map(|point| points.at(phase, point, precision));
+            at.filter(TestPoint::is_defined).count()
+        };
+        match defined(&positive) > defined(&signed) {
+            true => positive,
+            false => signed,
+        }
+    }
+
+    pub(crate) fn at(
+        &self,
+        phase: &PhaseInterface,
+        point: usize,
+        precision: Precision,
+    ) -> TestPoint {
+        let element = |slot: &str, k: usize| {
+            let i = k * N_BATCH + point;
+            let cycle = |modulus: usize| 0.01 * (i % modulus) as f64;
+            match slot {
+                "z" if i == 3 => self.far_angle,
+                "dz" if i == N_BATCH - 2 => self.far_angle,
+                "z" => self.z + cycle(97),
+                "dz" => self.dz - cycle(89),
+                _ => self.u_lat + cycle(83),
+            }
+        };
+        let slots = phase.dynamics.program.inputs().iter();
+        let inputs = slots.map(|slot| (0..slot.len).map(|k| element(&slot.name, k)).collect());
+        TestPoint::new(&phase.dynamics, inputs.collect(), precision)
+    }
+}
+
+/// Numbers between -1 and 1 with three decimals, the same in every run.
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub(crate) fn new() -> Self {
+        Self(0x5eed)
+    }
+
+    fn next(&mut self) -> f64 {
+        f64::from(self.bits() % 2001) / 1000.0 - 1.0
+    }
+
+    /// A short decimal up to a magnitude, never 0.
+    fn within(&mut self, reach: f64, precision: Precision) -> f64 {
+        precision.nearest((1e5 * reach * self.next()).round() / 1e5 + 5e-6)
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        self.bits() as usize % count
+    }
+
+    fn bits(&mut self) -> u32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) as u32
+    }
 }

@@ -2,8 +2,7 @@
 //!
 //! No mathematics happens here: the tree of operations of the program is kept as it is.
 
-use super::code::{Function, Index, Parameter, Role, Span};
-use super::dialect::Dialect;
+use super::dialect::{Dialect, Function, Index, Parameter, Role, Span};
 use super::ident::{Ident, Namer, Tables};
 use super::interface::{FunctionSpec, computes_angles};
 use super::options::SineCosine;

@@ -28,13 +28,9 @@
 //! # }
 //! ```
 
-mod exact;
 mod physical;
 mod system;
-mod unit;
 
-pub use exact::ExactStep;
-pub(crate) use exact::summand_words;
-pub use physical::{LatentUnits, PhysicalError};
-pub use system::{Equations, PhaseEquations};
-pub use unit::Unit;
+pub use physical::{LatentUnits, PhysicalError, Unit};
+pub(crate) use system::summand_words;
+pub use system::{Equations, ExactStep, PhaseEquations};

@@ -19,9 +19,8 @@
 //! ```
 
 mod build;
-mod interpret;
+pub mod interpret;
 mod program;
-pub mod sin_cos;
 
 pub use build::{IrError, ProgramBuilder};
 pub use interpret::Interpreter;

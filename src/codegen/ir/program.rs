@@ -135,7 +135,7 @@ pub enum Statement {
     /// The second value where the first one is zero, of either sign; the third elsewhere, also where the first is NaN.
     /// Both are computed.
     Select([ValueId; 3]),
-    /// Sine and cosine of all arguments by [`super::sin_cos::sin_cos`]: defines the n sines, then the n cosines.
+    /// Sine and cosine of all arguments by [`super::interpret::sin_cos`]: defines the n sines, then the n cosines.
     SinCos {
         /// The n arguments, in rad.
         arguments: Vec<ValueId>,

@@ -12,7 +12,6 @@ mod dynamics;
 mod expression;
 mod maps;
 mod nested;
-mod network;
 mod number;
 mod wrench;
 

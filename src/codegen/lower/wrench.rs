@@ -21,10 +21,10 @@ use super::dynamics::LowerError;
 use super::number::{Number, Sheet};
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
-use crate::robot::actuators::DRY_SPEED_RAD_S;
+use crate::robot::chain::least_levers;
 use crate::robot::chain::{Moved, cross, dot, sum};
+use crate::robot::input_rule::DRY_SPEED_RAD_S;
 use crate::robot::joints::LEG_JOINT_DIM;
-use crate::robot::kinematics::least_levers;
 use crate::robot::{
     BODY_DIM, ChainLeg, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegGeometry, PlanarLeg, STATE_DIM,
     WrenchFrame,

@@ -4,9 +4,8 @@ use nalgebra::DMatrix;
 
 use crate::equations::{Equations, Unit};
 
-use super::decimal::{Decimal, Rounding};
+use super::decimal::{Decimal, Rounder, Rounding, RoundingReport};
 use super::expression::terms;
-use super::rounder::{Rounder, RoundingReport};
 use super::symbols::SymbolTable;
 use super::tree::{Math, Signed, Symbol};
 

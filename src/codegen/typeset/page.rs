@@ -3,7 +3,7 @@
 use askama::Template;
 
 use super::equations::{EquationSystem, Typeset};
-use super::options::PrintOptions;
+use super::symbols::PrintOptions;
 use super::words::{self, Spelling};
 use crate::equations::Equations;
 

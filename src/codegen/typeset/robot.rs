@@ -8,12 +8,10 @@ use nalgebra::{DMatrix, DVector};
 use crate::equations::Equations;
 use crate::model::{AffineMap, LatentVariable};
 
-use super::decimal::{Decimal, Rounding};
+use super::decimal::{Decimal, Rounder, Rounding, RoundingReport};
 use super::equations::{EquationSystem, coefficients};
 use super::expression::terms;
-use super::options::TypesetError;
-use super::rounder::{Rounder, RoundingReport};
-use super::symbols::{SymbolTable, glyph};
+use super::symbols::{SymbolTable, TypesetError, glyph};
 use super::tree::{Glyph, Math, Signed, Symbol};
 
 /// Weights below this share of their row's largest are left out of the printed encoder.

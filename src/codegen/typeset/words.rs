@@ -3,8 +3,9 @@
 use crate::model::FeetRule;
 use crate::robot::{ContactFlags, Leg};
 
-use super::decimal::{Decimal, LEAST_DECIMALS, RELATIVE_ERROR, Rounding};
-use super::rounder::{Occurrence, RoundingReport};
+use super::decimal::{
+    Decimal, LEAST_DECIMALS, Occurrence, RELATIVE_ERROR, Rounding, RoundingReport,
+};
 use super::table::{rounded, rounded_up};
 use super::tree::{Math, Signed};
 

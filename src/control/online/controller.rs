@@ -2,13 +2,12 @@
 
 use std::time::Instant;
 
-use super::command::{Command, Status};
+use super::command::{Command, Memory, Status};
+use super::conic::StageSolver;
 use super::control_model::ControlModel;
 use super::dense::Real;
 use super::effectiveness::Effectiveness;
-use super::engine::StageSolver;
 use super::error::ControlError;
-use super::fallback::Memory;
 use super::horizon::{Horizon, StageInputs};
 use super::lift::{ConsistentLift, LiftFailure, StanceState};
 use super::linearise::LatentDynamics;

@@ -1,8 +1,8 @@
 //! The stages of the horizon at a control step: phases, reference, linearised dynamics, scaled programs.
 
 use super::command::Status;
+use super::conic::Start;
 use super::control_model::ControlModel;
-use super::engine::Start;
 use super::linearise::{LatentDynamics, Lineariser, StageModel};
 use super::plan::Plan;
 use super::problem::StageRows;

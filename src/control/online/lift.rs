@@ -29,12 +29,11 @@
 
 use nalgebra::{Cholesky, Matrix3};
 
-use super::conic::Conic;
+use super::conic::{Conic, StageSolver, Start};
 use super::control_model::{ControlModel, ControlPhase};
 use super::dense::{
     MOST_LATENT, MOST_SQUARE, Real, add_scaled, factorise, solve_lower, solve_upper,
 };
-use super::engine::{StageSolver, Start};
 use super::error::ControlError;
 use super::problem::upright;
 use super::qp::QpSettings;

@@ -21,24 +21,20 @@ mod control_model;
 mod controller;
 mod dense;
 mod effectiveness;
-mod engine;
 mod error;
 pub(crate) mod estimate;
-mod fallback;
 mod horizon;
 pub mod interface;
 mod lift;
 pub mod linearise;
 mod plan;
 pub mod problem;
-mod prune;
 mod qp;
 mod reference;
 mod settings;
 mod stage;
 mod step;
 mod structured;
-mod swing;
 mod trajectory;
 
 /// Numbers that the controller in C shares, which are no settings.
@@ -62,8 +58,7 @@ pub use estimate::InputGivenState;
 pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
 pub use linearise::LatentDynamics;
 pub use plan::Plan;
-pub use problem::to_upright;
-pub use prune::needed_rows;
+pub use problem::{needed_rows, to_upright};
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, SparseColumns, sparse};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{

@@ -1,7 +1,7 @@
 //! Stages for the structured [`solver`](crate::solver).
 
+use super::conic::{StageSolver, Start};
 use super::dense::Real;
-use super::engine::{StageSolver, Start};
 use super::qp::QpSettings;
 use super::stage::{Rows, StageCost, StageQp, StageShape};
 use crate::solver::{

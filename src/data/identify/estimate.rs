@@ -1,16 +1,20 @@
 //! From recordings to an [`Identification`]: equations, fit and delay in turn until they agree.
+//!
+//! Whether recordings are of one robot: each jump's torques bear its weight, it falls in flight, and its mass is that
+//! of the others.
+//!
+//! A payload that all recordings have is no contradiction; one log without torques, or of another robot, is.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
-use super::agreement::{require_one_robot, require_physics};
-use super::equations::SampleEquations;
+use super::equations::{Motion, SampleEquations};
 use super::error::IdentifyError;
 use super::fit::{Estimate, Iteration, explained, force_alone};
 use super::identification::{
     Fit, ForceAlone, Identification, Legs, PerKind, Samples, StandardError,
 };
-use super::motion::Motion;
 use super::parameters::{
     ARMATURE, CALF, CALF_SECOND, DELAY, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
     THIGH_SECOND, VISCOUS, priors,
@@ -19,6 +23,8 @@ use super::windows::{Group, Row, Windows};
 use crate::recording::Recording;
 use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
+use crate::recording::mismatch::{Balance, contradiction};
+use crate::recording::preprocess::median;
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 
 const LEAST_CONTACT_SAMPLES: usize = 100; // fewest samples with feet on the ground
@@ -285,4 +291,89 @@ fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
         faults.push("angular rates disagree with the angles and were replaced".to_owned());
     }
     (!faults.is_empty()).then(|| format!("{}: {}", path.display(), faults.join("; ")))
+}
+
+/// Share by which the mass of a jump may differ from that of all, and the same in standard errors of that jump.
+const MASS: (f64, f64) = (0.05, 4.0);
+const LEAST_BLOCKS: usize = 3; // fewest blocks of a jump whose mass is compared
+
+pub(super) fn require_physics(
+    recordings: &[Recording],
+    robot: &Robot,
+) -> Result<(), IdentifyError> {
+    let balances = (recordings.iter()).map(|recording| Balance::of(recording, robot));
+    let balances: Vec<Balance> = balances.collect();
+    match contradiction(&balances) {
+        None => Ok(()),
+        Some((at, found)) => Err(refused(&recordings[at], None, found)),
+    }
+}
+
+/// Refuses jumps whose mass is not that of all; `segments` are those of each recording among the windows.
+pub(super) fn require_one_robot(
+    recordings: &[Recording],
+    segments: &[Range<usize>],
+    windows: &Windows,
+    estimate: &Estimate,
+) -> Result<(), IdentifyError> {
+    let jumps = masses(windows, estimate);
+    let pooled_kg = 1.0 / estimate[INVERSE_MASS];
+    let differs = |(_, mass_kg, error): &(usize, f64, f64)| {
+        (mass_kg / pooled_kg - 1.0).abs() > MASS.0.max(MASS.1 * error)
+    };
+    if !jumps.iter().any(differs) {
+        return Ok(());
+    }
+    // Of two robots the one with fewer jumps is the stranger.
+    let most_kg = median(jumps.iter().map(|(_, mass_kg, _)| *mass_kg));
+    let far = |(_, mass_kg, _): &(usize, f64, f64)| (mass_kg / most_kg).ln().abs();
+    let worst = (jumps.iter()).max_by(|one, other| far(one).total_cmp(&far(other)));
+    let &(segment, mass_kg, error) = worst.expect("invariant: one differs");
+    let at = segments.iter().position(|range| range.contains(&segment));
+    let at = at.expect("invariant: a segment of a recording");
+    let words = format!(
+        "its mass is {mass_kg:.2} ± {:.2} kg, and that of most of these jumps {most_kg:.2} kg",
+        mass_kg * error
+    );
+    let number = (segments[at].len() > 1).then(|| segment - segments[at].start);
+    Err(refused(&recordings[at], number, words))
+}
+
+fn refused(recording: &Recording, segment: Option<usize>, found: String) -> IdentifyError {
+    let place = segment.map_or(String::new(), |segment| format!(", segment {segment}"));
+    IdentifyError::Contradiction {
+        recording: format!("{}{place}", recording.path.display()),
+        found,
+    }
+}
+
+/// Mass of each segment by its vertical acceleration in contact, the other unknowns as in all, and its standard error
+/// as a share of it (jackknife over blocks).
+fn masses(windows: &Windows, estimate: &Estimate) -> Vec<(usize, f64, f64)> {
+    let mut blocks = vec![(0.0, 0.0); windows.blocks.len()];
+    let upwards = (windows.rows.iter()).filter(|row| row.group == Group::Contact(2));
+    for row in upwards {
+        let others = (0..PARAMETER_DIM).filter(|unknown| *unknown != INVERSE_MASS);
+        let others = others.map(|unknown| row.coefficients[unknown] * estimate[unknown]);
+        let rest = row.left - others.sum::<f64>();
+        let force = row.coefficients[INVERSE_MASS];
+        blocks[row.block].0 += force * rest;
+        blocks[row.block].1 += force * force;
+    }
+    let segments = windows.blocks.last().map_or(0, |last| last + 1);
+    let of_segment = |segment: usize| {
+        let own = blocks.iter().zip(&windows.blocks);
+        let own = own.filter(|((_, square), of)| **of == segment && *square > 0.0);
+        let own: Vec<(f64, f64)> = own.map(|(sums, _)| *sums).collect();
+        let add = |sum: (f64, f64), block: &(f64, f64)| (sum.0 + block.0, sum.1 + block.1);
+        let (product, square) = own.iter().fold((0.0, 0.0), add);
+        let inverse = product / square;
+        let changed = |block: &(f64, f64)| (product - block.0) / (square - block.1) - inverse;
+        let without = own.iter().map(changed);
+        let count = own.len() as f64;
+        let variance = (count - 1.0) / count * without.map(|change| change * change).sum::<f64>();
+        let is_known = own.len() >= LEAST_BLOCKS && inverse > 0.0;
+        is_known.then(|| (segment, 1.0 / inverse, variance.sqrt() / inverse))
+    };
+    (0..segments).filter_map(of_segment).collect()
 }

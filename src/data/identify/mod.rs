@@ -19,13 +19,10 @@
 //! ```
 
 pub mod equations;
-pub mod motion;
 pub mod parameters;
 
-mod agreement;
 mod error;
 mod estimate;
-mod file;
 mod fit;
 mod identification;
 mod windows;

@@ -12,8 +12,8 @@ use super::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
 use super::error::IdentifyError;
 use super::parameters::PARAMETER_DIM;
 use crate::recording::Segment;
+use crate::recording::preprocess::SavitzkyGolay;
 use crate::recording::segment::stretches;
-use crate::recording::smoothing::SavitzkyGolay;
 use crate::robot::JOINT_DIM;
 
 const WINDOW_S: f64 = 0.03; // length of a window, s

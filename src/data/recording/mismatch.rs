@@ -6,7 +6,6 @@
 //! Each figure is taken over a whole recording and compared with bounds that leave room for what right recordings of
 //! simulated and real jumps have (`docs/recordings.md` has the table).
 
-mod balance;
 mod feet;
 mod stance;
 
@@ -18,10 +17,9 @@ use super::check::{Breach, check, outside};
 use super::preprocess::{differences, median};
 use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
-pub use balance::Balance;
-pub(super) use balance::hip_torque;
+pub use stance::Balance;
 use stance::{Slip, best_other_place, best_other_reading};
-pub(super) use stance::{foot_place, median_place, stances};
+pub(super) use stance::{foot_place, hip_torque, median_place, stances};
 
 /// Largest root mean square of the places of feet on the ground about their medians, m.
 const SLIP_M: f64 = 0.025;

@@ -30,28 +30,25 @@
 
 pub mod check;
 pub mod clock;
-pub mod columns;
-pub mod condition;
 pub mod files;
 pub mod foreign;
 pub mod mismatch;
 pub mod phases;
 pub mod preprocess;
-mod reader;
+pub mod reader;
 pub mod segment;
-pub mod smoothing;
 pub mod write;
 
 mod error;
-mod instant;
 mod lines;
-mod segments;
 
 pub use self::write::{WriteOptions, write, write_as, write_mcap};
 pub use clock::Mended;
-pub use condition::{Accelerations, ConditionOptions, ImplausibleSamples, SmoothedRows, condition};
 pub use error::{RecordingError, RecordingFault};
-pub use files::{RecordingFile, RecordingSet};
+pub use files::{
+    Accelerations, ConditionOptions, ImplausibleSamples, RecordingFile, RecordingSet, SmoothedRows,
+    condition,
+};
 pub use foreign::ColumnMap;
 pub use phases::{PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Reader, Reading, ReadingNotes, read, read_from_bytes};

@@ -11,9 +11,9 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use nalgebra::DMatrix;
 
-use super::columns::Column;
 use super::error::{RecordingError, RecordingFault};
 use super::foreign;
+use super::reader::Column;
 use super::segment::{Recording, Segment};
 use crate::files::{Overwrite, write_whole};
 use crate::robot::Robot;

@@ -6,14 +6,12 @@
 
 mod control_model;
 mod lock;
-mod settings;
-mod sources;
 
 use askama::Template;
 
 use crate::codegen::interface::ModelInterface;
-use crate::codegen::line_wrapping::{tidy, wrapped};
 use crate::codegen::{Precision, SineCosine, Units, rust};
+use crate::codegen::{tidy, wrapped};
 use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
@@ -22,8 +20,7 @@ use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Settings, all_codes};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
-use control_model::ControlModelText;
-use settings::{SettingText, quoted_names};
+use control_model::{ControlModelText, SettingText, quoted_names};
 
 /// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
 pub(super) struct Facts<'a> {
@@ -108,7 +105,7 @@ pub fn emit(
     let mut add = |path: &str, text: String| {
         files.push(EmittedFile::new(format!("{folder}/{path}"), text));
     };
-    for (path, text) in sources::files(provenance) {
+    for (path, text) in lock::files(provenance) {
         add(&path, text);
     }
     let text = ControlModelText::new(entries, &plant, format!("// {provenance}"));
@@ -194,7 +191,7 @@ fn project(
         .map(|(path, text)| (path.replace("NAME", name), tidy(&text)))
         .collect();
     files.push(("Cargo.lock".to_owned(), lock::text(hash, name)));
-    for (path, text) in sources::LICENCES {
+    for (path, text) in lock::LICENCES {
         files.push((path.to_owned(), text.to_owned()));
     }
     Ok(files)

@@ -5,19 +5,16 @@
 //! controller are made from their Rust (`src/translate`), the rest has the operations of `control/online` in their
 //! order, so that both give the same bits. Read `templates/controller_c/source.askama` first.
 
-mod legs;
-pub(super) mod numbers;
 mod ros2_control;
 mod selftest;
-mod solver;
-mod source;
+pub(super) mod source;
 
 use std::ops::Deref;
 
 use askama::Template;
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::codegen::line_wrapping::tidy;
+use crate::codegen::tidy;
 use crate::codegen::{Precision, Units, c};
 use crate::deploy::controller::{self, plant};
 use crate::deploy::emit::{EmitOptions, compiled};
@@ -28,8 +25,7 @@ use crate::mpc::problem::StageRows;
 use crate::mpc::shared::torque_deviation;
 use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
 use crate::solver::Shape;
-use numbers::Numbers;
-use source::Source;
+use source::{Numbers, Source};
 
 /// Rows of the friction pyramid and of the slack.
 const OTHER_ROWS: usize = 5;
@@ -169,7 +165,7 @@ fn facts<'a>(
         ..Shape::default()
     };
     Facts {
-        solver_stage: solver::stage(controller.name, &controller.upper, real),
+        solver_stage: source::stage(controller.name, &controller.upper, real),
         row_numbers: one_row.memory(),
         controller,
         banner: format!("/* {provenance} */"),

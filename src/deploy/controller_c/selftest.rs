@@ -5,7 +5,7 @@ use std::ops::Deref;
 use askama::Template;
 
 use super::Facts;
-use super::numbers::{Numbers, integers, nested};
+use super::source::{Numbers, integers, nested};
 use crate::codegen::Precision;
 use crate::deploy::{EmitError, PlannedJump};
 use crate::model::ReducedModel;

@@ -1,4 +1,10 @@
 //! `NAME_controller.c`.
+//!
+//! Numbers as initialisers of C.
+//!
+//! The legs of a robot as constants of the controller in C.
+//!
+//! The structured solver in C: the text that is made from its Rust, under the names and sizes of an instance.
 
 use std::ops::Deref;
 
@@ -6,16 +12,16 @@ use askama::Template;
 use nalgebra::DMatrix;
 
 use super::Facts;
-use super::legs::Legs;
-use super::numbers::{Numbers, integers, nested};
-use super::solver;
 use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
 use crate::mpc::problem::{Row, pairs};
 use crate::mpc::shared::{NO_PHASE, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
 use crate::mpc::{ControlModel, ControlModelParts, FallbackSettings, InputGivenState, MpcSettings};
-use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, SINGULAR_BOUND, WrenchFrame};
+use crate::robot::{
+    ChainLeg, DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegGeometry, PlanarLeg, Robot,
+    SINGULAR_BOUND, WrenchFrame,
+};
 
 /// Complementarity and residual in single precision, at which rounding ends the progress.
 const SINGLE: (f64, f64) = (1e-4, 1e-3);
@@ -128,9 +134,9 @@ impl<'a> Source<'a> {
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
-            functions: solver::of_horizon(facts.name),
-            lift_functions: solver::of_lift(),
-            online: solver::online(facts.name),
+            functions: of_horizon(facts.name),
+            lift_functions: of_lift(),
+            online: online(facts.name),
             legs: Legs::of(robot, numbers),
             torque_mean: numbers
                 .matrix(phases.iter().map(|phase| phase.torque_mean.iter().copied())),
@@ -190,4 +196,185 @@ impl SolverNumbers {
             },
         }
     }
+}
+
+/// Numbers per line.
+const WIDTH: usize = 6;
+
+/// Writes numbers of one precision.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::deploy) struct Numbers(pub Precision);
+
+impl Numbers {
+    /// One number, with a suffix in single precision.
+    pub(super) fn one(self, value: f64) -> String {
+        match self.0 {
+            Precision::Double => format!("{value:?}"),
+            Precision::Single => format!("{:?}f", value as f32),
+        }
+    }
+
+    /// `{1.0, 2.0}`; one zero if there are none, as C has no empty arrays.
+    pub(in crate::deploy) fn vector(self, values: impl IntoIterator<Item = f64>) -> String {
+        list(values.into_iter().map(|value| self.one(value)))
+    }
+
+    /// The first rows of a matrix.
+    pub(super) fn rows(self, matrix: &DMatrix<f64>, count: usize) -> String {
+        let row = |i| (0..matrix.ncols()).map(move |j| matrix[(i, j)]);
+        self.matrix((0..count).map(row))
+    }
+
+    /// Rows of vectors; one row of zeros if there are none.
+    pub(in crate::deploy) fn matrix<R: IntoIterator<Item = f64>>(
+        self,
+        rows: impl IntoIterator<Item = R>,
+    ) -> String {
+        nested(rows.into_iter().map(|row| self.vector(row)))
+    }
+}
+
+/// An initialiser of initialisers, one per line.
+pub(in crate::deploy) fn nested(rows: impl IntoIterator<Item = String>) -> String {
+    let rows: Vec<String> = rows.into_iter().collect();
+    match rows.is_empty() {
+        true => "{{0}}".to_owned(),
+        false => format!("{{\n    {},\n}}", rows.join(",\n    ")),
+    }
+}
+
+/// An initialiser of integers.
+pub(in crate::deploy) fn integers(values: impl IntoIterator<Item = i64>) -> String {
+    list(values.into_iter().map(|value| value.to_string()))
+}
+
+/// An initialiser with one zero at least.
+pub(in crate::deploy) fn list(values: impl Iterator<Item = String>) -> String {
+    let values: Vec<String> = values.collect();
+    if values.is_empty() {
+        return "{0}".to_owned();
+    }
+    let lines: Vec<String> = values.chunks(WIDTH).map(|line| line.join(", ")).collect();
+    format!("{{{}}}", lines.join(",\n     "))
+}
+
+/// Initialisers for the four legs, in the order of [`Leg::ALL`]; a leg of one kind is zeros in the table of the other.
+pub(super) struct Legs {
+    pub has_planar: bool,
+    pub has_chain: bool,
+    pub is_chain: String,
+    pub planar: String,
+    pub axes: String,
+    pub links: String,
+    pub least_levers: String,
+    pub volumes: String,
+    pub hips: String,
+}
+
+impl Legs {
+    pub(super) fn of(robot: &Robot, numbers: Numbers) -> Self {
+        let legs = Leg::ALL.map(|leg| robot.geometry(leg));
+        let planar = legs.map(|leg| match leg {
+            LegGeometry::Planar(leg) => {
+                let PlanarLeg {
+                    hip_m,
+                    thigh_m,
+                    calf_m,
+                    foot_forward_m,
+                } = *leg;
+                [hip_m, thigh_m, calf_m, foot_forward_m]
+            }
+            LegGeometry::Chain(_) => [0.0; 4],
+        });
+        let chains = legs.map(|leg| match leg {
+            LegGeometry::Planar(_) => [[[0.0; 3]; 3]; 2],
+            LegGeometry::Chain(ChainLeg { axes, links }) => [*axes, *links],
+        });
+        let is_chain = legs.map(|leg| matches!(leg, LegGeometry::Chain(_)));
+        let table = |part: usize| nested(chains.map(|chain| numbers.matrix(chain[part])));
+        Self {
+            has_planar: is_chain.contains(&false),
+            has_chain: is_chain.contains(&true),
+            is_chain: integers(is_chain.map(i64::from)),
+            planar: numbers.matrix(planar),
+            axes: table(0),
+            links: table(1),
+            least_levers: numbers.matrix(legs.map(LegGeometry::least_levers)),
+            volumes: numbers.vector(legs.map(LegGeometry::volume_m3)),
+            hips: numbers.matrix(Leg::ALL.map(|leg| {
+                let hip = robot.hip_position(leg);
+                [hip.x, hip.y, hip.z]
+            })),
+        }
+    }
+}
+
+/// A stage of the solver, and all else.
+const STAGE: &str = include_str!("../../../templates/controller_c/solver_stage.h");
+const FUNCTIONS: &str = include_str!("../../../templates/controller_c/solver.c");
+const STATE: &str = include_str!("../../../templates/controller_c/online_state.h");
+const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
+
+/// The controller's own steps.
+pub(super) fn online(name: &str) -> String {
+    renamed(ONLINE, |word| {
+        (word == "online_share").then(|| format!("{name}_{word}"))
+    })
+}
+
+/// A stage of the horizon's solver and the controller's own state, for the header of a controller.
+pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
+    renamed(
+        &format!(
+            "{STAGE}{}",
+            STATE.split_once("\n\n").map_or("", |(_, rest)| rest)
+        ),
+        |word| match word {
+            "real" => Some(real.to_owned()),
+            "NX" => Some(format!("2 * {upper}_LATENT_DIM")),
+            "NU" => Some(format!("{upper}_LATENT_DIM")),
+            "online_share" => Some(format!("{name}_{word}")),
+            _ => word
+                .starts_with("solver_")
+                .then(|| format!("{name}_{word}")),
+        },
+    )
+}
+
+/// The solver of the horizon.
+pub(super) fn of_horizon(name: &str) -> String {
+    renamed(FUNCTIONS, |word| {
+        (word == "solver_stage").then(|| format!("{name}_{word}"))
+    })
+}
+
+/// The solver of a lift: one stage of twelve inputs, without states that matter.
+pub(super) fn of_lift() -> String {
+    let lift = |word: &str| {
+        Some(match word {
+            "NX" => "1".to_owned(),
+            "NU" => "12".to_owned(),
+            "LINKED" => "0".to_owned(),
+            _ if word.starts_with("solver_") => format!("lift_{word}"),
+            _ if word.starts_with("SOLVER_") => format!("LIFT_{word}"),
+            _ => return None,
+        })
+    };
+    renamed(STAGE, lift) + &renamed(FUNCTIONS, lift)
+}
+
+/// A text of C behind its first comment, with other names.
+fn renamed(text: &str, rename: impl Fn(&str) -> Option<String>) -> String {
+    let text = text.split_once("\n\n").map_or(text, |(_, rest)| rest);
+    let mut out = String::with_capacity(2 * text.len());
+    let mut rest = text;
+    while let Some(first) = rest.find(|letter: char| letter.is_ascii_alphabetic()) {
+        let after = &rest[first..];
+        let is_part = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
+        let end = after.find(|letter| !is_part(letter)).unwrap_or(after.len());
+        out += &rest[..first];
+        out += &rename(&after[..end]).unwrap_or_else(|| after[..end].to_owned());
+        rest = &after[end..];
+    }
+    out + rest
 }

@@ -3,10 +3,10 @@
 use std::rc::Rc;
 
 use super::super::ImportError;
-use super::document::{CASES, LAYOUTS, is_one_of};
 use super::expander::{Expander, spelled};
 use super::reader::has;
 use super::scopes::{Macro, Meaning, Refusal};
+use super::sections::{CASES, LAYOUTS, is_one_of};
 use super::token::{Kind, Token};
 
 /// Commands that LaTeX and amsmath define, so that `\providecommand` leaves them as they are.

@@ -1,8 +1,8 @@
 //! Derivatives with respect to time, however they are written, as dots.
 
-use super::names::is_greek;
 use super::reader::{FONTS, INVISIBLE, has};
 use super::token::{Kind, Token, group_length};
+use super::variables::is_greek;
 
 const MAX_DOTS: usize = 3;
 /// Longest group that is looked at: a variable or a differential.

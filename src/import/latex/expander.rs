@@ -4,9 +4,9 @@
 use std::rc::Rc;
 
 use super::super::ImportError;
-use super::document::is_one_of;
 use super::reader::has;
 use super::scopes::{Macro, Meaning, Refusal, Scopes};
+use super::sections::is_one_of;
 use super::token::{Kind, Lexer, Token};
 
 const MAX_EXPANDED: usize = 500_000;

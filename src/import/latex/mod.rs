@@ -9,15 +9,11 @@
 //! `scopes.rs` (what of them is printed), `document.rs` (formulas), `derivatives.rs`, `sections.rs` (equations and
 //! phases), `reader.rs`, `digits.rs`, `expression.rs`, `variables.rs` and `numbers.rs` (one right side) in this order.
 
-mod conditionals;
 mod definitions;
 mod derivatives;
-mod digits;
-mod document;
 mod expander;
 mod expression;
 mod markdown;
-mod names;
 mod numbers;
 mod reader;
 mod scopes;
@@ -25,5 +21,5 @@ mod sections;
 mod token;
 mod variables;
 
-pub use names::{NameError, SymbolNames};
 pub(super) use sections::read;
+pub use variables::{NameError, SymbolNames};

@@ -1,8 +1,15 @@
 //! Numbers (literals, powers of ten, `\num`) and roots (`\sqrt{z_1}`, `\sqrt[3]{z_1}`).
+//!
+//! Numbers, of the digits that print next to each other.
+//!
+//! Braces, fonts and the ends of macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single
+//! digit as an argument (`x^12`, `\frac12`), the reader ends behind it, and so does the number.
 
 use super::definitions::changes_digits;
-use super::reader::{Digits, Last, Read, Reader};
-use super::token::Kind;
+use super::expression::WORDS;
+use super::reader::{Digits, FONTS, INVISIBLE_WITH_ARGUMENT, Last, Read, Reader, has};
+use super::token::{Kind, Token};
+use super::variables::function;
 
 /// Most pieces under an odd root, which are written twice, and so again in each root around it.
 const MAX_ODD_RADICAND: usize = 1000;
@@ -157,6 +164,186 @@ impl Reader<'_> {
         match self.character(']') {
             true => Ok(index),
             false => self.unexpected("`]`"),
+        }
+    }
+}
+
+/// Entries of [`FONTS`] that put space around what they hold.
+const SPACED: &str = "operatorname mathop mathbin mathopen mathclose mathinner";
+
+/// Digits with at most one point, or comma in braces, and an exponent as in `1.2e-3`.
+pub(super) struct Number {
+    pub(super) text: String,
+    pub(super) first: usize,
+    pub(super) behind: usize,
+}
+
+/// Of each token whether it is a brace or font around digits alone, which does not print.
+pub(super) fn around_digits(tokens: &[Token]) -> Vec<bool> {
+    let mut is_around = vec![false; tokens.len()];
+    // Braces that are open: place, font before it, and whether only digits and points are in it so far.
+    let mut open: Vec<(usize, Option<usize>, bool)> = Vec::new();
+    let mut font = None;
+    for (at, token) in tokens.iter().enumerate() {
+        let font_before = font.take();
+        let is_numeric = match &token.kind {
+            Kind::Comment(_) => {
+                font = font_before;
+                true
+            }
+            Kind::Command(name) if has(FONTS, name) && !has(SPACED, name) => {
+                font = Some(at);
+                font_before.is_none()
+            }
+            Kind::Open => {
+                open.push((at, font_before, true));
+                continue;
+            }
+            Kind::Close => match open.pop() {
+                Some((start, font, true)) if font.is_none() || at > start + 1 => {
+                    (is_around[start], is_around[at]) = (true, true);
+                    is_around[font.unwrap_or(at)] = true;
+                    true
+                }
+                _ => false,
+            },
+            kind if kind.digit().is_some() || *kind == Kind::Character('.') => {
+                is_around[font_before.unwrap_or(at)] = font_before.is_some();
+                true
+            }
+            _ => false,
+        };
+        if let (false, Some((_, _, is_numeric))) = (is_numeric, open.last_mut()) {
+            *is_numeric = false;
+        }
+    }
+    is_around
+}
+
+/// The tokens without braces around a lone operator or point, such as `{\times}` for less space around the sign.
+pub(super) fn without_operator_braces(tokens: Vec<Token>) -> Vec<Token> {
+    let is_lone = |at: usize| match &tokens[at..tokens.len().min(at + 3)] {
+        [open, inside, close] if open.kind == Kind::Open && close.kind == Kind::Close => {
+            let is_argument = at > 0 && takes_argument(&tokens[at - 1].kind);
+            !is_argument && is_operator(&inside.kind, &tokens[at + 3..])
+        }
+        _ => false,
+    };
+    let is_dropped = |at: usize| is_lone(at) || at > 1 && is_lone(at - 2);
+    let kept = (0..tokens.len()).filter(|at| !is_dropped(*at));
+    kept.map(|at| tokens[at].clone()).collect()
+}
+
+fn takes_argument(kind: &Kind) -> bool {
+    const ONES: &str = "sqrt dot ddot dddot abs num";
+    match kind {
+        Kind::Superscript | Kind::Subscript => true,
+        Kind::Command(name) => {
+            let mut lists = [FONTS, WORDS, INVISIBLE_WITH_ARGUMENT, ONES].iter();
+            lists.any(|list| has(list, name)) || name.ends_with("frac") || function(name).is_some()
+        }
+        _ => false,
+    }
+}
+
+/// Whether a token is an operator also without the space around it: `0{\cdot}5` may be a decimal fraction.
+fn is_operator(kind: &Kind, behind: &[Token]) -> bool {
+    let digit = |at: usize| behind.get(at).and_then(|token| token.kind.digit());
+    match kind {
+        Kind::Character(c) => "+-*/=.".contains(*c),
+        Kind::Command(name) if name == "cdot" => {
+            digit(0).is_none() || [0, 1, 2].map(digit) == [Some('1'), Some('0'), None]
+        }
+        Kind::Command(name) => has("times ast", name),
+        _ => false,
+    }
+}
+
+impl Reader<'_> {
+    pub(super) fn number_at(&self, at: usize) -> Option<Number> {
+        let (_, first) =
+            (self.character_at(at)).filter(|(c, _)| c.is_ascii_digit() || *c == '.')?;
+        let mut number = Number {
+            text: String::new(),
+            first,
+            behind: at,
+        };
+        self.digits(&mut number);
+        let behind_point = match self.character_at(number.behind) {
+            Some(('.', point)) => Some(point + 1),
+            // 0{,}36 is a decimal fraction; 1{,}500 may be a large number, and is none.
+            _ => (self.behind_comma(number.behind))
+                .filter(|behind| number.text == "0" || self.run(*behind) != 3)
+                .filter(|_| !number.text.is_empty()),
+        };
+        if let Some(behind) = behind_point.filter(|behind| self.run(*behind) > 0) {
+            number.text.push('.');
+            number.behind = behind;
+            self.digits(&mut number);
+        }
+        let is_number = !number.text.is_empty();
+        self.exponent(&mut number);
+        is_number.then_some(number)
+    }
+
+    pub(super) fn behind_integer(&self, at: usize) -> Option<usize> {
+        let number = self.number_at(at)?;
+        let is_integer = number.text.bytes().all(|byte| byte.is_ascii_digit());
+        is_integer.then_some(number.behind)
+    }
+
+    /// The next character that prints, if nothing else comes before it, and its place.
+    fn character_at(&self, from: usize) -> Option<(char, usize)> {
+        let is_unseen =
+            |at: &usize| self.is_around[*at] || matches!(self.tokens[*at].kind, Kind::Comment(_));
+        let at = (from..self.end).find(|at| !is_unseen(at))?;
+        match self.tokens[at].kind {
+            Kind::Character(character) => Some((character, at)),
+            _ => None,
+        }
+    }
+
+    fn digit(&self, from: usize) -> Option<(char, usize)> {
+        self.character_at(from).filter(|(c, _)| c.is_ascii_digit())
+    }
+
+    fn digits(&self, number: &mut Number) {
+        while let Some((digit, at)) = self.digit(number.behind) {
+            number.text.push(digit);
+            let behind = (at + 1..self.end).find(|at| !self.is_around[*at]);
+            number.behind = behind.unwrap_or(self.end);
+        }
+    }
+
+    /// How many digits there are from a place on, at most four.
+    fn run(&self, from: usize) -> usize {
+        let digits = std::iter::successors(self.digit(from), |(_, at)| self.digit(at + 1));
+        digits.take(4).count()
+    }
+
+    /// The place behind `{,}`.
+    fn behind_comma(&self, at: usize) -> Option<usize> {
+        let comma = [Kind::Open, Kind::Character(','), Kind::Close];
+        let next = self.tokens[..self.end].get(at..at + 3)?;
+        let is_comma = next.iter().map(|token| &token.kind).eq(&comma);
+        is_comma.then_some(at + 3)
+    }
+
+    fn exponent(&self, number: &mut Number) {
+        let typed = |at: usize, accepted: &str| {
+            let next = self.character_at(at);
+            next.filter(|(c, at)| accepted.contains(*c) && !self.tokens[*at].is_spaced)
+        };
+        let Some((_, mark)) = typed(number.behind, "eE") else {
+            return;
+        };
+        let sign = typed(mark + 1, "+-");
+        let from = sign.map_or(mark, |(_, at)| at) + 1;
+        if typed(from, "0123456789").is_some() {
+            let is_negative = sign.is_some_and(|(sign, _)| sign == '-');
+            number.text.push_str(if is_negative { "e-" } else { "e" });
+            number.behind = from;
+            self.digits(number);
         }
     }
 }

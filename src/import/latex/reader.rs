@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use super::super::ImportError;
 use super::super::equations::Piece;
-use super::digits::around_digits;
 use super::expression::{LeftSide, WORDS};
-use super::names::SymbolNames;
+use super::numbers::around_digits;
 use super::token::{Kind, Token};
+use super::variables::SymbolNames;
 
 const MAX_DEPTH: usize = 60;
 /// Commands that change only how the page looks; those of the second list take an argument.

@@ -2,7 +2,7 @@
 
 use super::aslip::{AslipRollout, Baseline};
 use super::coordinates::{CoordinateSums, Fit, FitSums, PointwiseSums};
-use super::linearised::{LinearisedPhase, linearise_phases};
+use super::prediction::{LinearisedPhase, linearise_phases};
 use super::torque::{LAMBDA, LiftSums, combined_loss};
 use crate::lower::{CompiledModel, LowerError};
 use crate::model::{ModelError, ReducedModel};

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::assessment::{Assessment, EvaluateError};
 use super::control_metrics::{ControlMetrics, control_metrics, usual_settings};
 use super::coordinates::CoordinateSums;
-use super::linearised::LinearisedPhase;
+use super::prediction::LinearisedPhase;
 use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::robot::{JOINT_DIM, Robot};

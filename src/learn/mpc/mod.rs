@@ -12,11 +12,7 @@
 //! (torques that the ground can answer). [`evaluate::along_recording()`](crate::evaluate::along_recording()) runs it
 //! all on recorded jumps.
 
-mod error;
-mod named;
 mod of_model;
 
 pub use crate::online::*;
-pub use error::MpcError;
-pub use named::{LIFTS, SOLVERS};
-pub use of_model::{STEP_SLACK, control_model, controller};
+pub use of_model::{LIFTS, MpcError, SOLVERS, STEP_SLACK, control_model, controller};

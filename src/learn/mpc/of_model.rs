@@ -1,18 +1,24 @@
 //! From a model to what the controller runs on: its numbers and its programs.
 //!
 //! The one place where the controller meets [`ReducedModel`]; what it makes is data.
+//!
+//! Names of the controller's choices on the command line and in Python.
+//!
+//! Errors of setting up a controller.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
+use thiserror::Error;
 
-use super::error::MpcError;
-use crate::lower::CompiledModel;
-use crate::model::ReducedModel;
+use crate::lower::{CompiledModel, LowerError};
+use crate::model::{ModelError, ReducedModel};
 use crate::online::{
-    ControlModel, ControlModelParts, ControlPhase, Controller, InputGivenState, LatentDynamics,
-    MpcSettings, NonlinearMaps,
+    ControlError, ControlModel, ControlModelParts, ControlPhase, Controller, InputGivenState,
+    LatentDynamics, Lift, MpcSettings, NonlinearMaps, Solver,
 };
+use crate::recording::RecordingError;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
 /// Share of the time between a recording's samples below which the controller's step is too short for it: a step may be
@@ -190,4 +196,63 @@ fn with_floor(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
 
 fn pattern(bits: usize) -> ContactFlags {
     std::array::from_fn(|foot| bits >> foot & 1 == 1)
+}
+
+/// Names of [`Lift`] with their help.
+pub const LIFTS: [(&str, &str, Lift); 2] = [
+    (
+        "transpose",
+        "`u = W_e^T u_lat`, the paper's",
+        Lift::Transpose,
+    ),
+    (
+        "consistent",
+        "Torques whose own ground reaction forces reproduce the latent input",
+        Lift::Consistent,
+    ),
+];
+
+/// Names of [`Solver`] with their help.
+pub const SOLVERS: [(&str, &str, Solver); 2] = [
+    ("clarabel", "General interior point", Solver::Clarabel),
+    (
+        "riccati",
+        "Gains prepared ahead where no limit is active, else an interior point stage by stage",
+        Solver::Riccati,
+    ),
+];
+
+/// Why a controller could not be built or given a reference.
+///
+/// Once it runs, a controller does not fail: each step's command carries a [`Status`](super::Status).
+#[derive(Debug, Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
+pub enum MpcError {
+    #[error("the model cannot be used for control")]
+    Model(#[from] ModelError),
+    #[error("the model's dynamics cannot be compiled")]
+    Lower(#[from] LowerError),
+    #[error("the recording cannot be used for control")]
+    Recording(#[from] RecordingError),
+    #[error("the model's encoder takes {found} coordinates, the robot has {expected}")]
+    StateDim { found: usize, expected: usize },
+    #[error("input statistics of phase `{phase}`: the covariance cannot be factorised")]
+    Statistics { phase: String },
+    #[error("{}: a sample every {:.3} ms; found a step of {} s, expected at least as long (`romc mpc --step {}`)", path.display(), recorded_s * 1e3, found_s, (recorded_s * 1e4).ceil() / 1e4)]
+    Step {
+        path: PathBuf,
+        found_s: f64,
+        /// Time between samples, s.
+        recorded_s: f64,
+    },
+    #[error("{}: {longest_s:.3} s without a gap, found a step of {found_s:.3e} s, expected a shorter one or a longer recording", path.display())]
+    NoStep {
+        path: PathBuf,
+        found_s: f64,
+        /// The recording's longest segment, s.
+        longest_s: f64,
+    },
+    #[error(transparent)]
+    Control(#[from] ControlError),
 }

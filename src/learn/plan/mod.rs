@@ -15,12 +15,9 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
-mod affine;
 mod costs;
 mod error;
-mod goal;
 mod motion;
-mod reach;
 mod seed;
 mod settings;
 mod solve;
@@ -28,8 +25,6 @@ mod transcribe;
 mod verdict;
 
 pub use error::PlanError;
-pub use goal::Goal;
-pub use reach::{GoalMap, MappedGoal, reach};
-pub use settings::PlanSettings;
-pub use solve::{Plan, PlannedPart, plan};
+pub use settings::{Goal, PlanSettings};
+pub use solve::{GoalMap, MappedGoal, Plan, PlannedPart, plan, reach};
 pub use verdict::Verdict;

@@ -3,8 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::error::PlanError;
-use super::goal::Goal;
-use super::settings::PlanSettings;
+use super::settings::{Goal, PlanSettings};
 use crate::lower::CompiledModel;
 use crate::model::{JumpPart, JumpPrior, Landmark, ReducedModel};
 use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};

@@ -21,8 +21,8 @@ use std::ops::Add;
 
 use nalgebra::DVector;
 
-use super::affine::{Affine, Builder};
 use super::costs;
+use super::costs::{Affine, Builder};
 use super::seed::{PITCH, Seed};
 use super::settings::PlanSettings;
 use crate::mpc::ConeProgram;

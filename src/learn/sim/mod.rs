@@ -6,11 +6,10 @@
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
 mod integrate;
-mod latent;
 mod rollout;
 
 pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
-pub(crate) use latent::phase_rule;
-pub use latent::{LatentSegment, SimError, with_input_statistics};
-pub use rollout::{Restart, Rollout, Window, rollout};
-pub(crate) use rollout::{integrate_stretches, restart_windows};
+pub use rollout::{
+    LatentSegment, Restart, Rollout, SimError, Window, rollout, with_input_statistics,
+};
+pub(crate) use rollout::{integrate_stretches, phase_rule, restart_windows};

@@ -6,7 +6,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::ir::sin_cos::{LIMIT, reduced_sin_cos, sin_cos};
+use crate::ir::interpret::{LIMIT, reduced_sin_cos, sin_cos};
 use crate::model::{LatentVariable, Library, Step, Tape};
 use crate::symbolic::{Function, SymbolId};
 

@@ -11,12 +11,10 @@ mod features;
 mod closed_form;
 mod dataset;
 mod error;
-mod frame;
 mod growth;
 mod joint;
 mod judge;
 mod jumps;
-mod knowledge;
 mod latent;
 mod metrics;
 mod options;
@@ -29,14 +27,12 @@ mod rollout;
 mod seeds;
 mod select;
 mod sparse;
-mod split;
 mod subspace;
 mod task;
-mod thin;
 mod weak_form;
 
 pub use closed_form::closed_form;
-pub use dataset::{MIN_SAMPLES, ScaleOptions};
+pub use dataset::{MIN_SAMPLES, ScaleOptions, Split};
 pub use error::TrainError;
 pub use joint::{Integrator, Unroll, joint};
 pub use metrics::{PartScore, PhaseTerms, SeedReport, SetMetrics, TrainReport, Trained, assess};
@@ -45,5 +41,4 @@ pub use options::{
     Transfer,
 };
 pub use progress::{Monitor, Progress};
-pub use split::Split;
 pub use task::{Origin, Recordings, SourceFile, sha256};

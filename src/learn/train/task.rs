@@ -12,10 +12,8 @@ use sha2::{Digest, Sha256};
 use super::dataset::{Dataset, mean};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
-use super::frame::Frame;
 use super::joint::Losses;
 use super::judge::Judge;
-use super::knowledge::Knowledge;
 use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
 use super::metrics::{
     BODY_X, BODY_Z, PLACE, PhaseTerms, SeedReport, SetMetrics, TrainReport, measure,
@@ -24,8 +22,8 @@ use super::options::{EncoderOptions, TrainOptions};
 use super::progress::Monitor;
 use super::rollout::{Candidate, Xi};
 use super::select::{Choice, select};
-use super::sparse::active_terms;
-use super::subspace::{Moments, order_and_sign, varimax};
+use super::sparse::{Knowledge, active_terms};
+use super::subspace::{Frame, Moments, order_and_sign, varimax};
 use super::weak_form::check_terms;
 use crate::files::hex;
 use crate::model::{

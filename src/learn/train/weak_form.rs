@@ -142,8 +142,8 @@ impl Span {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::knowledge::Knowledge;
     use crate::train::oscillator;
+    use crate::train::sparse::Knowledge;
     use crate::train::sparse::{Pruning, Regression};
 
     #[test]

@@ -35,7 +35,6 @@
 
 mod bounded;
 mod manifest;
-mod print;
 mod read;
 mod write;
 

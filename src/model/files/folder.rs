@@ -8,8 +8,7 @@ use std::{fs, io};
 
 use sha2::{Digest as _, Sha256};
 
-use super::part::{Part, remove_left_in};
-use super::whole::{EmittedFile, Overwrite};
+use super::whole::{EmittedFile, Overwrite, Part, remove_left_in};
 
 const LIST: &str = ".romc-emitted";
 

@@ -12,7 +12,6 @@ pub mod size;
 
 mod folder;
 mod located;
-mod part;
 mod text;
 mod whole;
 

@@ -1,9 +1,13 @@
 //! One file, written beside its place and then moved there.
+//!
+//! Files that are being written, beside their places.
 
+use std::collections::hash_map::RandomState;
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::hash::{BuildHasher as _, Hasher as _};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
-
-use super::part::{Part, remove_left_in};
+use std::path::{Path, PathBuf};
 
 /// A generated file, not yet on disk.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,4 +77,110 @@ pub fn write_whole(
     fill(&mut file)?;
     file.into_inner()?.sync_all()?;
     part.put(overwrite)
+}
+
+/// How names of parts end, after a random number in hexadecimal digits.
+const ENDING: &str = ".part";
+
+const DIGITS: usize = 16;
+
+const MAX_TRIED: usize = 16;
+
+/// A new file with a random, hidden name in the folder of its place; removed in the end unless it was moved there.
+///
+/// A lock shows that its process lives; parts without one are what ended processes have left.
+#[derive(Debug)]
+pub(super) struct Part {
+    pub file: File,
+    path: PathBuf,
+    pub place: PathBuf,
+    is_placed: bool,
+}
+
+impl Part {
+    /// Beside `place`. A link or file of that name that somebody else has put there is never opened.
+    pub(crate) fn beside(place: &Path) -> io::Result<Self> {
+        let name = place.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
+        let mut last = None;
+        for _ in 0..MAX_TRIED {
+            let number = RandomState::new().build_hasher().finish();
+            let mut part = OsString::from(".");
+            part.push(name);
+            part.push(format!(".{number:0DIGITS$x}{ENDING}"));
+            let path = place.with_file_name(part);
+            match OpenOptions::new().write(true).create_new(true).open(&path) {
+                Ok(file) => {
+                    let locked = file.try_lock();
+                    // `remove_left_in` of another process may have met it before the lock.
+                    let is_removed = matches!(locked, Err(TryLockError::WouldBlock))
+                        || path.symlink_metadata().is_err();
+                    if !is_removed {
+                        return Ok(Self {
+                            file,
+                            path,
+                            place: place.to_owned(),
+                            is_placed: false,
+                        });
+                    }
+                }
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => last = Some(error),
+                Err(error) => return Err(error),
+            }
+        }
+        Err(last.unwrap_or_else(|| io::ErrorKind::AlreadyExists.into()))
+    }
+
+    /// Moves the file to its place in one step: what is there is replaced, or refused with
+    /// [`io::ErrorKind::AlreadyExists`]. Of several processes that refuse, one alone succeeds.
+    pub(crate) fn put(&mut self, overwrite: Overwrite) -> io::Result<()> {
+        if overwrite == Overwrite::Refuse {
+            match fs::hard_link(&self.path, &self.place) {
+                // The part is the second name of the file, and goes in the end.
+                Ok(()) => return Ok(()),
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Err(error),
+                // A file system without links: whoever makes the file has the place.
+                Err(_) => drop(File::create_new(&self.place)?),
+            }
+        }
+        let renamed = fs::rename(&self.path, &self.place);
+        if renamed.is_err() && overwrite == Overwrite::Refuse {
+            let _ = fs::remove_file(&self.place);
+        }
+        self.is_placed = renamed.is_ok();
+        renamed
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        if !self.is_placed {
+            // The first error is the one worth reporting.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Removes the parts in a folder whose processes have ended. What cannot be read or removed stays.
+pub(super) fn remove_left_in(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if is_file && is_part(&entry.file_name().to_string_lossy()) {
+            let path = entry.path();
+            if let Ok(file) = OpenOptions::new().write(true).open(&path)
+                && file.try_lock().is_ok()
+            {
+                let _ = fs::remove_file(&path);
+            }
+        }
+    }
+}
+
+/// `.NAME.0123456789abcdef.part`
+fn is_part(name: &str) -> bool {
+    let inner = name.strip_prefix('.');
+    let inner = inner.and_then(|inner| inner.strip_suffix(ENDING));
+    let number = inner.and_then(|inner| inner.rsplit_once('.'));
+    number.is_some_and(|(_, digits)| {
+        digits.len() == DIGITS && digits.bytes().all(|byte| byte.is_ascii_hexdigit())
+    })
 }

@@ -34,12 +34,9 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
-mod activation;
 mod builder;
 mod coordinates;
 mod error;
-mod evaluation;
-mod given_state;
 mod identifier;
 mod jump_prior;
 mod library;
@@ -52,22 +49,19 @@ mod state_map;
 mod statistics;
 
 pub use crate::robot::FeetRule;
-pub use activation::{Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, TAIL};
 pub use builder::ModelBuilder;
 pub use coordinates::{CoordinateNames, ScaleFactors, Scaling};
 pub use error::ModelError;
-pub use evaluation::{Step, Tape};
-pub use given_state::InputGivenState;
 pub use identifier::{Identifier, IdentifierError, check_name};
 pub use jump_prior::{
     FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks,
 };
 pub use library::{
-    CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN,
+    CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN, Step, Tape,
 };
-pub use maps::{Tangent, complement};
+pub use maps::{Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, TAIL, Tangent, complement};
 pub use order::CoordinateOrder;
 pub use rom::{Phase, ReducedModel};
 pub use standard_library::{LibraryOrder, StandardLibrary};
 pub use state_map::{AffineMap, Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
-pub use statistics::InputStatistics;
+pub use statistics::{InputGivenState, InputStatistics};

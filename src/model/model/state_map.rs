@@ -6,9 +6,9 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::activation::Activation;
 use super::error::{ModelError, check, check_count, check_finite, check_shape};
 use super::listed;
+use super::maps::Activation;
 
 /// Most layers of a map.
 pub const MAX_LAYERS: usize = 16;

@@ -22,16 +22,11 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
-mod actuators;
-mod entry;
 mod identity;
 mod legs;
 mod read;
-mod registry;
 mod urdf;
 
-pub use actuators::{ActuatorsEntry, read_actuators};
-pub use entry::{RobotEntry, to_toml};
-pub use identity::RobotReading;
-pub use read::{RobotFileError, RobotOptions, find, from_text, open};
-pub use registry::{by_name, known_names};
+pub use identity::{RobotEntry, RobotReading, to_toml};
+pub use legs::{ActuatorsEntry, read_actuators};
+pub use read::{RobotFileError, RobotOptions, by_name, find, from_text, known_names, open};

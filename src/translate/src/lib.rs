@@ -22,7 +22,6 @@
 //! without contraction.
 
 mod call;
-mod definitions;
 mod expression;
 mod function;
 mod items;
@@ -30,9 +29,8 @@ mod statement;
 mod text;
 mod types;
 
-use std::fmt;
-use std::fs;
 use std::path::Path;
+use std::{fmt, fs};
 
 /// A source: its path for faults, and its text.
 #[derive(Debug, Clone)]

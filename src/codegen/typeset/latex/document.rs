@@ -1,24 +1,24 @@
 //! The files of the LaTeX backend.
+//!
+//! What each symbol of the equations means.
 
 use std::fmt;
 
 use askama::Template;
 
+use super::math::{
+    self, Block, comment_text, label, tex, tex_number, tex_symbol, tex_text, tex_unit,
+};
+use super::table::{self, TableBlock};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::model::{Identifier, ReducedModel};
-use crate::typeset::TypesetError;
-use crate::typeset::rounder::RoundingReport;
+use crate::model::{Activation, Identifier, LatentVariable, ReducedModel, ScaleFactors, StateMap};
+use crate::typeset::decimal::RoundingReport;
 use crate::typeset::words::{self, Plain, Spelling};
 use crate::typeset::{
-    EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, Typeset, rendered,
+    Decimal, EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, Rounding,
+    SymbolTable, Typeset, TypesetError, rendered,
 };
-
-use super::escape::{comment_text, label, tex_text};
-use super::lines::{self, Block};
-use super::math::tex;
-use super::nomenclature::{self, Entry};
-use super::table::{self, TableBlock};
 
 /// The LaTeX files of a model; NAME is its identifier:
 ///
@@ -54,7 +54,7 @@ pub fn emit(
         let system = std::slice::from_ref(system);
         files.push(equations(path, of_phase, system, false)?);
     }
-    let width_em = options.width_em.unwrap_or(lines::WIDTH_EM);
+    let width_em = options.width_em.unwrap_or(math::WIDTH_EM);
     let blocks = table::blocks(&typeset.table, model.name(), options.numbers, width_em);
     let packages = match blocks.iter().any(|block| block.long) {
         true => "Needs booktabs and longtable.",
@@ -68,7 +68,7 @@ pub fn emit(
     files.push(file(format!("{stem}-table.tex"), &coefficients)?);
     let nomenclature = Document::Nomenclature {
         header: header.short("A table as wide as the line; needs amsmath."),
-        entries: nomenclature::entries(system, &options.symbols, options.numbers),
+        entries: entries(system, &options.symbols, options.numbers),
     };
     files.push(file(format!("{stem}-nomenclature.tex"), &nomenclature)?);
     let is_physical = system.latent_units().is_some();
@@ -187,9 +187,9 @@ fn phases(
         .zip(model.phases())
         .map(|(system, phase)| {
             let label = format!("eq:{}{part}:{}", label(model.name()), label(&system.phase));
-            let block = lines::block(system, label, options);
+            let block = math::block(system, label, options);
             let feet = words::feet(&phase.feet);
-            let tall = match options.form == Form::Cases && block.lines.len() > lines::CASES_LINES {
+            let tall = match options.form == Form::Cases && block.lines.len() > math::CASES_LINES {
                 true => " Taller than a page as cases: align breaks across pages.",
                 false => "",
             };
@@ -220,7 +220,7 @@ fn robot_systems(
              their row are left out."
         ),
         introduction: format!("Latent coordinates{without}:"),
-        block: lines::block(&robot.encoder, label, options),
+        block: math::block(&robot.encoder, label, options),
     };
     let of_phases = phases(model, &robot.systems, "-robot", options);
     [encoder].into_iter().chain(of_phases).collect()
@@ -269,4 +269,163 @@ impl Header<'_> {
 
 fn file(path: String, template: &Document<'_>) -> Result<EmittedFile, TypesetError> {
     Ok(EmittedFile::new(path, rendered(template)?))
+}
+
+/// How many of an encoder row's weights are named.
+const STRONGEST: usize = 3;
+/// Weights below this share of the row's largest are not named.
+const NEGLIGIBLE: f64 = 0.1;
+/// One line of the list of symbols as LaTeX: the symbol, in dollars, and what it is.
+pub(super) type Entry = (String, String);
+
+fn entry(symbol: impl Into<String>, meaning: impl Into<String>) -> Entry {
+    (symbol.into(), meaning.into())
+}
+
+const ROBOT_STATE: &str = r"$\mathbf{x}$, $\mathbf{u}$";
+const ENCODER: &str = r"$\mathbf{W}_e$, $\mathbf{b}_e$";
+
+pub(super) fn entries(
+    system: &Equations<'_>,
+    symbols: &SymbolTable,
+    numbers: NumberStyle,
+) -> Vec<Entry> {
+    let (model, units) = (system.model(), system.latent_units());
+    let dim = model.latent_dim();
+    let position = |index| {
+        let unit = units.map(|units| format!("${}$; ", tex_unit(units.position[index])));
+        let meaning = unit.unwrap_or_default() + &coordinate(model, index, numbers);
+        entry(symbol(symbols, LatentVariable::Z(index)), meaning)
+    };
+    let mut list: Vec<Entry> = (0..dim).map(position).collect();
+    let velocity_range = range(symbols, LatentVariable::Dz, dim);
+    if let Some(units) = units {
+        list.push(entry(
+            velocity_range,
+            r"their derivatives by time, $\dot{\mathbf{z}} = \mathbf{W}_e \dot{\mathbf{x}}$, per second",
+        ));
+        list.extend((0..dim).map(|index| {
+            let (unit, number) = (tex_unit(units.input[index]), index + 1);
+            let meaning =
+                format!("${unit}$; the input that does work along latent coordinate {number}");
+            entry(symbol(symbols, LatentVariable::U(index)), meaning)
+        }));
+        list.push(entry(
+            ROBOT_STATE,
+            r"robot state and generalised input in SI units; $\mathbf{u} = \mathbf{L}\,\mathbf{u}_{\mathrm{lat}}$ with the constant matrix $\mathbf{L}$ of the generated code",
+        ));
+        list.push(entry(
+            ENCODER,
+            r"encoder in these units, $\mathbf{z} = \mathbf{W}_e \mathbf{x} + \mathbf{b}_e$",
+        ));
+        return list;
+    }
+    let [velocities, inputs] = velocities_and_inputs(model);
+    list.push(entry(velocity_range, velocities));
+    list.push(entry(range(symbols, LatentVariable::U, dim), inputs));
+    if let Ok(encoder) = model.encoder_map() {
+        let state = "robot state and generalised input in SI units";
+        list.push(entry(ROBOT_STATE, state));
+        list.push(match model.encoder() {
+            Ok(_) => entry(
+                ENCODER,
+                r"encoder, $\mathbf{z} = \mathbf{W}_e (\mathbf{s}_x \mathbf{x}) + \mathbf{b}_e$",
+            ),
+            Err(_) => layers(encoder),
+        });
+        list.extend(scale_factors(model, numbers));
+    }
+    list
+}
+
+fn velocities_and_inputs(model: &ReducedModel) -> [String; 2] {
+    // the map of velocities: the weights of an affine encoder, the Jacobian of another
+    let map = match (model.encoder(), model.encoder_map()) {
+        (Ok(_), _) => Some(r"\mathbf{W}_e"),
+        (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
+        (Err(_), Err(_)) => None,
+    };
+    let [mut velocities, mut inputs] = ["latent velocities", "latent inputs"].map(str::to_owned);
+    if let Some(map) = map {
+        velocities +=
+            &format!(r", $\dot{{\mathbf{{z}}}} = {map} (\mathbf{{s}}_x \dot{{\mathbf{{x}}}})$");
+        inputs += &format!(
+            r", $\mathbf{{u}}_{{\mathrm{{lat}}}} = ({map}^{{\mathsf{{T}}}})^{{+}} (\mathbf{{s}}_u \mathbf{{u}})$, lifted by $\mathbf{{s}}_u \mathbf{{u}} = {map}^{{\mathsf{{T}}}} \mathbf{{u}}_{{\mathrm{{lat}}}}$"
+        );
+    }
+    [velocities, inputs]
+}
+
+fn symbol(symbols: &SymbolTable, variable: LatentVariable) -> String {
+    format!("${}$", tex_symbol(&symbols.symbol(variable)))
+}
+
+/// `$z_1, \dots, z_6$`, or all of up to three.
+fn range(symbols: &SymbolTable, of: fn(usize) -> LatentVariable, dim: usize) -> String {
+    let show = |index| symbol(symbols, of(index));
+    match dim {
+        ..=3 => (0..dim).map(show).collect::<Vec<_>>().join(", "),
+        _ => format!(r"{}, \dots, {}", show(0), show(dim - 1)),
+    }
+}
+
+/// A latent coordinate and the robot coordinates that it mostly consists of.
+fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String {
+    let (Ok(encoder), Some(state)) = (model.encoder(), model.state()) else {
+        return format!("latent coordinate {}", row + 1);
+    };
+    let weights = encoder.weights().row(row);
+    let weights = state.names.iter().zip(weights.iter().copied());
+    let mut weights: Vec<(&String, f64)> = weights.collect();
+    weights.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    let largest = weights.first().map_or(0.0, |(_, weight)| weight.abs());
+    let strongest: Vec<String> = (weights.iter().take(STRONGEST))
+        .filter(|(_, weight)| weight.abs() > NEGLIGIBLE * largest)
+        .map(|(name, weight)| {
+            let weight = Decimal::rounded(*weight, Rounding::default());
+            let (name, weight) = (tex_text(name), tex_number(&weight, numbers));
+            format!(r"\texttt{{{name}}} (${weight}$)")
+        })
+        .collect();
+    let (number, strongest) = (row + 1, strongest.join(", "));
+    format!("latent coordinate {number}; largest weights: {strongest}")
+}
+
+/// A nonlinear encoder by the widths of its layers; its weights stay in the model file.
+fn layers(encoder: &StateMap) -> Entry {
+    let widths = encoder.layers().iter().map(|layer| {
+        let width = layer.map.output_dim();
+        match layer.activation {
+            Activation::Linear => width.to_string(),
+            activation => format!("{width} ({activation})"),
+        }
+    });
+    let (inputs, widths) = (encoder.input_dim(), widths.collect::<Vec<_>>().join(", "));
+    entry(
+        r"$\mathbf{E}$, $\mathbf{J}$",
+        format!(
+            r"nonlinear encoder, $\mathbf{{z}} = \mathbf{{E}}(\mathbf{{s}}_x \mathbf{{x}})$, and its Jacobian at $\mathbf{{s}}_x \mathbf{{x}}$; inputs {inputs}, layers {widths}"
+        ),
+    )
+}
+
+fn scale_factors(model: &ReducedModel, numbers: NumberStyle) -> Vec<Entry> {
+    let Ok(scaling) = model.scaling() else {
+        return Vec::new();
+    };
+    let factors = [("x", &scaling.state), ("u", &scaling.input)];
+    let line = |(symbol, factors): (&str, &ScaleFactors)| {
+        let value = match factors {
+            ScaleFactors::Uniform(factor) => {
+                let factor = tex_number(&Decimal::exact(*factor), numbers);
+                format!("${factor}$ for all")
+            }
+            ScaleFactors::PerCoordinate(_) => "one per coordinate".to_owned(),
+        };
+        entry(
+            format!(r"$\mathbf{{s}}_{symbol}$"),
+            format!(r"scale factors of $\mathbf{{{symbol}}}$: {value}"),
+        )
+    };
+    factors.into_iter().map(line).collect()
 }

@@ -1,9 +1,18 @@
 //! The LaTeX spelling of the typeset tree, for math mode.
+//!
+//! Equations as lines of a `cases` or `align` environment.
+//!
+//! The one way for text of a model file into a TeX file.
 
 use crate::equations::Unit;
+use crate::files::is_invisible;
 use crate::symbolic::Function;
 use crate::typeset::tree::{function_name, greek_letter};
-use crate::typeset::{Decimal, Glyph, Math, NumberStyle, Signed, Symbol};
+use crate::typeset::words::code_point;
+use crate::typeset::{
+    Decimal, EQUALS, Equation, EquationSystem, Form, Glyph, Math, NumberStyle, PrintOptions,
+    Signed, Symbol, break_lines, symbol_width,
+};
 
 pub(crate) fn tex(math: &Math, numbers: NumberStyle) -> String {
     let inner = |math: &Math| tex(math, numbers);
@@ -126,4 +135,191 @@ fn function(function: Function) -> String {
 pub(crate) fn tex_unit(unit: Unit) -> String {
     let unit = unit.spelled(r"\,", |power| format!("^{{{power}}}"));
     format!(r"\mathrm{{{unit}}}")
+}
+
+pub(super) const WIDTH_EM: f64 = 30.5;
+/// What a continued line is set in by, in em: `\qquad` and the empty group before its sign.
+const INDENT: f64 = 2.3;
+/// What the brace of `cases` takes of the line, in em.
+const BRACE: f64 = 1.8;
+/// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: no page holds many more.
+pub(super) const CASES_LINES: usize = 30;
+
+pub(super) struct Block {
+    pub label: String,
+    pub count: usize,
+    /// Whether the lines belong into `align` rather than `cases`.
+    pub aligned: bool,
+    /// The lines with `\\` where they need it.
+    pub lines: Vec<String>,
+}
+
+impl Block {
+    /// What `\ref` and `\eqref` can name.
+    pub(crate) fn labels(&self) -> String {
+        let label = &self.label;
+        match (self.aligned, self.count) {
+            (true, 2..) => format!("{label}:1 to {label}:{}", self.count),
+            (true, _) => format!("{label}:1"),
+            (false, _) => label.clone(),
+        }
+    }
+}
+
+/// Spells the equations of one phase; `label` is the stem of its labels.
+pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptions) -> Block {
+    let all = |widest: Option<f64>| -> Vec<Vec<String>> {
+        let equations = system.equations.iter();
+        let sides = equations.map(|equation| right_sides(equation, widest, options));
+        sides.collect()
+    };
+    let lines_of = |sides: &[Vec<String>]| sides.iter().map(Vec::len).sum::<usize>();
+    let in_cases = all(None);
+    let aligned = match options.form {
+        Form::Automatic => lines_of(&in_cases) > CASES_LINES,
+        Form::Cases => false,
+        Form::Align => true,
+    };
+    let lefts = system.equations.iter().map(|equation| &equation.left);
+    let sides = match aligned {
+        true => all(Some(lefts.map(symbol_width).fold(0.0, f64::max))),
+        false => in_cases,
+    };
+    let count = lines_of(&sides);
+    // the equations of the phase stand apart if one of them is broken
+    let is_spaced = count > sides.len();
+    let mut lines = Vec::with_capacity(count);
+    for (place, (equation, of_equation)) in system.equations.iter().zip(&sides).enumerate() {
+        let is_tall = equation.is_tall();
+        let (style, mark) = match (aligned, is_tall) {
+            (true, _) => ("", "&"),
+            // `cases` sets its lines in text style, in which fractions shrink.
+            (false, true) => (r"\displaystyle ", ""),
+            (false, false) => ("", ""),
+        };
+        let relation = match equation.is_approximate {
+            true => r"\approx",
+            false => "=",
+        };
+        let label = format!(r" \label{{{label}:{}}}", place + 1);
+        for (line, side) in of_equation.iter().enumerate() {
+            let start = match line {
+                0 => format!("{} {mark}{relation} ", tex_symbol(&equation.left)),
+                _ => format!(r"{mark}\qquad "),
+            };
+            // whether the equation and the phase end with this line
+            let ends = [line + 1 == of_equation.len(), place + 1 == sides.len()];
+            let end = match (aligned, ends) {
+                (true, [false, _]) => r" \notag \\",
+                (true, [true, true]) => &label,
+                (true, [true, false]) => &format!(r"{label} \\"),
+                (false, [true, true]) => "",
+                (false, [true, false]) if is_tall || is_spaced => r" \\[1ex]",
+                (false, [false, _]) if is_tall => r" \\[0.5ex]",
+                (false, _) => r" \\",
+            };
+            lines.push(format!("{style}{start}{side}{end}"));
+        }
+    }
+    Block {
+        label,
+        count: sides.len(),
+        aligned,
+        lines,
+    }
+}
+
+/// One phase as a bare `cases` environment, for a place that is in math mode already.
+pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
+    let options = PrintOptions {
+        form: Form::Cases,
+        width_em: Some(width_em),
+        ..PrintOptions::default()
+    };
+    let lines = block(system, String::new(), &options).lines.join("\n  ");
+    format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
+}
+
+/// The right side of an equation, one entry per line. Lines are aligned behind the widest left side, in em, or stand
+/// behind a brace, at the equation's own left side.
+fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions) -> Vec<String> {
+    let numbers = options.numbers;
+    if equation.terms.is_empty() {
+        return vec![tex(&equation.right(), numbers)];
+    }
+    let width = options.width_em.unwrap_or(WIDTH_EM);
+    let (available, first, continued) = match aligned {
+        None => (width - BRACE, symbol_width(&equation.left) + EQUALS, INDENT),
+        Some(left) => (width, left + EQUALS, left + INDENT),
+    };
+    let lines = break_lines(&equation.terms, available, first, continued).into_iter();
+    let side = |(line, terms)| tex_terms(terms, numbers, line > 0);
+    lines.enumerate().map(side).collect()
+}
+
+/// Text from outside, printed so that TeX shows its characters and runs none of them: every special character becomes a
+/// command, control characters and line ends become a space, and characters that pdfTeX does not know by default their
+/// code point in brackets. The result never contains a line break, so it is as safe inside a comment as in the running
+/// text.
+///
+/// ```
+/// use romc::typeset::latex::tex_text;
+/// assert_eq!(tex_text(r"50% \input{x}"), r"50\% \textbackslash{}input\{x\}");
+/// ```
+pub fn tex_text(text: &str) -> String {
+    let mut tex = String::new();
+    let mut previous = ' ';
+    for character in text.chars() {
+        // Two of these in a row are a ligature.
+        if character == previous && "-,".contains(character) {
+            tex.push_str("{}");
+        }
+        previous = character;
+        match escaped(character) {
+            Some(command) => tex.push_str(command),
+            None if is_plain(character) => tex.push(character),
+            None => tex.push_str(&code_point(character)),
+        }
+    }
+    tex
+}
+
+/// Text from outside for a `%` comment: as it is, but on one line and without what changes how its reader sees the
+/// line. TeX skips the rest of a comment's line without looking at it, so only a line end could let something out.
+pub(crate) fn comment_text(text: &str) -> String {
+    text.replace(is_invisible, " ")
+}
+
+/// Characters that TeX would not print as they are, and their commands.
+const COMMANDS: &str = r#"
+    \ \textbackslash{} { \{ } \} $ \$ & \& # \# % \% _ \_ ^ \textasciicircum{} ~ \textasciitilde{}
+    < \textless{} > \textgreater{} | \textbar{} " \textquotedbl{} ' \textquotesingle{} ` \textasciigrave{}
+    – \textendash{} — \textemdash{} ‘ \textquoteleft{} ’ \textquoteright{} “ \textquotedblleft{}
+    ” \textquotedblright{} … \dots{} ° \textdegree{} µ \textmu{} ± \textpm{} × \texttimes{}
+    · \textperiodcentered{} ² \texttwosuperior{} ³ \textthreesuperior{}
+"#;
+
+fn escaped(character: char) -> Option<&'static str> {
+    if character.is_control() || character.is_whitespace() {
+        return Some(" ");
+    }
+    let words = COMMANDS.split_whitespace();
+    let mut pairs = words.clone().step_by(2).zip(words.skip(1).step_by(2));
+    let known = pairs.find(|(plain, _)| plain.starts_with(character));
+    known.map(|(_, command)| command)
+}
+
+/// ASCII letters, digits and harmless marks, and the Latin letters that the default fonts of pdfTeX carry.
+fn is_plain(character: char) -> bool {
+    character.is_ascii_alphanumeric()
+        || "!()*+,-./:;=?@[] ".contains(character)
+        || "ÀÁÂÃÄÅÆÇÈÉÊËÌÍÎÏÑÒÓÔÕÖØÙÚÛÜÝßàáâãäåæçèéêëìíîïñòóôõöøùúûüýÿČčĎďĚěŇňŘřŠšŤťŮůŽžŁłŃńŚśŹźŻżŐőŰű"
+            .contains(character)
+}
+
+/// A name reduced to what a `\label` and a file name can hold: ASCII letters and digits, everything else a hyphen.
+pub(crate) fn label(name: &str) -> String {
+    name.chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .collect()
 }

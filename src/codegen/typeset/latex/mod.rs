@@ -30,13 +30,9 @@
 //! `\input{flight_only_flight}` for one, and `\eqref{eq:flight-only:flight}` to refer to it.
 
 mod document;
-mod escape;
-mod lines;
 mod math;
-mod nomenclature;
 mod table;
 
 pub use document::emit;
-pub use escape::tex_text;
-pub use lines::tex_cases;
 pub(crate) use math::{tex, tex_symbol, tex_unit};
+pub use math::{tex_cases, tex_text};

@@ -3,8 +3,7 @@
 use crate::typeset::{CoefficientRow, CoefficientTable, Decimal, NumberStyle, width};
 
 use super::document::is_narrow;
-use super::escape::{label, tex_text};
-use super::math::{tex, tex_number, tex_symbol, tex_unit};
+use super::math::{label, tex, tex_number, tex_symbol, tex_text, tex_unit};
 
 const TERM_HEAD_EM: f64 = 2.31;
 /// Space around a column, in em: twice LaTeX's `\tabcolsep` at 10 pt.

@@ -3,10 +3,6 @@
 //! A [`ReducedModel`](crate::model::ReducedModel) enters, `NAME.html` leaves; [`system`] gives the `math` element of
 //! one phase to pages made elsewhere.
 
-mod math;
 mod page;
-mod prose;
 
-pub use math::mathml;
-pub use page::{Html, emit, system};
-pub use prose::{HtmlProse, HtmlText};
+pub use page::{Html, HtmlProse, HtmlText, emit, mathml, system};

@@ -14,7 +14,7 @@ use mcap::read::parse_record;
 use mcap::records::{ChunkHeader, Record, op};
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 
-use super::log::Log;
+use super::signal::Log;
 use super::topics::Topics;
 use crate::files::magic::{MAGIC_BYTES, MCAP, recognised};
 use crate::files::size::{Capped, Format, read_text_capped};

@@ -7,11 +7,8 @@
 //! yaw and their rates (`attitude`), and makes segments; `guess` writes a first map.
 
 mod assemble;
-mod attitude;
 mod elements;
 pub mod guess;
-mod interpolate;
-mod log;
 mod map;
 mod mcap;
 mod mcap_write;
@@ -21,7 +18,7 @@ mod text;
 mod topics;
 
 pub(super) use assemble::assemble;
-pub(super) use attitude::angles_of_quaternions;
+pub(super) use elements::angles_of_quaternions;
 pub use map::ColumnMap;
 pub(super) use map::TextFormat;
 pub(super) use mcap::{is_mcap, read_mcap};

@@ -3,12 +3,12 @@
 
 use std::path::Path;
 
-use super::log::{Channel, Log};
 use super::map::{ColumnMap, Delimiter, TextFormat};
-use crate::recording::columns::Column;
+use super::signal::{Channel, Log};
+use crate::recording::clock::Instant;
 use crate::recording::error::{RecordingError, RecordingFault, shortened};
-use crate::recording::instant::Instant;
 use crate::recording::lines::{self, Lines, MAX_ROWS, NumberReader};
+use crate::recording::reader::Column;
 
 /// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
 const LARGE: f64 = 1e8;

@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 
 use mcap::records::{Channel as Declared, SchemaHeader};
 
-use super::log::{Channel, Log};
 use super::message::{Definition, Layout, Value, undefined, unknown_encoding};
+use super::signal::{Channel, Log};
+use crate::recording::clock::Instant;
 use crate::recording::error::RecordingFault;
-use crate::recording::instant::Instant;
 use crate::recording::lines::MAX_ROWS;
 
 const MOST_TABLES: usize = 16; // most tables of a topic

@@ -3,8 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use super::batch::Batch;
-use super::loss::{JointLoss, LossWeights, Losses};
+use super::loss::{Batch, JointLoss, LossWeights, Losses};
 use super::parameters::Parameters;
 
 #[derive(Clone, Debug, PartialEq)]

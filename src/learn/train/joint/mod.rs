@@ -4,12 +4,10 @@
 //! 9 to 20 and their gradient), then `descent` (Adam, and the transfer steps of section IV-D) and [`joint`] (seeds,
 //! choice, assembly). Linear maps are networks of one layer.
 
-mod batch;
 mod descent;
 mod loss;
 mod network;
 mod parameters;
-mod projection;
 mod run;
 mod unroll;
 

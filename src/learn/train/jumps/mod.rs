@@ -4,7 +4,6 @@
 //! one kind. `landmarks` cuts each jump into parts and samples these at equal shares of their durations; `deviations`
 //! fits nodes and durations over the goals, and how accelerations change about such a trajectory.
 
-mod deviations;
 mod landmarks;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
@@ -13,8 +12,9 @@ use super::dataset::{Dataset, centred, mean};
 use super::latent::{EncodedSet, Latent};
 use super::metrics::{BODY_X, BODY_Z, PartScore};
 use crate::model::{self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap};
-use deviations::{GoalRegression, fit_deviations};
-use landmarks::{Cut, PartNodes, intervals, of_commonest_kind, sample};
+use landmarks::{
+    Cut, GoalRegression, PartNodes, fit_deviations, intervals, of_commonest_kind, sample,
+};
 
 /// Fewest jumps of one kind that say how jumps depend on their goal.
 pub(super) const LEAST_JUMPS: usize = 6;

@@ -4,19 +4,16 @@
 //! at a moving joint with fixed joints alone between it and the body. The body's frame is that of the trunk, the
 //! heaviest of the links that all four legs are below, wherever the root is.
 
-mod element;
 mod limbs;
 mod tree;
 
 use nalgebra::{Rotation3, Vector3};
 
-use super::entry::{Axis, JointEntry, LegEntry, RobotEntry};
-use super::identity::{RobotReading, identified};
+use super::identity::{Axis, JointEntry, LegEntry, RobotEntry, RobotReading, identified};
 use super::legs::{Part, Places};
 use super::read::{RobotFileError, RobotOptions};
-use element::{Element, document};
 use limbs::{Legs, Limb};
-use tree::{Joint, Tree};
+use tree::{Element, Joint, Tree, document};
 
 /// Components of axes and positions that are rounding of zero or one.
 const ROUNDING: f64 = 1e-12;

@@ -2,9 +2,8 @@
 
 use std::cmp::Reverse;
 
-use super::super::elements::Dimension;
-use super::super::elements::{QUATERNION, Quantity};
-use super::super::log::{Channel, Log};
+use super::super::elements::{Dimension, QUATERNION, Quantity};
+use super::super::signal::{Channel, Log};
 use super::names::{Reading, is_quantity, is_time, is_wanted, read, unit};
 use crate::recording::preprocess::median;
 use crate::robot::{JOINT_DIM, Robot};

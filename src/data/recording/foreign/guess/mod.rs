@@ -5,7 +5,6 @@
 //! divides forces; `write` prints the map with what it rests on.
 
 mod columns;
-mod evidence;
 mod feet;
 mod names;
 mod physics;
@@ -15,9 +14,9 @@ mod write;
 use std::path::Path;
 
 use super::assemble::assemble;
-use super::log::Log;
 use super::map::{ColumnMap, TextFormat};
 use super::mcap::{is_mcap, read_mcap};
+use super::signal::Log;
 use super::text::read_text;
 use crate::recording::error::{RecordingError, RecordingFault};
 use crate::robot::Robot;

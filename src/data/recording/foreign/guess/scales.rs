@@ -6,13 +6,13 @@ use std::f64::consts::TAU;
 use nalgebra::DMatrix;
 
 use super::super::assemble::assemble;
-use super::super::attitude::{angle_rates, angles_of_quaternions, in_world, unwrap};
-use super::super::elements::{Dimension, Quantity};
+use super::super::elements::{
+    Dimension, Quantity, angle_rates, angles_of_quaternions, in_world, unwrap,
+};
 use super::super::map::{ColumnMap, Frame};
 use super::columns::Group;
-use super::evidence::{Scale, reach, scale, slopes};
 use super::feet::force_lines;
-use super::physics::{NamedUnit, Reading, View};
+use super::physics::{NamedUnit, Reading, Scale, View, reach, scale, slopes};
 use super::write::{Lines, Source, unit_line};
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot};
 

@@ -6,12 +6,12 @@ use std::path::Path;
 use nalgebra::DMatrix;
 
 use super::super::elements::{Dimension, Quantity};
-use super::super::log::Log;
 use super::super::map::{Frame, Name};
+use super::super::signal::Log;
 use super::Guess;
 use super::columns::{Clock, Group, clock, groups};
-use super::evidence::{scale, slopes};
 use super::names::unit;
+use super::physics::{scale, slopes};
 use super::scales::{Scales, order_line};
 use crate::robot::Robot;
 
