@@ -801,6 +801,51 @@ fn trained_networks_go_through_every_command() {
 }
 
 #[test]
+fn study_means_over_seeds_and_counts_refusals() {
+    let folder = folder();
+    let (part, whole) = (path(&folder, "part"), path(&folder, "whole"));
+    fs::create_dir(&part).expect("a new folder");
+    let write = |name: &str, value: Value| {
+        fs::write(Path::new(&part).join(name), value.to_string()).expect("written");
+    };
+    write(
+        "study.json",
+        serde_json::json!({
+            "latent_dims": [2], "seeds": 3, "method": "closed-form", "settings": "",
+            "recordings": [], "training": 0, "romc": "0",
+        }),
+    );
+    let trained = |decoder_mse: f64, active: usize| {
+        serde_json::json!({ "trained": {
+            "decoder_mse": decoder_mse, "active": active, "active_all_phases": active,
+            "torque_r2": 0.5, "prediction_x_m": 0.01, "prediction_z_m": 0.02,
+        } })
+    };
+    let refused = serde_json::json!({ "refused": "no \"stable\" model" });
+    let outcomes = [trained(1.0, 10), trained(3.0, 20), refused];
+    for (seed, outcome) in (1..).zip(outcomes) {
+        let id = serde_json::json!({ "latent_dim": 2, "seed": seed });
+        let cell = serde_json::json!({ "id": id, "outcome": outcome });
+        write(&format!("cell-d02-s0{seed}.json"), cell);
+    }
+    let merge = ["study", "--merge", &part, "--out-dir", &whole];
+    let found = json(&[&merge[..], &["--lambda", "0.5"]].concat());
+    let row = &found["summary"]["dimensions"][0];
+    assert_eq!((&row["trained"], &row["refused"]), (&2.into(), &1.into()));
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let spread = &row["decoder_mse"];
+    assert_eq!(number(&spread["mean"]), 2.0);
+    assert_eq!(number(&spread["std"]), 2.0_f64.sqrt());
+    let expected = (2.0 + 10.0_f64.ln() + 6.0 + 20.0_f64.ln()) / 2.0;
+    assert!((number(&row["combined_loss"]["mean"]) - expected).abs() < 1e-12);
+    let table = fs::read_to_string(Path::new(&whole).join("cells.csv")).expect("a table");
+    assert_eq!(table.lines().count(), 4);
+    assert!(table.contains("\"no \"\"stable\"\" model\""), "{table}");
+    let mut commas = table.lines().map(|line| line.matches(',').count());
+    assert!(commas.all(|commas| commas == 9), "{table}");
+}
+
+#[test]
 fn study_in_parts_and_resumed_equals_the_whole() {
     let folder = folder();
     let out = |name: &str| path(&folder, name);

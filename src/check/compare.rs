@@ -11,42 +11,33 @@ use crate::symbolic::{CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPo
 
 const MAX_TERMS: usize = 5;
 
-/// Both files, phase by phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// Phases of the first file in its order, then those that only the second has.
     pub phases: Vec<PhaseComparison>,
 }
 
-/// One phase of both files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseComparison {
     /// Its name, or its place from 1 where no file names it.
     pub name: String,
-    /// One entry per acceleration.
     pub equations: Vec<EquationComparison>,
 }
 
-/// One acceleration in both files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EquationComparison {
-    /// `ddz1` and so on.
     pub output: String,
-    /// What is known of it.
     pub verdict: Verdict,
     /// A point where only one side has a value.
     pub one_sided: Option<Gap>,
 }
 
-/// Whether two right sides are equal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
     /// Proven equal wherever both have a value.
     Equal,
-    /// Proven equal but for the rounding of printed decimals, which moves coefficients of the normal form by at most
-    /// this.
+    /// But for the rounding of printed decimals, which moves coefficients of the normal form by at most this.
     EqualAsPrinted(f64),
-    /// Different at a point.
     Different(Difference),
     /// Neither a proof nor a point; the largest difference that was seen, and terms that differ.
     Undecided(Option<Gap>, Vec<TermDifference>),
@@ -54,50 +45,40 @@ pub enum Verdict {
     Missing(bool),
 }
 
-/// A point of difference and the terms that cause it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// Where, and both values.
     pub gap: Gap,
     /// Terms with different coefficients as the files write them, largest difference first.
     pub terms: Vec<TermDifference>,
-    /// Whether the terms differ by more than the rounding of their own coefficients, but not by more than that of all
-    /// coefficients at any one point that was tried.
+    /// The terms differ by more than their own rounding explains, but at no one point by more than all rounding.
     pub beside_rounding: bool,
 }
 
-/// A term and its coefficient in both files.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TermDifference {
-    /// The term in the grammar of candidate terms.
     pub term: String,
     /// Coefficient in the first file, 0 without the term.
     pub left: f64,
-    /// Coefficient in the second file.
     pub right: f64,
 }
 
 impl Verdict {
-    /// Whether it is a proof of equality.
     pub fn is_equal(&self) -> bool {
         matches!(self, Verdict::Equal | Verdict::EqualAsPrinted(_))
     }
 }
 
 impl Comparison {
-    /// Whether every equation of every phase is proven equal.
     pub fn says_the_same(&self) -> bool {
         self.verdicts().all(Verdict::is_equal)
     }
 
-    /// The verdicts of all equations.
     pub fn verdicts(&self) -> impl Iterator<Item = &Verdict> {
         let equations = self.phases.iter().flat_map(|phase| &phase.equations);
         equations.map(|equation| &equation.verdict)
     }
 }
 
-/// Compares two files.
 pub fn compare(left: &Side, right: &Side, options: &CheckOptions) -> Comparison {
     let outputs = left.latent_dim.max(right.latent_dim);
     let phases = paired(&left.phases, &right.phases)
@@ -320,7 +301,6 @@ impl Table {
         Self { rows }
     }
 
-    /// Rows whose coefficients are not the same exact number.
     fn differing(&self) -> impl Iterator<Item = &Row> {
         self.rows.iter().filter(|row| {
             let difference = row.difference();
@@ -353,7 +333,6 @@ impl Table {
     }
 }
 
-/// The value of a number or decimal.
 fn value_of(pool: &ExprPool, factor: ExprId) -> Option<Coefficient> {
     match pool.node(factor) {
         Node::Number(number) => Some(Coefficient::from(*number)),

@@ -21,6 +21,8 @@
 //! # Ok::<(), romc::check::CheckError>(())
 //! ```
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 mod compare;
 mod point;
 mod side;
@@ -34,13 +36,9 @@ pub use side::{CheckError, Side};
 
 use crate::import::SymbolNames;
 
-/// How files are read and compared.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {
-    /// Take decimals of LaTeX and Markdown as exact too.
     pub exact: bool,
-    /// Names that LaTeX has for the variables.
     pub symbols: SymbolNames,
-    /// Ranges in which points of difference are searched.
     pub domain: CheckDomain,
 }

@@ -20,14 +20,10 @@ const SCALES: [f64; 8] = [1.0, 1.0, 1.0, 0.3, 3.0, 0.03, 10.0, 100.0];
 
 pub(crate) type Point = BTreeMap<String, f64>;
 
-/// Both sides at a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gap {
-    /// The variables that occur.
     pub point: Point,
-    /// Value of the first file's side.
     pub left: f64,
-    /// Value of the second file's side.
     pub right: f64,
 }
 
@@ -50,7 +46,6 @@ impl Gap {
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Search {
-    /// A point where the sides differ by more than rounding explains.
     pub(super) gap: Option<Gap>,
     /// The point with the largest difference, which rounding may explain.
     pub(super) largest: Option<Gap>,
@@ -149,7 +144,6 @@ pub(super) fn search(
     search
 }
 
-/// The value with four significant digits, so that a point can be typed.
 fn short(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }

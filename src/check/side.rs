@@ -16,9 +16,7 @@ const FLOAT_DIGITS: usize = 16;
 /// Below this floats hold every multiple of 1/2.
 const LARGEST_HALF: f64 = 4e15;
 
-/// What is wrong with a file that is to be compared.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum CheckError {
     #[error("{}: cannot read the file", path.display())]
     Io { path: PathBuf, source: io::Error },
@@ -28,11 +26,9 @@ pub enum CheckError {
     Kind { file: String, found: String },
     #[error(transparent)]
     File(#[from] ImportError),
-    /// An equation that is too large once its numbers are kept as they are written.
     #[error("{file}:{line}: not a usable equation")]
     Expression {
         file: String,
-        /// Line of its left side; 0 in a model.
         line: usize,
         source: ParseError,
     },
@@ -40,12 +36,9 @@ pub enum CheckError {
     Domain { path: PathBuf, message: String },
 }
 
-/// The equations of one file.
 #[derive(Clone, Debug)]
 pub struct Side {
-    /// The file as it was named.
     pub file: String,
-    /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Whether its decimals stand for numbers that were rounded in the last digit.
     pub is_rounded: bool,
@@ -93,11 +86,7 @@ pub(crate) fn read_sides(
 }
 
 impl Side {
-    /// Reads the text of a file, whose format follows from the ending of its name. `known` are names of phases that labels of LaTeX
-    /// may end in, besides `contact` and `flight`.
-    ///
-    /// # Errors
-    /// [`CheckError`].
+    /// `known` are names of phases that labels of LaTeX may end in, besides `contact` and `flight`.
     pub fn from_bytes(
         file: &str,
         bytes: &[u8],
@@ -139,7 +128,6 @@ impl Side {
         Ok(side)
     }
 
-    /// The equations of a model as it was learned.
     pub fn of_model(file: &str, model: &ReducedModel) -> Self {
         let equations = Equations::as_learned(model);
         let phases = equations.phases().iter().map(|phase| {

@@ -9,7 +9,6 @@ use crate::check::{
 use crate::files::read_toml;
 use crate::import::SymbolNames;
 
-/// Compares two files. The exit code is 0 if they are proven equal and 1 otherwise.
 pub(super) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let options = CheckOptions {
         exact: arguments.exact,
@@ -104,7 +103,6 @@ fn side(is_second: bool) -> &'static str {
     if is_second { "B" } else { "A" }
 }
 
-/// A verdict in words, and as entries of a JSON object.
 fn described(verdict: &Verdict) -> (String, Value) {
     match verdict {
         Verdict::Equal => ("proven equal".to_owned(), json!({ "verdict": "equal" })),

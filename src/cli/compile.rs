@@ -66,7 +66,6 @@ pub(super) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     Ok(Answer::new(text, json))
 }
 
-/// The files that are read, after a check of the one that the model is saved to.
 fn inputs(arguments: &CompileArguments) -> Result<Inputs<'_>, Error> {
     let simplification = &arguments.simplification;
     let inputs = Inputs::reading(&simplification.reading)
@@ -127,7 +126,6 @@ fn text(
     text
 }
 
-/// The jump of `--plan` with its inputs by the rule of the model: the one segment of the recording.
 fn planned(
     arguments: &CompileArguments,
     model: &ReducedModel,

@@ -52,10 +52,6 @@ fn chained(recordings: Vec<Recording>) -> Vec<Segment> {
     segments
 }
 
-/// Writes a recording in the format that the ending of its name says.
-///
-/// # Errors
-/// [`Error::NotOne`] for an MCAP file of several, [`Error::Exists`], [`Error::Recording`] if the file system refuses.
 pub(super) fn write_recording(
     path: &Path,
     segments: Vec<Segment>,

@@ -27,7 +27,6 @@ pub use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
 
-/// What an output file holds: the endings that it may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Format(&'static [&'static str]);
 
@@ -62,13 +61,12 @@ impl<'a> Inputs<'a> {
         Ok(self)
     }
 
-    /// These and the file of a robot, unless the name is that of one of romc's own.
     pub(super) fn and_robot(self, name: Option<&'a str>) -> Self {
         let is_file = |name: &&str| !crate::robot_file::known_names().contains(name);
         self.and(name.filter(is_file))
     }
 
-    /// Refuses to write a file that is read, by whatever path: it, or the folder that it is in, is an input.
+    /// Refuses to write a file that is read, or that is in a folder that is.
     fn check(&self, output: &Path) -> Result<(), Error> {
         let Ok(place) = output.canonicalize() else {
             return Ok(()); // what is not there is not read
@@ -91,8 +89,6 @@ impl<'a> Inputs<'a> {
         Err(Error::Output { path, message })
     }
 
-    /// Refuses an output by its name alone: a folder, a name that says another format, one of the inputs. What is there
-    /// and no file of a disk may have any name.
     pub(super) fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
         let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
             let message = "is a folder; expected the name of a file";
@@ -116,8 +112,7 @@ impl<'a> Inputs<'a> {
         Err(Error::Output { path, message })
     }
 
-    /// Refuses an output that could not be written, before long work begins: by its name, as it is there and may not be
-    /// replaced, or as its folder is not.
+    /// Refuses an output that could not be written, before long work begins.
     pub(super) fn check_output(
         &self,
         path: Option<&Path>,
@@ -139,7 +134,6 @@ impl<'a> Inputs<'a> {
         }
     }
 
-    /// Writes files into a folder, none of them one of these, nor one of that name that romc did not make.
     pub(super) fn write_folder(
         &self,
         folder: &Path,
@@ -171,7 +165,6 @@ impl<'a> Inputs<'a> {
     }
 }
 
-/// Writes a whole file, unless it is there, also since a moment ago, and may not be replaced.
 pub(super) fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
     let written = write_whole(path, overwrite, |out| out.write_all(contents));
     let path = path.to_owned();
@@ -198,7 +191,6 @@ pub(super) fn read_settings<T: DeserializeOwned>(
     Ok(settings)
 }
 
-/// The reader that the arguments ask for, with this treatment of clocks unless they name another.
 pub(super) fn reader(
     arguments: &ReadingArguments,
     clocks: Clocks,
@@ -220,7 +212,6 @@ pub(super) fn read_for(
     read_recordings(paths, arguments, model.robot().ok())
 }
 
-/// The one jump of the recording after `--plan`, of a model's robot.
 pub(super) fn read_jump(
     model: &ReducedModel,
     path: &PathBuf,
@@ -235,7 +226,6 @@ pub(super) fn read_jump(
     Ok(recording.segments.swap_remove(0))
 }
 
-/// Reads recordings of a robot, if it is known, showing which; what reading did besides goes to stderr.
 pub(super) fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,
@@ -273,8 +263,7 @@ pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
     (mismatch::notes(recording, robot).iter()).for_each(|found| note(found));
 }
 
-/// Prints on stderr which recordings are given twice, under whatever name: a jump in two sets judges nothing, and one
-/// that counts twice says less than two.
+/// A jump in two sets judges nothing, and one that counts twice says less than two.
 pub(super) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
     let of_set = |(set, paths): &(_, Vec<_>)| paths.iter().map(|path| (*set, *path)).collect();
@@ -297,7 +286,6 @@ pub(super) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     }
 }
 
-/// Prints a note where restarts come later than every recording ends, so that restarted rollouts are whole ones.
 pub(super) fn note_late_restarts(recordings: &[Recording], restart_every_s: f64) {
     let segments = recordings.iter().flat_map(|recording| &recording.segments);
     let longest_s = segments.map(Segment::duration_s).fold(0.0, f64::max);
@@ -331,7 +319,6 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
     text.chars().map(shown).collect()
 }
 
-/// Each of these on a line of its own, behind the same words.
 pub(super) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
     let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
     lines.collect()
@@ -356,20 +343,17 @@ pub(super) fn extend(object: &mut Value, more: Value) {
     }
 }
 
-/// The name of a model: as given, or that of its file without folder and ending.
 pub(super) fn named(given: Option<&str>, output: &Path) -> String {
     let stem = (output.file_stem()).expect("an output without a name is refused");
     given.map_or_else(|| stem.to_string_lossy().into_owned(), str::to_owned)
 }
 
-/// A spinner on stderr, shown only when stderr is a terminal.
 pub(super) fn spinner(message: &'static str) -> ProgressBar {
     let bar = styled(ProgressBar::new_spinner(), "{spinner} {msg} [{elapsed}]");
     bar.enable_steady_tick(Duration::from_millis(120));
     bar.with_message(message)
 }
 
-/// A bar on stderr for a known number of steps, shown only when stderr is a terminal.
 pub(super) fn progress_bar(message: impl Into<String>) -> ProgressBar {
     styled(ProgressBar::new(0), "{msg} {wide_bar} {pos}/{len}").with_message(message.into())
 }

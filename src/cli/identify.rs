@@ -104,7 +104,6 @@ fn two_digits(value: f64) -> String {
     format!("{value:.*}", usize::try_from(2 - before_point).unwrap_or(0))
 }
 
-/// The keys that other programs rely on; see `docs/identify.md`.
 fn report(found: &Identification, arguments: &IdentifyArguments) -> Value {
     let alone = &found.force_alone;
     let [viscous, dry, armature] = found.losses();

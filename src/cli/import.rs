@@ -73,11 +73,8 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
 /// An imported model, compared with recordings if there are any.
 #[derive(Debug)]
 pub struct Compared {
-    /// The model, with the statistics of the recorded inputs.
     pub imported: Imported,
-    /// What the recordings reveal about it.
     pub check: Option<RoundTrip>,
-    /// What is wrong with it and no reason to refuse it.
     pub fault: Option<String>,
 }
 
@@ -102,7 +99,12 @@ pub fn import_compared(
     let compared = |options: &ImportOptions| -> Result<(Imported, RoundTrip), Error> {
         let mut imported = read(options)?;
         imported.model = with_input_statistics(imported.model, segments)?;
-        let check = RoundTrip::of_import(&imported.model, segments, options.library_order)?;
+        let tensors = |part: &str| {
+            let used = imported.report.used.iter().find(|used| used.role == part);
+            used.map(|used| used.tensor.clone())
+        };
+        let order = options.library_order;
+        let check = RoundTrip::of_import(&imported.model, segments, order, &tensors)?;
         let check = check.ok_or_else(|| needs_maps(&imported.report))?;
         Ok((imported, check))
     };
@@ -121,12 +123,7 @@ pub fn import_compared(
         options.library_order = None;
         read(&options)?;
     }
-    let tensor = |part: &str| {
-        let used = imported.report.used.iter().find(|used| used.role == part);
-        used.map(|used| used.tensor.clone())
-    };
-    let fault = check.fault(&tensor);
-    match fault {
+    match check.fault() {
         Some(fault) if check.is_refused() && !unchecked => Err(Error::Mismatch {
             file: imported.report.file.into(),
             fault,
@@ -150,7 +147,6 @@ fn needs_maps(report: &ImportReport) -> Error {
     ImportError::option("--inputs-from", found, expected).into()
 }
 
-/// Commands that cannot use a model, and the option that mends it.
 fn lacking(model: &ReducedModel) -> Option<&'static str> {
     let has_maps = model.encoder_map().is_ok() && model.decoder_map().is_ok();
     let mut phases = 0..model.phases().len();
@@ -246,7 +242,6 @@ fn shape(dims: &[usize]) -> String {
     }
 }
 
-/// What the recordings of `--inputs-from` say of the imported model, in words and as JSON.
 fn describe_check(check: &RoundTrip, fault: Option<&str>) -> (String, Value) {
     let mut text = format!(
         "\nOn the recordings: decode(encode(x)) misses {:.3} of the variance",

@@ -22,7 +22,6 @@ use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot, WrenchFrame};
 /// Endings of models; those of other tools are refused with the lines that convert them.
 const OF_MODELS: &str = "json safetensors pt pth ckpt keras onnx tflite msgpack";
 
-/// Inspects each file: those with an ending of models as such, all others as recordings.
 pub(super) fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     let robot = robot::chosen(&arguments.robot)?;
     if arguments.guess {
@@ -80,7 +79,6 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
     Ok(Answer::new(text, json))
 }
 
-/// Library terms that still fit as a pattern in a terminal.
 const PATTERN_WIDTH: usize = 120;
 const DOMINANT: usize = 4;
 
@@ -186,7 +184,6 @@ fn input_rule(model: &ReducedModel) -> String {
     format!("{rule} torques of the motors less what the joints take\n\n{table}")
 }
 
-/// Rows are outputs, columns terms; a dot is an inactive one.
 fn pattern(equations: &Equations<'_>, phase: usize) -> String {
     let mut text = format!(
         "Xi of {} (one column per term, + positive, - negative)\n",
@@ -223,7 +220,6 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Dominant> {
 const BAR_WIDTH: usize = 60;
 /// Shorter spans are feet that leave or land one after the other, part of the span before them.
 const CHATTER: usize = 10;
-/// Findings shown to people; JSON holds them all.
 const FINDINGS_SHOWN: usize = 12;
 
 fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
@@ -285,7 +281,6 @@ fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer, Error>
     Ok(Answer::new(text, json))
 }
 
-/// Feet on the ground over time, one character per slice of equal duration.
 fn time_bar(segment: &Segment) -> String {
     let feet = (0..BAR_WIDTH).map(|slot| segment.feet[slot * segment.len() / BAR_WIDTH]);
     let character = |feet: [bool; 4]| match feet {
@@ -355,7 +350,6 @@ fn range_table(ranges: &[Ranges]) -> Table {
         .table()
 }
 
-/// A finding without the place of its recording.
 pub(super) fn finding_json(finding: &Finding) -> Value {
     json!({
         "what": finding.kind.description(),

@@ -13,8 +13,6 @@ use crate::report::{
 };
 use crate::robot::{JOINT_DIM, Robot};
 
-/// Runs the controller along each recording. The exit code is 1 if the model is not fit for torques or control there,
-/// or if most steps along one of them have no plan.
 pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
@@ -74,8 +72,6 @@ pub(super) fn run_all(
     Ok(runs)
 }
 
-/// Runs with default settings: with the plain lift, then with the consistent one. Recordings of fewer samples than a
-/// default stage has are followed at the rate of the slowest, which a note says.
 pub(super) fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],

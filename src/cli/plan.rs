@@ -7,7 +7,6 @@ use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict};
 use crate::report::{plan_figures, plan_json, reach_figure};
 use crate::robot::Robot;
 
-/// Plans a jump and writes it unless it is not to be trusted and not forced, or maps what can be planned.
 pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])

@@ -12,7 +12,6 @@ use crate::simplify::Tolerance;
 use crate::study::{Store, Summary};
 use crate::train::sha256;
 
-/// Writes the page, and the figures if a folder for them is given. The exit code is 1 if the model is fit for nothing.
 pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])

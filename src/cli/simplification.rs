@@ -27,8 +27,7 @@ pub(super) struct Outcome {
     domain_files: Vec<String>,
 }
 
-/// Simplifies a model as typed, over the ranges of one TOML file or the box around all samples of recordings; nothing
-/// if no domain was given.
+/// Nothing if no domain was given.
 pub(super) fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
@@ -125,8 +124,7 @@ impl Outcome {
         }
     }
 
-    /// Adds the certificate to the emitted files and, if anything changed, a comment to those that can hold one; its
-    /// summary, and the same as JSON. `equations` are those of the model as they are printed, `rounding` is how.
+    /// Adds the certificate, and a comment to files that can hold one; `equations` are those of the model as printed.
     pub(super) fn add_to(
         &self,
         files: &mut Vec<EmittedFile>,
@@ -164,7 +162,6 @@ impl Outcome {
         Ok((self.summary(), value))
     }
 
-    /// Adds a comment to each file of equations or code that names the model it was simplified from.
     fn comment(&self, files: &mut [EmittedFile], certificate_file: &str) {
         let within = self.certificate.tolerance.words();
         let digest = artifact::digest(&self.original).short();
@@ -202,7 +199,6 @@ impl Outcome {
     }
 }
 
-/// What exact simplification did, one line for each step; nothing if it did nothing.
 pub(super) fn exact_words(equations: &Equations<'_>) -> String {
     match equations.steps() {
         [] => String::new(),
@@ -212,9 +208,7 @@ pub(super) fn exact_words(equations: &Equations<'_>) -> String {
 
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
 
-/// Simplifies a model within several tolerances over the recordings of an assessment: a table with a row per tolerance
-/// (size, error and rollouts of the simplified equations), one of the errors of each equation within `chosen`, and one
-/// of every change within it.
+/// Sizes, errors and rollouts within several tolerances; errors of each equation within `chosen`; changes within it.
 pub(super) fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,

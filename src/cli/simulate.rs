@@ -9,7 +9,6 @@ use crate::report::{
     assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table, verdict_lines,
 };
 
-/// Rolls the model out over every segment of every recording. The exit code is 1 if predictions of body x or z fail.
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     Inputs::reading(&arguments.reading)
         .and([&arguments.model])

@@ -19,7 +19,6 @@ pub(crate) struct Content<'a> {
     pub verdict: &'a Verdict,
     /// The controller along each recording with the plain lift; empty if it did not run.
     pub plain: &'a [NamedRun],
-    /// The same with the lift that keeps torques and forces consistent.
     pub consistent: &'a [NamedRun],
     pub study: Option<&'a Summary>,
     pub plan: Option<&'a Segment>,
@@ -36,9 +35,7 @@ pub(crate) struct AllFigures {
 
 pub(crate) struct JumpFigures {
     pub title: String,
-    /// Root mean square errors of body x and z over the whole jump, in m.
     pub body_rms_m: [Option<f64>; 2],
-    /// The robot recorded and predicted, as a strip for paper and animated.
     pub motion: Option<(Figure, Film)>,
     pub body: Figure,
     /// Figures to fold away, each with a title: accelerations, template models, joints, and the controller's run if
@@ -95,7 +92,6 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelErro
     Ok(figures)
 }
 
-/// Figures 6, 9 and 15 of the paper.
 fn encoder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
@@ -177,7 +173,6 @@ fn millimetres(spread: Spread) -> [f64; 3] {
     range(spread).map(|metres| 1000.0 * metres)
 }
 
-/// Logarithms of a bar; one that reaches below zero ends at a tenth of its middle.
 fn logarithm(spread: Spread) -> [f64; 3] {
     let [low, mean, high] = range(spread);
     [low.max(0.1 * mean), mean, high].map(f64::log10)
@@ -200,7 +195,6 @@ pub(crate) fn control_figures(
     figures.collect()
 }
 
-/// The first phase without input statistics, by which the controller weighs inputs.
 pub(crate) fn without_statistics(model: &ReducedModel) -> Option<&str> {
     let mut phases = model.phases().iter().enumerate();
     let without = phases.find(|&(index, _)| model.input_statistics(index).is_err());

@@ -8,10 +8,8 @@ use super::tables::template_rms;
 use super::*;
 
 pub(crate) struct Introduction {
-    /// One line: fit for what, and for what not.
     pub headline: String,
     pub sentences: Vec<String>,
-    /// The jumps: where from, how long, seen in training or not, errors.
     pub recordings: Table,
 }
 
@@ -47,7 +45,7 @@ pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
     }
 }
 
-/// Why the model fails, where that is known: its maps lose the torques, or its training had these very recordings.
+/// Why the model fails, where that is known.
 fn cause(content: &Content<'_>) -> Option<String> {
     let failed = &content.verdict.failed;
     let lift_r2 = content.assessment.lift.torque.r2().contact;
@@ -97,7 +95,6 @@ fn listed(names: &[String]) -> String {
     }
 }
 
-/// Whether the training had a recording; `None` if the model file does not name its recordings.
 fn seen(content: &Content<'_>, path: &Path) -> Option<bool> {
     let recordings = content.model.provenance().get("recordings");
     let entries = recordings.and_then(Value::as_array)?.iter();
@@ -175,8 +172,6 @@ fn beside_pendulum(content: &Content<'_>) -> Option<String> {
     ))
 }
 
-/// The controller's recovery from a push, compared with the same controller without feedback, and what became of its
-/// steps.
 fn commands(content: &Content<'_>) -> Option<String> {
     let runs = || content.consistent.iter().map(|(_, run)| run);
     let steps: usize = runs().map(|run| run.summary.steps).sum();

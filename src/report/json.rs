@@ -82,7 +82,6 @@ fn rollouts_json(
     })
 }
 
-/// A planned jump: goal and what is reached, durations, how far it is from what was recorded.
 pub fn plan_json(planned: &Plan) -> Value {
     let durations = (planned.parts.iter()).map(|part| (part.name.clone(), json!(part.duration_s)));
     json!({

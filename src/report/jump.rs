@@ -12,7 +12,6 @@ use crate::sim::Rollout;
 
 const FRAMES: usize = 10;
 
-/// Whether each coordinate of the robot enters a latent one at the beginning of a run.
 pub(crate) fn modelled(
     model: &ReducedModel,
     run: &SegmentRun<'_>,
@@ -23,7 +22,6 @@ pub(crate) fn modelled(
 
 pub(super) struct JumpName {
     pub suffix: String,
-    /// Name of the recording, with the row where the jump begins if there may be several.
     pub words: String,
 }
 
@@ -42,7 +40,6 @@ impl JumpName {
     }
 }
 
-/// A value of every sample; none where a rollout did not arrive.
 type Samples = Vec<Option<DVector<f64>>>;
 
 fn predicted(
@@ -62,7 +59,6 @@ pub(super) struct Jump<'a> {
     pub assessment: &'a Assessment<'a>,
     pub run: &'a SegmentRun<'a>,
     pub place: JumpName,
-    /// Coordinates of the robot along the rollout over the whole jump, and along the restarted one.
     full: Samples,
     restarted: Samples,
     modelled: Vec<bool>,
@@ -94,15 +90,13 @@ impl<'a> Jump<'a> {
         })
     }
 
-    /// The jumps of an assessment.
     pub(super) fn all(content: &Content<'a>) -> Result<Vec<Self>, ModelError> {
         let runs = content.assessment.runs.iter().enumerate();
         runs.map(|(index, run)| Self::new(content, index, run))
             .collect()
     }
 
-    /// The robot as it moved and as the model predicts it over the whole jump, as a strip and as an animation; none for
-    /// a model without a robot.
+    /// As a strip and as an animation; none without a robot.
     pub fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
         let robot = self.model.robot().ok()?;
         let segment = self.run.segment;
@@ -127,7 +121,7 @@ impl<'a> Jump<'a> {
         ))
     }
 
-    /// The robot along the rollout over the whole jump; coordinates that the model does not encode stay as recorded.
+    /// Coordinates that the model does not encode stay as recorded.
     fn states(&self) -> Samples {
         let recorded = &self.run.segment.x;
         let mut states = self.full.clone();
@@ -156,7 +150,6 @@ impl<'a> Jump<'a> {
         (flights.map(|span| (time_s[span.start], time_s[span.end - 1]))).collect()
     }
 
-    /// A figure of rollouts beside the recording; `id` gets the number of the jump.
     fn rollout_figure(&self, id: &str, caption: String, panels: Vec<Panel>) -> Figure {
         let every = self.assessment.restart_every_s;
         let restarted = format!("model, restarted every {every} s");
@@ -168,7 +161,6 @@ impl<'a> Jump<'a> {
         Figure::over_time(self.place.id(id), caption, panels, &legend)
     }
 
-    /// A recorded line with the two of the rollouts.
     fn beside_rollouts(
         &self,
         title: String,
@@ -263,7 +255,6 @@ impl<'a> Jump<'a> {
         figure.in_columns(2, (360.0, 180.0))
     }
 
-    /// Root mean square errors of body x and z over the whole jump, in m; none where the rollout arrives nowhere.
     pub(crate) fn body_rms_m(&self) -> [Option<f64>; 2] {
         let of = |row: usize| {
             let mut sums = FitSums::default();

@@ -19,8 +19,6 @@ const WIDTH_EM: f64 = 44.0;
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PageOptions {
-    /// Effects of simplification within several tolerances, and every change of the chosen one; tables without rows are
-    /// left out.
     pub simplification: Vec<Table>,
     pub commands: Vec<String>,
 }
@@ -53,7 +51,6 @@ pub(crate) fn page(
     Ok(rendered(&page)?)
 }
 
-/// What the template shows; it escapes texts by [`html`], and sentences of the report itself by [`prose`].
 #[derive(Template)]
 #[template(path = "report/page.askama", config = "templates/askama.toml")]
 struct Page<'a> {
@@ -76,7 +73,6 @@ fn html(text: &str) -> String {
     HtmlText(text).to_string()
 }
 
-/// Symbols in the text become mathematics.
 fn prose(text: &str) -> String {
     HtmlProse(text).to_string()
 }
@@ -117,7 +113,6 @@ const DIGEST: usize = 12;
 
 #[derive(Default)]
 pub(crate) struct Origin {
-    /// Name and value of each entry that fits a cell.
     pub facts: Vec<(String, String)>,
     /// The others as tables with their names as captions: objects by place and value, lists of objects by their keys.
     pub lists: Vec<Table>,
@@ -169,7 +164,6 @@ fn spaced(key: &str) -> String {
     key.replace('_', " ")
 }
 
-/// A value in one cell: numbers with four digits, digests shortened, lists with commas.
 fn text(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(),

@@ -131,7 +131,6 @@ pub(crate) fn reach_figure(reach: &GoalMap, prior: &JumpPrior) -> Figure {
     figure.over("distance, m").in_columns(1, (420.0, 280.0))
 }
 
-/// The outline of the goals with one of these verdicts: for each apex, the stretch of distances.
 fn border(reach: &GoalMap, role: Role, words: &[&str]) -> Series {
     let rows = reach.points.chunks_exact(reach.distances_m.len());
     let stretches = rows.zip(&reach.apexes_m).filter_map(|(row, apex)| {

@@ -10,7 +10,6 @@ pub(super) struct Section<'a> {
     pub title: &'static str,
     pub paragraphs: Vec<String>,
     pub tables: Vec<Table>,
-    /// Tables whose captions are the summaries that unfold them.
     pub folded: Vec<Table>,
     pub figures: &'a [Figure],
 }
@@ -195,7 +194,6 @@ const PLAIN: &str = "Plain lift, u = W_e^T u_lat";
 const CONSISTENT: &str = "Consistent lift";
 const MOST_RUNS: usize = 6;
 
-/// Of each section its name in links, its title and what it says of every model.
 const WORDS: [&[&str]; 8] = [
     &[
         "verdict",

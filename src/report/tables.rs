@@ -26,7 +26,6 @@ fn coordinates(assessment: &Assessment<'_>) -> Table {
     table
 }
 
-/// Fit of every coordinate, whole and restarted; a coordinate that no latent one takes in is marked.
 pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let mut table = coordinates(assessment);
@@ -141,7 +140,6 @@ pub(crate) fn invariance_table(invariance: &Invariance) -> Table {
         .captioned(words)
 }
 
-/// What drives a robot, its predictions, its torques, how far the body is off after a push.
 type Driven<'a> = (
     &'static str,
     Option<&'a PredictionError>,
@@ -149,7 +147,6 @@ type Driven<'a> = (
     Option<f64>,
 );
 
-/// The model and its baselines along each recording: figures that a wrong model changes.
 pub(crate) fn control_table(runs: &[NamedRun]) -> Table {
     let judged = (runs.iter()).filter_map(|(path, run)| Some((path, run.metrics.as_ref()?)));
     let rows = judged.flat_map(|(path, metrics)| driven(metrics).map(|row| (path, row)));
@@ -233,7 +230,6 @@ pub(crate) fn verdict_table(verdict: &Verdict) -> Table {
         .table()
 }
 
-/// A verdict as lines of text: fit for what, every counted row that fails, every other that is worse than its baseline.
 pub(crate) fn verdict_lines(verdict: &Verdict) -> String {
     let failed = verdict.rows.iter().filter(|row| row.passed == Some(false));
     let lines = failed.map(|row| match row.counts {
@@ -252,8 +248,6 @@ pub(super) fn file_name(path: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// The solver's work along each recording, and what the lift makes of recorded inputs, one row per run: whether the
-/// dynamics are right changes none of it.
 pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
     let rows = runs.iter().map(|(path, run)| (path, &run.summary));
     let whole = |us: f64| format!("{us:.0}");

@@ -16,12 +16,6 @@ use crate::robot::{Robot, STATE_DIM};
 use crate::train::{Method, Monitor, Origin, Recordings, TrainError, TrainOptions, Trained};
 
 /// Trains the cells of a shard that the store misses; each is kept as soon as it is finished.
-///
-/// Seeds of the joint method are random starts, as published. The closed form finds the same model from every start, so
-/// its seed `s` leaves out every fifth training jump, beginning with the `s`-th: its spread says how much the
-/// recordings matter. Where the encoder may look at fewer coordinates than the latent space has, the mask is lifted.
-/// `[training, validation]` are the recordings, `options` the settings but for name, latent dimension and seed,
-/// `finished` is called for every cell. The result does not depend on the number of threads.
 pub(crate) fn run(
     store: &Store,
     shard: Shard,
@@ -104,32 +98,25 @@ fn without_fold(recordings: &[Recording], seed: u64) -> Vec<Recording> {
     }
 }
 
-/// Seeds of the closed form leave out every jump whose number has this remainder of the seed.
 pub(crate) const FOLDS: usize = 5;
 
-/// The trainings of a study; parts of one study have equal plans.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     pub latent_dims: Vec<usize>,
-    /// Seeds, counted from 1.
     pub seeds: usize,
     pub method: Method,
-    /// The settings of the training as flags.
     pub settings: String,
     /// Digests of the recordings, training then validation.
     pub recordings: Vec<String>,
-    /// Of all recordings, how many are for training.
     pub training: usize,
     pub romc: String,
 }
 
-/// One training of a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CellId {
     pub latent_dim: usize,
-    /// Seed, from 1.
     pub seed: u64,
 }
 
@@ -150,7 +137,6 @@ impl Plan {
         }
     }
 
-    /// All trainings, by dimension and then seed.
     pub(crate) fn cells(&self) -> Vec<CellId> {
         let seeds = 1..=self.seeds as u64;
         let of = |&latent_dim: &usize| seeds.clone().map(move |seed| CellId { latent_dim, seed });

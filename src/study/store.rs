@@ -21,7 +21,6 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    /// The store of `plan` in `folder`, which is made if it is not there.
     pub(crate) fn create(folder: &Path, plan: Plan) -> Result<Self, StudyError> {
         plan.check()?;
         fs::create_dir_all(folder).map_err(refused(folder, "make the folder"))?;
@@ -70,7 +69,6 @@ impl Store {
         write_json(&self.path(cell.id), cell, Overwrite::Replace)
     }
 
-    /// All finished trainings in the order of the plan.
     pub(crate) fn cells(&self) -> Result<Vec<Cell>, StudyError> {
         let ids = self.plan.cells().into_iter();
         ids.filter_map(|id| self.get(id).transpose()).collect()
@@ -81,7 +79,6 @@ impl Store {
         cells.filter(|id| !self.path(*id).exists()).collect()
     }
 
-    /// Takes over all finished trainings of another part of the same study.
     pub(crate) fn merge(&self, part: &Store) -> Result<(), StudyError> {
         if let Some(difference) = difference(&part.plan, &self.plan) {
             let path = part.folder.join(PLAN);

@@ -14,12 +14,10 @@ pub(crate) struct Cell {
     pub outcome: Outcome,
 }
 
-/// Metrics, or the reason why there are none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     Trained(Metrics),
-    /// Training refused, for this reason; the same settings would refuse again.
     Refused(String),
 }
 
@@ -27,15 +25,10 @@ pub enum Outcome {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Metrics {
-    /// Mean square of `x - decode(encode(x))`, scaled units (16).
     pub decoder_mse: f64,
-    /// Active coefficients in the first phase (contact), as the paper counts them.
     pub active: usize,
-    /// Active coefficients over all phases.
     pub active_all_phases: usize,
-    /// Coefficient of determination of the joint torques of the plain lift from projected inputs.
     pub torque_r2: f64,
-    /// Root mean square error of body x over predictions of 0.1 s, m.
     pub prediction_x_m: f64,
     pub prediction_z_m: f64,
 }
@@ -93,20 +86,15 @@ pub(crate) struct DimensionSummary {
     pub trained: usize,
     pub refused: usize,
     pub decoder_mse: Spread,
-    /// Active coefficients in contact.
     pub active: Spread,
-    /// `2 E_dec + 2 lambda ln |Xi|` (29), over all phases.
     pub combined_loss: Spread,
-    /// Coefficient of determination of the torques of the plain lift.
     pub torque_r2: Spread,
     pub prediction_x_m: Spread,
     pub prediction_z_m: Spread,
 }
 
-/// A whole study by latent dimension.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
-    /// Weight of the complexity in (29).
     pub lambda: f64,
     /// Ascending; dimensions without any model are left out.
     pub dimensions: Vec<DimensionSummary>,
@@ -124,7 +112,6 @@ impl Summary {
         }
     }
 
-    /// The latent dimension of least combined loss (29).
     pub(crate) fn best(&self) -> Option<usize> {
         let loss = |row: &&DimensionSummary| row.combined_loss.mean;
         let rows = self.dimensions.iter();
@@ -132,7 +119,6 @@ impl Summary {
         best.map(|row| row.latent_dim)
     }
 
-    /// One row per latent dimension: means and standard deviations.
     pub fn table(&self) -> Table {
         let mut table = Table::of(&self.dimensions)
             .column("latent_dim", "", |row| row.latent_dim)
@@ -159,7 +145,6 @@ impl Summary {
     }
 }
 
-/// One row per training, in the order of the plan.
 pub(crate) fn cell_table(cells: &[Cell], lambda: f64) -> Table {
     let columns = "latent_dim,seed,decoder_mse,active,active_all_phases,combined_loss,torque_r2,prediction_x_m,prediction_z_m,refused";
     let mut table = Table::new(columns.split(','));
@@ -209,44 +194,4 @@ fn dimension(cells: &[Cell], latent_dim: usize, lambda: f64) -> Option<Dimension
         prediction_x_m: spread(&|found| found.prediction_x_m)?,
         prediction_z_m: spread(&|found| found.prediction_z_m)?,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::study::run::CellId;
-
-    #[test]
-    fn summary_means_over_seeds_and_counts_refusals() {
-        let latent_dim = 2;
-        let trained = |decoder_mse: f64, active: usize| {
-            Outcome::Trained(Metrics {
-                decoder_mse,
-                active,
-                active_all_phases: active,
-                torque_r2: 0.5,
-                prediction_x_m: 0.01,
-                prediction_z_m: 0.02,
-            })
-        };
-        let refused = Outcome::Refused("no \"stable\" model".to_owned());
-        let outcomes = (1..).zip([trained(1.0, 10), trained(3.0, 20), refused]);
-        let cells = outcomes.map(|(seed, outcome)| Cell {
-            id: CellId { latent_dim, seed },
-            outcome,
-        });
-        let cells: Vec<Cell> = cells.collect();
-        let summary = Summary::of(&cells, 0.5);
-        let row = &summary.dimensions[0];
-        assert_eq!((row.trained, row.refused), (2, 1));
-        let spread = (row.decoder_mse.mean, row.decoder_mse.std);
-        assert_eq!(spread, (2.0, 2.0_f64.sqrt()));
-        let expected = (2.0 + 10.0_f64.ln() + 6.0 + 20.0_f64.ln()) / 2.0;
-        assert!((row.combined_loss.mean - expected).abs() < 1e-12);
-        let table = cell_table(&cells, 0.5).csv();
-        assert_eq!(table.lines().count(), 4);
-        assert!(table.contains("\"no \"\"stable\"\" model\""), "{table}");
-        let mut commas = table.lines().map(|line| line.matches(',').count());
-        assert!(commas.all(|commas| commas == 9), "{table}");
-    }
 }

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use romc::evaluate::{ReferenceInput, along_recording, lift_comparison};
+use romc::evaluate::{
+    ControlMetrics, ReferenceInput, along_recording, control_metrics, lift_comparison,
+};
 use romc::mpc::{Lift, MpcSettings, Source};
 use romc::recording::{Recording, Segment};
 
@@ -74,7 +76,12 @@ fn run_along_a_recording_that_the_model_follows_finds_its_torques() {
         "{summary:?}"
     );
     assert!(summary.tracking_rms.expect("plans") < 0.05, "{summary:?}");
-    assert!(summary.step_us.p50 > 0.0 && summary.step_us.p50 <= summary.step_us.max);
+    // Percentiles are ranks of the sorted times.
+    let mut times: Vec<f64> = run.rows.iter().map(|row| row.command.solve_us).collect();
+    times.sort_by(f64::total_cmp);
+    let of_steps = &summary.step_us;
+    let ranks = [times[54], times[107], times[108]];
+    assert_eq!([of_steps.p50, of_steps.p99, of_steps.max], ranks);
     for row in &run.rows {
         assert_eq!(row.command.source, Source::Plan);
         for joint in 0..12 {
@@ -210,4 +217,51 @@ fn shipped_models_stay_within_limits_and_friction_at_every_step_of_every_recordi
             assert!(steps > 100 * taken.len(), "{steps}");
         }
     }
+}
+
+fn metrics_along(jump: &str, step_s: f64) -> (ControlMetrics, Option<f64>) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let model = romc::artifact::read(&root.join("models/go1-d6.json")).expect("sound");
+    let path = root.join(format!("examples/recordings/{jump}.csv.gz"));
+    let jump = romc::recording::read(&path).expect("a sound jump");
+    let settings = MpcSettings {
+        step_s,
+        ..MpcSettings::default()
+    };
+    let mut controller = romc::mpc::controller(&model, settings).expect("complete");
+    let input = ReferenceInput::Recorded;
+    let run = along_recording(&mut controller, &jump, input, |_, _| {}).expect("a sound jump");
+    let metrics = control_metrics(&model, &jump, settings).expect("a sound jump");
+    (metrics, run.summary.tracking_rms)
+}
+
+#[test]
+fn replay_moves_on_at_the_speed_of_the_push_and_feedback_does_not() {
+    // after k of 100 samples of 2 ms the body is 0.1 m/s k 2 ms away, whatever the control step
+    let mean_square = (1..=100).map(|k| f64::from(k * k)).sum::<f64>() / 100.0;
+    for step_s in [0.005, 0.02] {
+        let (metrics, without_push) = metrics_along("go1/test_01", step_s);
+        let baseline = &metrics.baseline;
+        let replay = baseline.replay.recovery_rms_m.expect("the robot stands");
+        let expected = 0.1 * 0.002 * mean_square.sqrt();
+        assert!((replay - expected).abs() < 1e-9, "{step_s}: {replay}");
+        let feedback_off = baseline.feedback_off.recovery_rms_m;
+        assert!(metrics.recovery_rms_m < feedback_off, "{metrics:?}");
+        assert!(metrics.tracking_rms > without_push, "{metrics:?}");
+    }
+}
+
+#[test]
+fn pitch_without_a_latent_coordinate_does_not_make_right_predictions_fail() {
+    let (metrics, _) = metrics_along("go1-other/jump_04", 0.01);
+    let own = metrics.prediction_rms.as_ref().expect("stages");
+    let constant = &metrics.baseline.constant_velocity.prediction_rms;
+    let constant = constant.as_ref().expect("stages");
+    assert!(own.pitch_rad > 2.0 * constant.pitch_rad, "{own:?}");
+    assert_eq!(own.latent.len(), 6);
+    let shares = own.latent.iter().zip(&constant.latent);
+    let share = shares.map(|(own, other)| own / other).sum::<f64>() / 6.0;
+    assert!(share < 0.7, "{share}: {own:?} {constant:?}");
+    let failure = metrics.failure.unwrap_or_default();
+    assert!(!failure.contains("one stage ahead"), "{failure}");
 }

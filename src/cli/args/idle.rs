@@ -16,10 +16,6 @@ use crate::import::Format;
 use crate::mpc::Lift;
 
 impl Arguments {
-    /// Refuses the first flag that has no effect.
-    ///
-    /// # Errors
-    /// [`Error::Idle`].
     pub fn refuse_idle(&self) -> Result<(), Error> {
         match &self.command {
             Command::Compile(arguments) => of_compile(arguments),
@@ -58,7 +54,6 @@ impl Arguments {
 struct Needed(&'static str, bool);
 
 impl Needed {
-    /// [`Error::Idle`] for a flag that was given without the option that it depends on.
     fn by(self, flag: &'static str, is_given: bool) -> Result<(), Error> {
         let Self(needs, is_there) = self;
         match is_given && !is_there {
@@ -73,7 +68,6 @@ impl Needed {
     }
 }
 
-/// No ending is empty, which no format has.
 fn ending(path: &Path) -> String {
     let ending = path.extension().unwrap_or_default();
     ending.to_string_lossy().to_lowercase()

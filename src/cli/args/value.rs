@@ -14,17 +14,14 @@ use crate::limits::Range;
 use crate::recording::Clocks;
 use crate::robot::WrenchFrame;
 
-/// A whole number in a range.
 pub(super) fn count(range: &'static Range) -> impl Fn(&str) -> Result<usize, String> + Clone {
     |text| range.parse(text)
 }
 
-/// A number in a range.
 pub(super) fn real(range: &'static Range) -> impl Fn(&str) -> Result<f64, String> + Clone {
     |text| range.parse(text)
 }
 
-/// As [`real`], as settings hold it.
 pub(super) fn finite(range: &'static Range) -> impl Fn(&str) -> Result<Finite, String> + Clone {
     |text| range.parse::<f64>(text)?.try_into()
 }
@@ -69,12 +66,10 @@ impl TypedValueParser for RobotParser {
     }
 }
 
-/// Reads `body` or `world`.
 pub(crate) fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
     WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
 }
 
-/// How recordings are read.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct ReadingArguments {
     /// What the columns of the recordings are: names, units, signs, order, clocks of another program's log (`romc

@@ -27,14 +27,10 @@ use crate::robot::input_rule::DRY_SPEED_RAD_S;
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{JOINT_DIM, Leg, LegLinks, Robot};
 
-/// Smallest `|det J|` over the volume of its links at which a foot's force is taken from torques.
 pub(crate) const LEAST_MANIPULABILITY: f64 = 0.04;
-/// Speed within which rolling resistance changes its sign, in rad/s.
 const ROLLING_SPEED_RAD_S: f64 = 0.05;
 
-/// Rows of an equation: the coefficients of all unknowns, then the left side.
 pub const BODY_ROWS: usize = PARAMETER_DIM + 1;
-/// Rows of a joint's equation in [`SampleEquations::joints`].
 pub const JOINT_ROWS: usize = 12;
 
 /// The unknowns of a joint's equation, in the order of its rows; the left side follows.
@@ -53,9 +49,7 @@ pub struct SampleEquations {
     pub body: DMatrix<f64>,
     /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the air.
     pub joints: DMatrix<f64>,
-    /// Samples at which a leg on the ground is too close to a singular posture.
     pub singular: Vec<bool>,
-    /// Number of torques above the robot's limit, which count as the limit.
     pub clipped_torques: usize,
 }
 
@@ -127,7 +121,6 @@ impl SampleEquations {
     }
 }
 
-/// Coefficients and left side for the trunk's acceleration at one sample, a column an axis.
 struct BodyEquation([[f64; BODY_ROWS]; 3]);
 
 impl BodyEquation {
@@ -143,7 +136,6 @@ impl BodyEquation {
         }
     }
 
-    /// The force of a foot on the ground; `map` takes torques to forces in the world.
     fn add_foot(&mut self, state: &LegSample, map: &Matrix3<f64>) {
         let force = map * state.torque;
         self.add(INVERSE_MASS, force);
@@ -168,11 +160,9 @@ impl BodyEquation {
     }
 }
 
-/// First moments of a leg in the order of [`Directions`](super::equations::Directions): its share in the acceleration of
-/// the centre of mass.
+/// In the order of [`Directions`].
 const MOMENTS: [usize; 5] = [LEG_SIDE, THIGH, CALF, THIGH_FRONT, CALF_FRONT];
 
-/// Unknowns of a leg's own links in the torques of its joints.
 const OWN: [usize; 7] = [
     LEG_SIDE,
     THIGH,
@@ -183,7 +173,6 @@ const OWN: [usize; 7] = [
     CALF_FRONT,
 ];
 
-/// One leg at one sample; vectors over joints unless they are directions.
 struct LegSample {
     frame: LegFrame,
     trunk_rate: Vector3<f64>,
@@ -195,7 +184,6 @@ struct LegSample {
 }
 
 impl LegSample {
-    /// Components of a moment (world axes) about the three joints.
     fn about_joints(&self, moment: &Vector3<f64>) -> Vector3<f64> {
         let flexion = self.frame.flexion.dot(moment);
         Vector3::new(self.frame.abduction.dot(moment), flexion, flexion)
@@ -207,7 +195,6 @@ impl LegSample {
             + self.frame.flexion * (self.rate[1] + self.rate[2])
     }
 
-    /// Coefficients of [`joint_unknowns`] and the torque of one joint.
     fn joint(&self, kind: usize) -> [f64; JOINT_ROWS] {
         let rate = self.rate[kind];
         let dry = (rate / DRY_SPEED_RAD_S).tanh();
@@ -219,10 +206,7 @@ impl LegSample {
     }
 }
 
-/// Torques at the three joints that move the links of a leg, per unit of each unknown of [`OWN`].
-///
-/// A mass at `s` from a point that accelerates by `a` (gravity subtracted) needs the moment `s x (a + s'')` about it.
-/// The mass beside the axis of abduction is taken in the leg's plane.
+/// Torques at the joints per unit of each unknown of [`OWN`]: a mass at `s` from a point that accelerates by `a` needs the moment `s x (a + s'')`.
 fn own_torques(
     robot: &Robot,
     motion: &Motion,
@@ -274,7 +258,6 @@ fn own_torques(
     ]
 }
 
-/// Rows as they were `delay_s` before each time, by straight lines; held at the ends.
 fn delayed(time_s: &[f64], rows: &DMatrix<f64>, delay_s: f64) -> DMatrix<f64> {
     let mut out = rows.clone();
     for (sample, time) in time_s.iter().enumerate() {
@@ -285,30 +268,22 @@ fn delayed(time_s: &[f64], rows: &DMatrix<f64>, delay_s: f64) -> DMatrix<f64> {
     out
 }
 
-/// Directions of a leg in the world, or their derivatives: from the axis of abduction to the plane of the leg (side),
-/// from hip to knee (thigh), from knee to foot (calf), in front of the thigh, in front of the calf. The equations'
-/// moments of a leg have this order.
+/// Sideways from the axis of abduction, hip to knee, knee to foot, in front of thigh and calf; or their derivatives.
 pub(crate) type Directions = [Vector3<f64>; 5];
 
-/// Axes and directions of one leg in the world, unit vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegFrame {
-    /// Axis of abduction.
     pub abduction: Vector3<f64>,
-    /// Axis of flexion and of the knee.
     pub flexion: Vector3<f64>,
-    /// Where its parts are.
     pub directions: Directions,
 }
 
-/// Directions of a segment and all accelerations.
 #[derive(Debug, Clone)]
 pub struct Motion {
     /// Trunk to world, one a sample.
     pub attitude: Vec<Matrix3<f64>>,
     /// Angular velocity of the trunk in the world, rad/s.
     pub trunk_rate: Vec<Vector3<f64>>,
-    /// Legs in the order of [`Leg::ALL`].
     pub legs: Vec<[LegFrame; 4]>,
     /// Accelerations of the recorded coordinates, 18 x n, per s^2.
     pub coordinates: DMatrix<f64>,
@@ -316,12 +291,10 @@ pub struct Motion {
     directions: DMatrix<f64>,
 }
 
-/// Rows of the trunk's axes in [`Motion::directions`].
 const TRUNK_ROWS: usize = 9;
 const LEG_ROWS: usize = 15; // rows of a leg there
 
 impl Motion {
-    /// The motion of a robot's segment of at least two samples.
     pub fn of(segment: &Segment, robot: &Robot) -> Self {
         let links = Leg::ALL.map(|leg| robot.geometry(leg).links());
         let n = segment.len();
@@ -368,7 +341,6 @@ impl Motion {
         motion
     }
 
-    /// Acceleration of the trunk's origin, m/s^2.
     pub(crate) fn body(&self, sample: usize) -> Vector3<f64> {
         let rows = self.coordinates.fixed_view::<3, 1>(JOINT_DIM, sample);
         rows.into_owned()

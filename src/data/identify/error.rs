@@ -1,7 +1,5 @@
 //! Errors of identification and of its file.
 
-#![allow(missing_docs, reason = "each variant's message names its fields")]
-
 use thiserror::Error;
 
 use crate::files::{Fault, Located};
@@ -10,7 +8,6 @@ use crate::recording::RecordingError;
 /// Why recordings do not say what the robot is, or a file does not.
 #[derive(Debug, Error)]
 pub enum IdentifyError {
-    /// A recording cannot be read or filtered.
     #[error(transparent)]
     Recording(#[from] RecordingError),
     #[error(
@@ -31,7 +28,6 @@ pub enum IdentifyError {
         found: usize,
         expected: usize,
     },
-    /// The feet's forces do not explain the trunk's acceleration by any mass.
     #[error(
         "the trunk's acceleration does not follow the feet's forces: found {inverse:.3e} as \
          1/mass, expected about {expected:.3e} 1/kg; are signs, units and order of the \
@@ -42,12 +38,10 @@ pub enum IdentifyError {
         expected: f64,
         robot: String,
     },
-    /// A recording contradicts physics or the other recordings.
     #[error(
         "{recording}: {found}; expected recordings of one robot with its torques: leave this one out, or use it alone"
     )]
     Contradiction { recording: String, found: String },
-    /// A file of an identification cannot be used.
     #[error(transparent)]
     File(#[from] Located<Fault>),
 }

@@ -32,18 +32,9 @@ const LEAST_WINDOWS: usize = 30; // fewest windows with moving legs; there are 2
 const MOST_ROUNDS: usize = 30; // most rounds; a clean recording needs about eight
 const LARGEST_DELAY_CHANGE_S: f64 = 0.004; // largest change of the delay in a round, s
 const LARGEST_DELAY_S: f64 = 0.06; // largest delay either way, s
-/// Changes in a round below which the rounds end: of the delay (s), of the mass (relative).
 const SETTLED: [f64; 2] = [2e-5, 1e-4];
 
-/// What the recordings say of a robot of this geometry: gravity, mass, losses by kind of joint, with standard errors.
-///
-/// Implausible samples stay and become notes; samples with a leg on the ground close to a singular posture are left out
-/// one by one.
-///
-/// # Errors
-/// [`IdentifyError::Contact`], [`IdentifyError::Still`] for too little to go by, [`IdentifyError::Mass`] where forces
-/// do not explain the acceleration, [`IdentifyError::Contradiction`] for a recording that contradicts physics or the
-/// others, [`IdentifyError::Recording`] for a segment without two samples at different times.
+/// Gravity, mass and losses by kind of joint, with standard errors. Implausible samples stay and become notes.
 pub fn identify(recordings: &[Recording], robot: &Robot) -> Result<Identification, IdentifyError> {
     let mut notes = Vec::new();
     let (mut segments, mut mended_recordings, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
@@ -293,7 +284,6 @@ fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
     (!faults.is_empty()).then(|| format!("{}: {}", path.display(), faults.join("; ")))
 }
 
-/// Share by which the mass of a jump may differ from that of all, and the same in standard errors of that jump.
 const MASS: (f64, f64) = (0.05, 4.0);
 const LEAST_BLOCKS: usize = 3; // fewest blocks of a jump whose mass is compared
 
@@ -309,7 +299,6 @@ pub(super) fn require_physics(
     }
 }
 
-/// Refuses jumps whose mass is not that of all; `segments` are those of each recording among the windows.
 pub(super) fn require_one_robot(
     recordings: &[Recording],
     segments: &[Range<usize>],
@@ -347,8 +336,7 @@ fn refused(recording: &Recording, segment: Option<usize>, found: String) -> Iden
     }
 }
 
-/// Mass of each segment by its vertical acceleration in contact, the other unknowns as in all, and its standard error
-/// as a share of it (jackknife over blocks).
+/// Mass of each segment by its vertical acceleration in contact, and its standard error as a share (jackknife over blocks).
 fn masses(windows: &Windows, estimate: &Estimate) -> Vec<(usize, f64, f64)> {
     let mut blocks = vec![(0.0, 0.0); windows.blocks.len()];
     let upwards = (windows.rows.iter()).filter(|row| row.group == Group::Contact(2));

@@ -14,9 +14,7 @@ pub(crate) type Estimate = SVector<f64, PARAMETER_DIM>;
 type Square = SMatrix<f64, PARAMETER_DIM, PARAMETER_DIM>;
 
 const HUBER: f64 = 3.0; // deviations of a residual from which it counts less
-/// Smallest deviation of a group, m/s^2: what the model leaves out of the best recordings.
 const LEAST_DEVIATION: f64 = 0.005;
-/// Weights of body and joint rows before the deviations are known.
 const FIRST_WEIGHTS: [f64; 2] = [1.0, 0.3];
 
 #[derive(Debug, Clone, Default)]
@@ -42,13 +40,11 @@ impl Normal {
         }
     }
 
-    /// Copies the lower triangle, which [`Normal::add`] fills, to the upper.
     fn symmetric(mut self) -> Self {
         self.matrix.fill_upper_triangle_with_lower_triangle();
         self
     }
 
-    /// Solution over the free unknowns, zero in the others.
     fn solve(&self, free: &[usize]) -> Option<Estimate> {
         // Scaled to a diagonal of ones: units of the unknowns differ by orders of magnitude.
         let scale = |i: usize| self.matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt();
@@ -65,7 +61,6 @@ impl Normal {
         Some(out)
     }
 
-    /// By how much the free unknowns change when the delay is one unit longer.
     fn change_by_delay(&self, free: &[usize]) -> Option<Estimate> {
         let others: Vec<usize> = free.iter().copied().filter(|i| *i != DELAY).collect();
         let held = Self {
@@ -107,7 +102,6 @@ impl Normal {
     }
 }
 
-/// What a row's equation leaves unexplained, m/s^2.
 pub(crate) fn residual(row: &Row, estimate: &Estimate, mass_kg: f64) -> f64 {
     let pairs = row.coefficients.iter().zip(estimate.iter());
     let products = pairs.map(|(coefficient, value)| coefficient * value);
@@ -122,9 +116,7 @@ fn left(row: &Row, mass_kg: f64) -> f64 {
 }
 
 impl Iteration {
-    /// Solves once with present deviations, then takes the deviations of the new residuals.
-    ///
-    /// `None` if the equations are singular even with the priors (not finite numbers).
+    /// Solves once, then takes the deviations of the new residuals. `None` if the equations are singular with the priors.
     pub(crate) fn step(&mut self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Option<()> {
         let normal = self.normal(rows, priors, mass_kg);
         let (estimate, _) = normal.solve_not_negative()?;
@@ -147,11 +139,7 @@ impl Iteration {
         Some(())
     }
 
-    /// Variances of the unknowns: the largest that leaving out the groups of one of the `groupings` in turn gives
-    /// ([`Windows::groupings`](super::windows::Windows::groupings)), and that of a delay that is uncertain by
-    /// `delay_deviation_s` beside the estimated one; `None` as for [`Iteration::step`].
-    ///
-    /// Unknowns at zero have the variance that they have when they are free.
+    /// Variances: the largest of the `groupings`, and that of the delay. Unknowns at zero have that of free ones.
     pub(crate) fn variances(
         &self,
         rows: &[Row],
@@ -186,7 +174,6 @@ impl Iteration {
         Some(variances)
     }
 
-    /// The normal equations of the rows of each group.
     fn normals(
         &self,
         rows: &[Row],
@@ -236,10 +223,7 @@ fn huber(residual: f64) -> f64 {
     HUBER / residual.abs().max(HUBER)
 }
 
-/// Jackknife variances of the free unknowns over groups.
-///
-/// With `n` groups `(n - 1)/n` of the sum of squared changes. This holds for groups of different sizes, too: what a
-/// group changes grows with what it contributes (MacKinnon, Nielsen and Webb, J. Econometrics 232, 2023, CV3).
+/// Jackknife variances; groups may differ in size (MacKinnon, Nielsen and Webb, J. Econometrics 232, 2023, CV3).
 fn spread(whole: &Normal, parts: &[Normal], free: &[usize]) -> Option<Estimate> {
     let center = whole.solve(free)?;
     let mut sum = Estimate::zeros();
@@ -264,7 +248,6 @@ pub(crate) fn force_alone(rows: &[Row]) -> Option<Estimate> {
     normal.symmetric().solve(&[GRAVITY, INVERSE_MASS])
 }
 
-/// Share of the variance of the trunk's acceleration along an axis in contact that is explained.
 pub(crate) fn explained(rows: &[Row], estimate: &Estimate, axis: usize) -> f64 {
     let chosen = || rows.iter().filter(|row| row.group == Group::Contact(axis));
     let count = chosen().count().max(1) as f64;

@@ -2,8 +2,6 @@
 //!
 //! An identification as a TOML file.
 
-#![allow(missing_docs, reason = "fields are named by quantity and unit")]
-
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -15,7 +13,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::robot::joints::LEG_JOINT_DIM;
 
-/// A value for each kind of joint.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PerKind {
@@ -33,7 +30,6 @@ impl PerKind {
         [self.hx, self.hy, self.kn]
     }
 
-    /// Means of a value of all twelve joints over the legs.
     pub(crate) fn mean(joints: &[f64; JOINT_DIM]) -> Self {
         Self::from_array(std::array::from_fn(|kind| {
             let legs = joints.iter().skip(kind).step_by(LEG_JOINT_DIM);
@@ -58,13 +54,11 @@ pub struct Legs {
     pub calf_kg_m2: f64,
 }
 
-/// Standard errors of an identification, in the units of its values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandardError {
     pub gravity_m_s2: f64,
     pub mass_kg: f64,
-    /// Of the delay of the motion behind the torques.
     pub delay_s: f64,
     pub viscous_nm_s_rad: PerKind,
     pub dry_nm: PerKind,
@@ -72,7 +66,7 @@ pub struct StandardError {
     pub legs: Legs,
 }
 
-/// How well an equation explains the trunk's acceleration in contact along the world's axes: R^2 over windows.
+/// R^2 of the trunk's acceleration in contact along the world's axes, over windows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fit {
@@ -80,7 +74,6 @@ pub struct Fit {
     pub z: f64,
 }
 
-/// The trunk's acceleration regressed on the feet's forces `-J^-T tau` alone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ForceAlone {
@@ -89,7 +82,6 @@ pub struct ForceAlone {
     pub r2: Fit,
 }
 
-/// Samples in the windows of the regression, with a foot on the ground and in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Samples {
@@ -97,23 +89,19 @@ pub struct Samples {
     pub flight: usize,
 }
 
-/// What recordings say of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identification {
     /// Name of the robot whose geometry was used.
     pub robot: String,
     pub gravity_m_s2: f64,
-    /// Mass of trunk and legs, kg.
     pub mass_kg: f64,
     /// Time from a recorded torque to its effect on the motion, s.
     pub delay_s: f64,
     pub actuators: Actuators,
     pub legs: Legs,
     pub standard_error: StandardError,
-    /// Fit of the whole equation.
     pub r2: Fit,
-    /// The equation without losses, delay and legs.
     pub force_alone: ForceAlone,
     pub samples: Samples,
     /// What a reader of the values should know of the recordings.
@@ -123,14 +111,12 @@ pub struct Identification {
 
 const WORSE: f64 = 0.05; // by how much the whole equation may fit less forwards than forces alone
 
-/// Shares by which found gravity, and mass against the robot's, are farther off than recordings explain.
 const GRAVITY_SHARE: f64 = 0.04;
 const MASS_SHARE: f64 = 0.3;
 
 const NO_GRAVITY_SHARE: f64 = 0.25; // share from which on gravity is no robot's
 
 impl Identification {
-    /// What is known already and was found to be otherwise, for a robot of `mass_kg`.
     pub(super) fn doubts(&self, mass_kg: f64) -> Vec<String> {
         let mut doubts = Vec::new();
         if (self.gravity_m_s2 / GRAVITY_M_S2 - 1.0).abs() > GRAVITY_SHARE {
@@ -151,9 +137,7 @@ impl Identification {
         doubts
     }
 
-    /// Why these values are no robot's: gravity is not the earth's, or the trunk moves against them, or forwards better
-    /// by the feet's forces alone. Upwards forces alone may fit better: rounds weigh windows by their noise, and
-    /// commanded torques are noisy there.
+    /// Why these values are no robot's. Upwards forces alone may fit better: commanded torques are noisy there.
     pub fn contradiction(&self) -> Option<String> {
         if (self.gravity_m_s2 / GRAVITY_M_S2 - 1.0).abs() > NO_GRAVITY_SHARE {
             return Some(format!(
@@ -181,7 +165,6 @@ impl Identification {
 }
 
 impl Identification {
-    /// The file's text: SI units, `[actuators]` in the order of the state's joints.
     pub fn to_toml(&self) -> String {
         let (error, alone) = (&self.standard_error, &self.force_alone);
         let mut out = String::from(
@@ -225,10 +208,7 @@ impl Identification {
         out
     }
 
-    /// Reads a file that [`Identification::to_toml`] wrote; its notes are comments and stay there.
-    ///
-    /// # Errors
-    /// [`IdentifyError::File`] with line and column of a fault of syntax, or with the entry whose value no robot has.
+    /// Reads a file of [`Identification::to_toml`] without its notes.
     pub fn read(path: &Path) -> Result<Self, IdentifyError> {
         let file = path.display().to_string();
         let action = "read";
@@ -238,10 +218,7 @@ impl Identification {
         Self::from_toml(&file, &read_toml(path).map_err(refused)?)
     }
 
-    /// Reads the text of such a file; `file` stands for it in messages.
-    ///
-    /// # Errors
-    /// As [`Identification::read`].
+    /// The same of a text; `file` stands for it in messages.
     pub fn from_toml(file: &str, text: &str) -> Result<Self, IdentifyError> {
         let found: Self = toml::from_str(text).map_err(|error| {
             let of_byte = |span: std::ops::Range<usize>| Place::of_byte(text, span.start);

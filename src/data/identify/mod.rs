@@ -18,6 +18,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
+
 pub mod equations;
 pub mod parameters;
 

@@ -1,8 +1,6 @@
 //! The unknowns of the regression, in the order of the columns. All but gravity stand in the equations divided by the
 //! robot's mass.
 
-#![allow(missing_docs, reason = "a table of columns, each with its unit")]
-
 use crate::robot::LegGeometry;
 
 pub const PARAMETER_DIM: usize = 23;
@@ -25,27 +23,21 @@ pub(crate) const FOOT_RADIUS: usize = 20; // height of the foot's centre above i
 pub(crate) const ROLLING: usize = 21; // arm of the normal force about a rolling foot, m
 pub(crate) const DELAY: usize = 22; // change of the time by which torques run ahead of the motion, s
 
-/// Unknowns that cannot be negative: losses, second moments, rolling resistance.
 pub(crate) fn not_negative() -> impl Iterator<Item = usize> {
     (VISCOUS..TRUNK_FORWARD).chain([THIGH_SECOND, CALF_SECOND, ROLLING])
 }
 
-/// Standard deviation of a linear combination of the unknowns about zero, known beforehand.
-///
-/// These are wide: they matter only where the recordings leave a direction open.
+/// A wide deviation of a linear combination about zero: it matters where the recordings leave a direction open.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prior {
     pub terms: Vec<(usize, f64)>, // coefficients by unknown
     pub deviation: f64,
 }
 
-/// Share of the robot's mass in the moving part of one leg, by order of magnitude.
 const LEG_SHARE: f64 = 0.13;
-/// Least distance of a leg from its axis of abduction that counts, over the thigh's length.
 const LEAST_SIDE: f64 = 0.1;
 const ROD: f64 = 2.0 / 3.0; // second moment of a uniform rod over length times first moment
-/// Deviation of a hip's loss from that of the thigh joint of the same leg, relative, and the smallest loss that it
-/// counts from.
+/// Relative deviation of a hip's loss from that of the thigh joint, and the smallest loss that it counts from.
 const HIP_LIKE_THIGH: [(usize, f64, f64); 3] = [
     (VISCOUS, 1.0, 0.05),
     (DRY, 0.5, 0.05),

@@ -20,14 +20,12 @@ const WINDOW_S: f64 = 0.03; // length of a window, s
 const MARGIN_S: f64 = 0.02; // distance of windows from a change of the feet on the ground, s
 pub(crate) const OVERLAP: usize = 4; // windows a window's length: neighbours overlap
 const BLOCK_S: f64 = 0.1; // length of the blocks that are left out in turn for standard errors, s
-/// Fewest jumps that are left out in turn, too, and the largest share of all equations that one of them may have.
+/// Fewest jumps that are left out in turn, and the largest share of the equations that one may have.
 const LEAST_JUMPS: usize = 6;
 const LARGEST_SHARE: f64 = 1.0 / 3.0;
-/// Mean speed of the bearing joints from which their dry friction has a direction, rad/s: of hips and knees, and for
-/// accelerations sideways of the abductions, too, for a joint at rest holds any torque up to that friction.
+/// Mean speed of the bearing joints from which their dry friction has a direction, rad/s.
 const MOVING_RAD_S: f64 = 0.1;
 const SIDEWAYS: usize = 1; // axis along which abductions push
-/// Speed that a joint in the air keeps over a window for the same reason, rad/s.
 const TURNING_RAD_S: f64 = 0.15;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,15 +64,12 @@ pub(crate) struct Windows {
     pub blocks: Vec<usize>, // the segment that each block lies in, counted from zero
     pub contact_samples: usize,
     pub flight_samples: usize,
-    /// Samples left out because a leg on the ground was close to a singular posture.
     pub singular_samples: usize,
-    /// Torques above the robot's limits, which count as the limit.
     pub clipped_torques: usize,
     segments: usize,
 }
 
 impl Windows {
-    /// Adds the windows of a segment at even time steps; `lost` are samples to leave out.
     pub(crate) fn add(
         &mut self,
         segment: &Segment,
@@ -119,9 +114,7 @@ impl Windows {
         Ok(())
     }
 
-    /// Ways to divide the blocks into groups that are left out in turn for standard errors: the group of every block.
-    /// Blocks by themselves; and whole segments, which are jumps, where there are at least six and none has more than a
-    /// third of the equations of the fit.
+    /// Groups of blocks that are left out in turn for standard errors: single blocks, and whole jumps where there are enough.
     pub(crate) fn groupings(&self) -> Vec<Vec<usize>> {
         let mut groupings = vec![(0..self.blocks.len()).collect()];
         let mut counts = vec![0; self.segments];
@@ -206,12 +199,11 @@ struct Averaged<'a> {
     equations: &'a SampleEquations,
     filter: &'a SavitzkyGolay,
     span: Range<usize>,
-    /// Centre of each of its windows, counted from its start, and the block that it belongs to.
+    /// Centre of each window, counted from the start, and its block.
     blocks: Vec<(usize, usize)>,
 }
 
 impl Averaged<'_> {
-    /// Averages of rows over the windows of the stretch, at their centres.
     fn of(&self, rows: &DMatrix<f64>) -> DMatrix<f64> {
         let part = rows.columns(self.span.start, self.span.len()).into_owned();
         (self.filter.smooth(&part)).expect("invariant: a stretch is as long as the window")

@@ -44,10 +44,8 @@ pub struct StepRow {
     pub segment: usize,
     pub time_s: f64,
     pub command: Command,
-    /// Lifted input in SI units: with the transpose lift `W_eᵀ u_lat`, with the consistent lift the torques at the
-    /// links and the force that they produce.
+    /// In SI units: `W_eᵀ u_lat`, or with the consistent lift the torques at the links and their force.
     pub input: [f64; STATE_DIM],
-    /// Recorded torques, N m, averaged over the time that the command is held.
     pub recorded_torque_nm: [f64; JOINT_DIM],
     pub z_reference: Vec<f64>,
     pub z: Vec<f64>,
@@ -59,13 +57,11 @@ pub struct StepRow {
 pub struct Run {
     pub rows: Vec<StepRow>,
     pub summary: Summary,
-    /// The model and its baselines, see [`control_metrics`](super::control_metrics); none where only the controller was
-    /// at hand.
     pub metrics: Option<ControlMetrics>,
 }
 
 impl Run {
-    /// Why nothing was controlled, if so: most steps, or all that there are, have no plan of their own.
+    /// Why nothing was controlled, if so: most steps have no plan of their own.
     pub fn failure(&self) -> Option<String> {
         let Summary { steps, failed, .. } = self.summary;
         if steps > 0 && 2 * failed <= steps {
@@ -76,9 +72,7 @@ impl Run {
         for status in of_steps.filter(|status| !status.has_plan()) {
             *statuses.entry(status.word()).or_default() += 1;
         }
-        let statuses = statuses
-            .iter()
-            .map(|(word, count)| format!("{word} {count}"));
+        let statuses = (statuses.iter()).map(|(word, count)| format!("{word} {count}"));
         let statuses: Vec<String> = statuses.collect();
         Some(format!(
             "{failed} of {steps} control steps have no plan of their own ({})",
@@ -137,8 +131,7 @@ pub fn along_recording(
         for &sample in schedule {
             let started = Instant::now();
             controller.prepare(segment.time_s[sample]);
-            let preparation_us = started.elapsed().as_secs_f64() * 1e6;
-            tally.preparations_us.push(preparation_us);
+            (tally.preparations_us).push(started.elapsed().as_secs_f64() * 1e6);
             rows.push(one_step(controller, segment, number, sample, &mut tally));
             progress(rows.len(), total);
         }
@@ -172,9 +165,7 @@ pub fn lift_comparison(
             }
             let x = segment.x.column(sample);
             controller.stand_at(x.as_slice());
-            controller
-                .local_plant()
-                .project(x.as_slice(), u, &mut u_lat);
+            (controller.local_plant()).project(x.as_slice(), u, &mut u_lat);
             let Some(mut stance) = stance(controller, segment, sample) else {
                 continue;
             };
@@ -188,8 +179,7 @@ pub fn lift_comparison(
     Ok(comparison)
 }
 
-/// Samples at which a controller with period `step_s` acts: the first at or after each multiple, as long as the
-/// command's whole hold lies within the recording.
+/// First samples at or after each multiple of the period whose whole hold lies within the recording.
 pub(super) fn control_samples(time_s: &[f64], step_s: f64) -> Vec<usize> {
     let mut samples = Vec::new();
     let (Some(&first), Some(&last)) = (time_s.first(), time_s.last()) else {
@@ -216,16 +206,14 @@ fn one_step(
     sample: usize,
     tally: &mut Tally,
 ) -> StepRow {
-    let time_s = segment.time_s[sample];
-    let feet = segment.feet[sample];
+    let (time_s, feet) = (segment.time_s[sample], segment.feet[sample]);
     let (x, dx) = (segment.x.column(sample), segment.dx.column(sample));
-    let measurement = Measurement {
+    let command = controller.step(Measurement {
         time_s,
         x: x.as_slice(),
         dx: dx.as_slice(),
         feet,
-    };
-    let command = controller.step(measurement);
+    });
     let recorded = held_torque(segment, sample, controller.settings().step_s);
     let d = controller.plant().latent_dim();
     let mut z = vec![0.0; d];
@@ -285,10 +273,8 @@ pub(super) fn set_reference(
 
 fn held_torque(segment: &Segment, sample: usize, step_s: f64) -> Option<[f64; JOINT_DIM]> {
     let until = segment.time_s[sample] + step_s - 1e-9;
-    let count = segment.time_s[sample..]
-        .iter()
-        .take_while(|&&time_s| time_s < until)
-        .count();
+    let held = segment.time_s[sample..].iter();
+    let count = held.take_while(|&&time_s| time_s < until).count();
     let mut mean = [0.0; JOINT_DIM];
     for held in sample..sample + count {
         for (mean, torque) in mean.iter_mut().zip(segment.torque(held)) {
@@ -311,23 +297,18 @@ fn lifted_input(
     sample: usize,
 ) -> [f64; STATE_DIM] {
     let mut input = controller.local_plant().lift(&command.u_lat);
-    match controller.settings().lift {
-        Lift::Transpose => {}
-        Lift::Consistent => {
-            let net = command.net_torque_nm();
-            input[..JOINT_DIM].copy_from_slice(&net);
-            let rule = controller.plant().input_rule();
-            let wrench = rule.wrench(&segment.state(sample), &net, segment.feet[sample]);
-            if let Ok(wrench) = wrench {
-                input[JOINT_DIM..].copy_from_slice(wrench.as_slice());
-            }
+    if controller.settings().lift == Lift::Consistent {
+        let net = command.net_torque_nm();
+        input[..JOINT_DIM].copy_from_slice(&net);
+        let rule = controller.plant().input_rule();
+        if let Ok(wrench) = rule.wrench(&segment.state(sample), &net, segment.feet[sample]) {
+            input[JOINT_DIM..].copy_from_slice(wrench.as_slice());
         }
     }
     input
 }
 
-/// Whether a command leaves a friction cone that the controller constrains, by more than a thousandth of the robot's
-/// weight; none if it constrains none here.
+/// Whether a command leaves its friction cone by more than a thousandth of the weight; none where it has none.
 fn friction_violated(
     controller: &Controller,
     command: &Command,
@@ -339,11 +320,10 @@ fn friction_violated(
     match settings.lift {
         Lift::Consistent => {
             let forces = foot_forces(plant, stance)?;
-            Some(forces.iter().enumerate().any(|(leg, force)| {
+            let net = command.net_torque_nm();
+            Some(forces.iter().zip(net.chunks(3)).any(|(force, torque)| {
                 force.is_some_and(|map| {
-                    let net = command.net_torque_nm();
-                    let torque = std::array::from_fn::<f64, 3, _>(|joint| net[3 * leg + joint]);
-                    let force = map * nalgebra::Vector3::from(torque);
+                    let force = map * nalgebra::Vector3::from_column_slice(torque);
                     force.x.hypot(force.y) > settings.foot_friction * force.z + tolerance_n
                 })
             }))

@@ -36,10 +36,6 @@ impl Aslip {
         )
     }
 
-    /// Accelerations of body x and z, in m/s^2.
-    ///
-    /// In contact `ddx = k_s/m (p_f,x - x) + F_x/m`, `ddz = k_s/m (l_0 + p_f,z - z) - g + F_z/m` (equation 27, actuated
-    /// by the legs' force over the mass); in flight `0` and `-g` (equation 28).
     fn acceleration(&self, position: Vector2<f64>, stance: Option<Stance>) -> Vector2<f64> {
         let gravity = Vector2::new(0.0, -self.gravity_m_s2);
         match stance {
@@ -103,7 +99,6 @@ struct PendulumSpan<'a> {
 }
 
 impl PendulumSpan<'_> {
-    /// The stance with the force interpolated between samples, held after the last.
     fn stance_at(&self, time_s: f64) -> Option<Stance> {
         let times = &self.times[..self.stances.len()];
         let (left, right, share) = between(times, time_s);
@@ -135,7 +130,6 @@ impl OdeSystem for PendulumSpan<'_> {
     }
 }
 
-/// Body x and z, m, that the pendulum predicts for each sample of a segment; none after a divergence.
 pub(crate) type AslipRollout = Vec<Option<Vector2<f64>>>;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -155,15 +149,13 @@ impl AslipSums {
     }
 }
 
-/// What holds the pendulum while a foot is down, in the world's plane of x and z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Stance {
-    /// Mean position of the feet in contact at the sample where the contact began.
+    /// Mean position of the feet where the contact began.
     pub(super) foot_m: Vector2<f64>,
     pub(super) force_n: Vector2<f64>,
 }
 
-/// The stance of every sample; `None` in flight.
 pub(super) fn stances(
     rule: &InputRule,
     segment: &Segment,
@@ -210,7 +202,6 @@ fn mean_foot(robot: &Robot, segment: &Segment, sample: usize) -> Vector2<f64> {
     Vector2::new(in_world.x, in_world.z)
 }
 
-/// A template, where its constants come from, and its residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baseline {
     pub name: &'static str,
@@ -292,7 +283,6 @@ fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, R
     Ok(fits.next())
 }
 
-/// Least-squares coefficients of some columns; none where they are not independent.
 fn least_squares(rows: &[[f64; 3]], columns: &[usize], right: &DVector<f64>) -> Option<Vec<f64>> {
     if rows.len() <= columns.len() {
         return None;

@@ -1,5 +1,3 @@
-//! Everything that a model and recordings show together, in one pass.
-
 use super::aslip::{AslipRollout, Baseline};
 use super::coordinates::{CoordinateSums, Fit, FitSums, PointwiseSums};
 use super::prediction::{LinearisedPhase, linearise_phases};
@@ -83,9 +81,8 @@ impl<'a> Assessment<'a> {
             let restarted = rollout(&compiled, &latent, restart);
             (assessment.full).add_rollout(model, segment, &latent, &full)?;
             (assessment.restarted).add_rollout(model, segment, &latent, &restarted)?;
-            for (sums, rollout) in
-                (assessment.constant_velocity.iter_mut()).zip([&full, &restarted])
-            {
+            let constant = assessment.constant_velocity.iter_mut();
+            for (sums, rollout) in constant.zip([&full, &restarted]) {
                 sums.add_constant_velocity(segment, &latent, rollout);
             }
             assessment.pointwise.add(model, segment, &latent)?;
@@ -110,7 +107,6 @@ impl<'a> Assessment<'a> {
         self.pointwise.decoder.fit().map(|fit| fit.rms.powi(2))
     }
 
-    /// The combined loss of equation (29).
     pub fn combined_loss(&self) -> Option<f64> {
         combined_loss(self.decoder_mean_square()?, self.active_terms, LAMBDA)
     }
@@ -137,20 +133,14 @@ pub fn remarks(
         let latent = LatentSegment::encode(model, segment)?;
         pointwise.add(model, segment, &latent)?;
     }
-    let of_recordings = recordings
-        .iter()
-        .flat_map(|recording| notes(recording, robot));
-    Ok(of_recordings
-        .chain(unexplained(model, &pointwise))
-        .collect())
+    let of_recordings = (recordings.iter()).flat_map(|recording| notes(recording, robot));
+    Ok((of_recordings.chain(unexplained(model, &pointwise))).collect())
 }
 
-/// By how much `R^2` of a phase's accelerations may be below that of the training. Single jumps of another controller
-/// of the same robot are up to 1.1 below.
+/// How far `R^2` of accelerations may be below that of the training; single jumps of another controller are up to 1.1 below.
 const BELOW_TRAINING: f64 = 1.5;
 
-/// Phases whose accelerations the mean would explain better, and clearly worse than those of the training are
-/// explained. Flight is left out: accelerations hardly vary there, and any model is as far off as their mean.
+/// Accelerations explained worse than by their mean, and than in training; in flight they hardly vary, so it is left out.
 fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
     let accelerations = pointwise.acceleration.iter().map(FitSums::r2);
     let phases = model.phases().iter().zip(accelerations).enumerate();
@@ -169,8 +159,7 @@ fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
     unlike.collect()
 }
 
-/// `R^2` of a phase's accelerations over the training, if the model file says it. Refinement by rollouts may have
-/// traded it for predictions.
+/// Refinement by rollouts may have traded it for predictions.
 fn training_r2(model: &ReducedModel, phase: usize) -> Option<f64> {
     let training = model.provenance().get("report")?.get("training")?;
     training.get("ddz_r2")?.get(phase)?.as_f64()

@@ -8,7 +8,6 @@ use crate::model::{LibraryChoice, LibraryOrder, ModelError, ReducedModel};
 use crate::recording::Segment;
 use crate::sim::LatentSegment;
 
-/// Samples that are compared, spread over all recordings.
 const SAMPLES: usize = 1000;
 /// R^2 of latent accelerations at which a reading explains that those of another were worse.
 pub(super) const GOOD_R2: f64 = 0.2;
@@ -19,28 +18,21 @@ const UNNAMED: f64 = 4.0;
 /// Part of the variance below which residuals count as equal.
 const NO_RESIDUAL: f64 = 1e-9;
 
-#[derive(Debug, Clone, PartialEq)]
-pub struct CoefficientSlip {
-    /// The option that states another order of the terms.
-    pub order: Option<String>,
-    /// Two phases that have each other's coefficients.
-    pub exchanged: Option<[String; 2]>,
-}
+/// The names of tensors by the parts of a model that they are.
+pub(super) type Tensors<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientTrials {
     /// R^2 in each order that has a name, without those that are the same in this library.
     pub by_order: Vec<(LibraryOrder, f64)>,
-    /// The reading that explains the residual, and its R^2.
-    pub slip: Option<(CoefficientSlip, f64)>,
+    /// The reading that explains the residual with the options that state it, in words, and its R^2.
+    pub slip: Option<(String, f64)>,
     /// R^2 of coefficients fitted to these samples; none where these are too few.
     pub fitted: Option<f64>,
 }
 
-/// Values of the terms and accelerations of a phase, one row per sample.
 type PhaseSamples = (DMatrix<f64>, DMatrix<f64>);
 
-/// A way to read coefficients: for each row of the file that of romc's order.
 struct Reading {
     order: Option<LibraryOrder>,
     rows: Vec<usize>,
@@ -52,6 +44,7 @@ impl CoefficientTrials {
         model: &ReducedModel,
         segments: &[&Segment],
         order: Option<LibraryOrder>,
+        tensors: Tensors<'_>,
     ) -> Result<Self, EvaluateError> {
         let samples = samples(model, segments)?;
         let readings = readings(model, order)?;
@@ -84,15 +77,10 @@ impl CoefficientTrials {
         }
         let (_, found, reading, exchanged) = best;
         let other = reading.order.filter(|_| reading.order != readings[0].order);
-        let name = |phase: usize| model.phases()[phase].name.clone();
-        let slip = CoefficientSlip {
-            order: other.map(|order| option(model, order)),
-            exchanged: exchanged.map(|pair| pair.map(name)),
-        };
-        let is_slip = slip.order.is_some() || slip.exchanged.is_some();
+        let slip = advice(model, other, exchanged, tensors);
         Ok(Self {
             by_order,
-            slip: is_slip.then_some((slip, found)),
+            slip: slip.map(|slip| (slip, found)),
             fitted: fitted(&samples),
         })
     }
@@ -110,7 +98,6 @@ impl CoefficientTrials {
     }
 }
 
-/// The coefficients of a phase, read in another way than the one given.
 fn read(
     model: &ReducedModel,
     phase: usize,
@@ -150,6 +137,31 @@ fn readings(model: &ReducedModel, given: Option<LibraryOrder>) -> Result<Vec<Rea
         }
     }
     Ok(readings)
+}
+
+/// Another reading in words, with the options of an import that state it.
+fn advice(
+    model: &ReducedModel,
+    order: Option<LibraryOrder>,
+    exchanged: Option<[usize; 2]>,
+    tensors: Tensors<'_>,
+) -> Option<String> {
+    let (mut with, mut expected) = (Vec::new(), Vec::new());
+    if let Some([a, b]) = exchanged.map(|pair| pair.map(|phase| &model.phases()[phase].name)) {
+        with.push(format!("the coefficients of {a} and {b} exchanged"));
+        for part in ["xi", "mask"] {
+            for [to, from] in [[a, b], [b, a]] {
+                let tensor = tensors(&format!("{part}.{from}"));
+                expected.extend(tensor.map(|tensor| format!("--map {part}.{to}={tensor}")));
+            }
+        }
+    }
+    if let Some(order) = order {
+        with.push("the terms in another order".to_owned());
+        expected.push(option(model, order));
+    }
+    let (words, options) = (with.join(" and "), expected.join(" "));
+    (!with.is_empty()).then(|| format!("with {words}: expected {options}"))
 }
 
 fn option(model: &ReducedModel, order: LibraryOrder) -> String {
@@ -202,9 +214,8 @@ fn r2(samples: &[PhaseSamples], xi: impl Fn(usize) -> Option<DMatrix<f64>>) -> O
     for (phase, (theta, ddz)) in samples.iter().enumerate() {
         if ddz.nrows() > 0 {
             residual += (theta * xi(phase)? - ddz).norm_squared();
-            deviation += (ddz.column_iter())
-                .map(|y| y.variance() * y.len() as f64)
-                .sum::<f64>();
+            let squares = ddz.column_iter().map(|y| y.variance() * y.len() as f64);
+            deviation += squares.sum::<f64>();
         }
     }
     let r2 = 1.0 - residual / deviation;

@@ -7,12 +7,12 @@ use super::along_recording::{ReferenceInput, along_recording};
 use super::assessment::EvaluateError;
 use super::coordinates::Mean;
 use super::prediction::{PredictionError, prediction_error, recorded_stages, uninformed};
-use super::recovery::{Driver, Recovery, recovery};
+use super::recovery::{Driver, recovery};
 use super::torque::{ByContact, Comparison};
 use super::verdict::failure;
 use crate::model::ReducedModel;
 use crate::mpc::{
-    Command, Controller, MAX_STRUCTURED_DIM, MpcSettings, STEP_SLACK, Solver, Status,
+    Command, Controller, MAX_STRUCTURED_DIM, MpcError, MpcSettings, STEP_SLACK, Solver, Status,
 };
 use crate::recording::{Recording, Segment};
 
@@ -26,40 +26,30 @@ pub struct StepTimes {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Summary {
     pub steps: usize,
-    /// Steps with a checked plan within all limits.
     pub solved: usize,
     /// Steps with a checked plan that leaves joint limits.
     pub softened: usize,
-    /// Steps without a plan of their own.
     pub failed: usize,
     pub step_us: StepTimes,
-    /// Wall times of the preparations between steps, which no command waits for:
-    /// [`Controller::prepare`](crate::mpc::Controller::prepare).
+    /// Of [`Controller::prepare`](crate::mpc::Controller::prepare), which no command waits for.
     pub prepare_us: StepTimes,
-    /// Agreement of commanded and recorded torques, see [`Comparison::r2`].
     pub torque_r2: ByContact,
-    /// The same for torques that the lift alone makes of projected recorded inputs, at every sample; see
-    /// [`lift_comparison`](super::lift_comparison).
+    /// Of the lift alone, see [`lift_comparison`](super::lift_comparison).
     pub lift_r2: ByContact,
-    /// Root mean square of commanded minus recorded torques over all steps and joints, N m.
     pub torque_rms_nm: Option<f64>,
-    /// Root mean square over all steps, stages and latents of planned minus reference position, in standard deviations
-    /// of the reference.
+    /// Of planned minus reference positions, in standard deviations of the reference.
     pub tracking_rms: Option<f64>,
     pub limit_violations: usize,
-    /// Steps that leave a friction cone by more than a thousandth of the weight; none if the controller constrains
-    /// none.
+    /// None if the controller constrains no friction cone.
     pub friction_violations: Option<usize>,
     /// Mean of `|F_lift − G τ| / |F_lift|` over the steps where it is defined.
     pub inconsistency: Option<f64>,
-    /// Steps left out of the comparison of torques: the recording's are no torques of the robot.
     #[serde(rename = "implausible_steps")]
     pub implausible: usize,
 }
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
-    /// The counts; [`Self::summary`] fills in the rest.
     pub(super) summary: Summary,
     times_us: Vec<f64>,
     pub(super) preparations_us: Vec<f64>,
@@ -84,43 +74,36 @@ impl Tally {
         }
     }
 
-    pub(super) fn summary(mut self) -> Summary {
-        self.times_us.sort_by(f64::total_cmp);
-        self.preparations_us.sort_by(f64::total_cmp);
+    pub(super) fn summary(self) -> Summary {
         Summary {
-            step_us: step_times(&self.times_us),
-            prepare_us: step_times(&self.preparations_us),
+            step_us: step_times(self.times_us),
+            prepare_us: step_times(self.preparations_us),
             torque_r2: self.torque.r2(),
             lift_r2: self.lift.r2(),
             torque_rms_nm: self.torque.rms(),
-            tracking_rms: self.tracking.get().map(f64::sqrt),
+            tracking_rms: self.tracking.root(),
             inconsistency: self.inconsistency.get(),
             ..self.summary
         }
     }
 }
 
-/// Percentiles of sorted times: the smallest value that so many percent do not exceed.
-fn step_times(sorted_us: &[f64]) -> StepTimes {
-    let rank = |share: f64| {
-        let rank = (share * sorted_us.len() as f64).ceil() as usize;
-        sorted_us.get(rank.max(1) - 1).copied().unwrap_or(0.0)
-    };
-    StepTimes {
-        p50: rank(0.5),
-        p99: rank(0.99),
-        max: sorted_us.last().copied().unwrap_or(0.0),
-    }
+/// Percentiles: the smallest value that so many percent do not exceed.
+fn step_times(mut times_us: Vec<f64>) -> StepTimes {
+    times_us.sort_by(f64::total_cmp);
+    let [p50, p99, max] = [0.5, 0.99, 1.0].map(|share| {
+        let rank = (share * times_us.len() as f64).ceil() as usize;
+        times_us.get(rank.max(1) - 1).copied().unwrap_or(0.0)
+    });
+    StepTimes { p50, p99, max }
 }
 
-/// A model and its baselines along one recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ControlMetrics {
     /// Predictions one stage ahead with the recorded input; none if no stage lies within one phase.
     pub prediction_rms: Option<PredictionError>,
     /// Agreement of commanded and recorded torques where the controller has to find the input itself.
     pub torque_r2: ByContact,
-    /// Root mean square of commanded minus recorded torques of the same run, N m.
     pub torque_rms_nm: Option<f64>,
     /// Mean of `|F_lift - G tau| / |F_lift|` over the steps of the same run where it is defined.
     pub inconsistency: Option<f64>,
@@ -129,7 +112,6 @@ pub struct ControlMetrics {
     /// Planned minus reference positions after the pushes, in standard deviations of the reference.
     pub tracking_rms: Option<f64>,
     pub baseline: Baselines,
-    /// Share of the steps of the same run that have no plan of their own.
     pub unplanned_share: f64,
     /// The counted rows of the [verdict](super::Verdict) that fail along this recording, in words.
     pub failure: Option<String>,
@@ -141,9 +123,7 @@ pub struct Baselines {
     pub no_dynamics: NoDynamics,
     /// The same controller, given the recorded state after the pushes.
     pub feedback_off: Pushed,
-    /// The recorded torques after the pushes.
     pub replay: Pushed,
-    /// A body that keeps its velocity.
     pub constant_velocity: ConstantVelocity,
 }
 
@@ -192,28 +172,28 @@ pub fn control_metrics(
     };
     let run = own_input(&mut controller)?.summary;
     let blind_run = own_input(&mut blind_controller)?.summary;
-    let pushed = |controller: &mut Controller, driver| recovery(controller, recording, driver);
-    let feedback = pushed(&mut controller, Driver::Feedback)?;
-    let off = |recovery: Recovery| Pushed {
-        recovery_rms_m: recovery.rms_m(),
+    let feedback = recovery(&mut controller, recording, Driver::Feedback)?;
+    let pushed = |controller: &mut Controller, driver| {
+        let recovery_rms_m = recovery(controller, recording, driver)?.deviations.root();
+        Ok::<_, MpcError>(Pushed { recovery_rms_m })
     };
     let mut metrics = ControlMetrics {
         prediction_rms: predicted(Some(model))?,
         torque_r2: run.torque_r2,
         torque_rms_nm: run.torque_rms_nm,
         inconsistency: run.inconsistency,
-        recovery_rms_m: feedback.rms_m(),
-        tracking_rms: feedback.tracking_rms(),
+        recovery_rms_m: feedback.deviations.root(),
+        tracking_rms: feedback.planned.root(),
         unplanned_share: run.failed as f64 / run.steps as f64,
         baseline: Baselines {
             no_dynamics: NoDynamics {
                 prediction_rms: predicted(Some(&blind))?,
                 torque_r2: blind_run.torque_r2,
                 torque_rms_nm: blind_run.torque_rms_nm,
-                recovery_rms_m: pushed(&mut blind_controller, Driver::Feedback)?.rms_m(),
+                recovery_rms_m: pushed(&mut blind_controller, Driver::Feedback)?.recovery_rms_m,
             },
-            feedback_off: off(pushed(&mut controller, Driver::NoFeedback)?),
-            replay: off(pushed(&mut controller, Driver::Replay)?),
+            feedback_off: pushed(&mut controller, Driver::NoFeedback)?,
+            replay: pushed(&mut controller, Driver::Replay)?,
             constant_velocity: ConstantVelocity {
                 prediction_rms: predicted(None)?,
             },
@@ -224,8 +204,7 @@ pub fn control_metrics(
     Ok(metrics)
 }
 
-/// The settings that a controller along these recordings has by default: recordings of fewer samples than a default
-/// stage has are followed at the rate of the slowest.
+/// Default settings, but at the rate of the slowest recording where that has fewer samples than a default stage.
 pub fn usual_settings(recordings: &[Recording]) -> MpcSettings {
     let default = MpcSettings::default();
     let segments = recordings.iter().flat_map(|recording| &recording.segments);
@@ -235,24 +214,5 @@ pub fn usual_settings(recordings: &[Recording]) -> MpcSettings {
     MpcSettings {
         step_s: if is_slow { slowest_s } else { default.step_s },
         ..default
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn step_times_are_ranks_of_the_sorted_list() {
-        let times: Vec<f64> = (1..=200).map(f64::from).collect();
-        assert_eq!(
-            step_times(&times),
-            StepTimes {
-                p50: 100.0,
-                p99: 198.0,
-                max: 200.0
-            }
-        );
-        assert_eq!(step_times(&[]), StepTimes::default());
     }
 }

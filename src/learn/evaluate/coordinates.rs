@@ -10,8 +10,7 @@ use crate::sim::{LatentSegment, Rollout};
 pub struct Fit {
     /// Root mean square of the residuals, in the unit of the samples.
     pub rms: f64,
-    /// Coefficient of determination `1 - sum (y - y_hat)^2 / sum (y - mean y)^2`; at most 1, and negative where the
-    /// mean of the record would have been the better prediction. `None` when the record does not move.
+    /// `1 - sum (y - y_hat)^2 / sum (y - mean y)^2`; `None` when the record does not move.
     pub r2: Option<f64>,
 }
 
@@ -34,22 +33,16 @@ impl FitSums {
         self.deviation_square += from_old_mean * (recorded - self.mean);
     }
 
-    /// Adds the pairs that `other` holds; deviations are each taken from its own mean.
-    ///
-    /// This is how several coordinates, or several jumps, make one coefficient of determination without the differences
-    /// between their means counting as explained.
+    /// Adds the pairs of `other`, deviations taken from its own mean: differences between means do not count as explained.
     pub fn merge_keeping_means(&mut self, other: &Self) {
         self.count += other.count;
         self.residual_square += other.residual_square;
         self.deviation_square += other.deviation_square;
     }
 
-    /// Pairs of several coordinates or phases together, see [`FitSums::merge_keeping_means`].
     pub(crate) fn jointly(parts: &[Self]) -> Self {
         let mut total = Self::default();
-        parts
-            .iter()
-            .for_each(|part| total.merge_keeping_means(part));
+        (parts.iter()).for_each(|part| total.merge_keeping_means(part));
         total
     }
 
@@ -57,7 +50,6 @@ impl FitSums {
         self.count
     }
 
-    /// The fit of all pairs added so far; `None` before the first.
     pub fn fit(&self) -> Option<Fit> {
         (self.count > 0).then(|| Fit {
             rms: (self.residual_square / self.count as f64).sqrt(),
@@ -66,7 +58,6 @@ impl FitSums {
         })
     }
 
-    /// Coefficient of determination of all pairs added so far, see [`Fit::r2`].
     pub(crate) fn r2(&self) -> Option<f64> {
         self.fit()?.r2
     }
@@ -87,15 +78,17 @@ impl Mean {
     pub(super) fn get(&self) -> Option<f64> {
         (self.count > 0).then(|| self.sum / self.count as f64)
     }
+
+    pub(super) fn root(&self) -> Option<f64> {
+        self.get().map(f64::sqrt)
+    }
 }
 
-/// Sums of residuals of every robot coordinate, over any number of rollouts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoordinateSums {
     sums: Vec<FitSums>,
     by_phase: Vec<Vec<FitSums>>,
     pub windows: usize,
-    /// Windows that diverged; their samples after that have no prediction and do not count.
     pub diverged: usize,
 }
 
@@ -136,8 +129,7 @@ impl CoordinateSums {
         Ok(())
     }
 
-    /// Adds the residuals of a robot that keeps the recorded velocity at the start of each window, over the samples
-    /// that `rollout` predicts.
+    /// Adds residuals of the constant velocity at the start of each window, over the samples that `rollout` predicts.
     pub(super) fn add_constant_velocity(
         &mut self,
         segment: &Segment,
@@ -162,7 +154,6 @@ impl CoordinateSums {
         }
     }
 
-    /// Fit of each coordinate, in the order of the state; `None` before the first sample.
     pub fn fits(&self) -> Vec<Option<Fit>> {
         self.sums.iter().map(FitSums::fit).collect()
     }
@@ -176,7 +167,6 @@ impl CoordinateSums {
     }
 }
 
-/// How well the model's pieces do on one recorded segment, without integrating anything.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointwiseSums {
     /// Residuals of `decode(encode(x))`, all coordinates in scaled units (equation 16).
@@ -221,9 +211,7 @@ impl PointwiseSums {
             }
         }
         for (total, outputs) in self.acceleration.iter_mut().zip(&accelerations) {
-            outputs
-                .iter()
-                .for_each(|sums| total.merge_keeping_means(sums));
+            (outputs.iter()).for_each(|sums| total.merge_keeping_means(sums));
         }
         Ok(())
     }

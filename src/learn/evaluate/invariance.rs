@@ -10,24 +10,18 @@ use serde::Serialize;
 use crate::model::{ModelError, ReducedModel};
 use crate::robot::{BODY_X, BODY_Z, ContactFlags, JOINT_DIM, Leg, STATE_DIM};
 
-/// By how much the robot is moved, m.
 const SHIFT_M: f64 = 0.3;
-/// By how much a joint is off for its mirror image, rad.
 const OFF_RAD: f64 = 0.1;
-/// Largest part of another body coordinate in a latent combination that counts as the height of a centre of mass.
+/// Largest part of another body coordinate in the height of a centre of mass.
 const PURE: f64 = 1e-6;
 
-/// What a model says of known physics.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Invariance {
-    /// Downward acceleration in flight of the latent combination that is body z and joints alone, and of all such the
-    /// one that state and input change least, m/s^2; none if the latents do not tell body z from the body's other
-    /// coordinates, or no phase is selected by feet in the air.
+    /// Of the latent combination that is body z and joints alone; none without one, or without a flight phase.
     pub gravity_m_s2: Option<f64>,
-    /// Vertical force of four feet over the acceleration of that combination that it makes, kg.
+    /// Vertical force of four feet over the acceleration of that combination.
     pub mass_kg: Option<f64>,
-    /// Largest change of a decoded joint angle for a body 1 m further on, rad/m: what a controller's joint targets and
-    /// a plan's postures are off where x does not count from where the jump begins.
+    /// Largest change of a decoded joint angle for a body 1 m further on, rad/m.
     pub joint_shift_rad_m: f64,
     pub phases: Vec<PhaseInvariance>,
 }
@@ -141,7 +135,6 @@ fn mean_input(model: &ReducedModel, phase: usize) -> DVector<f64> {
     statistics.map_or(DVector::zeros(STATE_DIM), |known| known.mean.clone())
 }
 
-/// Latent acceleration of a phase, scaled units, at a state and an input of the robot, SI, `state_dim` each.
 fn latent_acceleration(
     model: &ReducedModel,
     phase: usize,
@@ -169,7 +162,6 @@ fn mirrored(vector: &DVector<f64>) -> DVector<f64> {
     image
 }
 
-/// Gravity and mass, by the latent combination that is body z and joints alone.
 fn by_height(model: &ReducedModel, rest: &DVector<f64>) -> Result<[Option<f64>; 2], ModelError> {
     let body_dim = STATE_DIM - JOINT_DIM;
     let encode = model.tangent(rest)?.encode;
@@ -227,7 +219,6 @@ fn gain(
     Ok(out)
 }
 
-/// Force of four feet over the acceleration of a combination that it makes.
 fn mass_kg(
     model: &ReducedModel,
     rest: &DVector<f64>,

@@ -31,13 +31,6 @@ pub use round_trip::RoundTrip;
 pub use torque::{ByContact, Comparison, LAMBDA, combined_loss, is_plausible};
 pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
 
-/// A model of the project's own, by the name of its file.
-#[cfg(test)]
-pub(crate) fn shipped_model(name: &str) -> crate::model::ReducedModel {
-    let path = format!("{}/../../models/{name}.json", env!("CARGO_MANIFEST_DIR"));
-    crate::artifact::read(path.as_ref()).expect("a shipped model")
-}
-
 /// A recording below `examples/recordings`, such as `go1/test_01`.
 #[cfg(test)]
 pub(crate) fn shipped(name: &str) -> crate::recording::Recording {

@@ -13,8 +13,7 @@ use crate::recording::Recording;
 use crate::robot::{BODY_Z, JOINT_DIM};
 use crate::sim::LatentSegment;
 
-/// Root mean squares of predicted minus recorded positions one stage ahead, in the robot's coordinates. What the
-/// decoder alone loses does not count: both are decoded from latent positions.
+/// Root mean squares of predicted minus recorded positions one stage ahead, both decoded from latent positions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PredictionError {
     #[serde(rename = "body.x")]
@@ -29,10 +28,7 @@ pub struct PredictionError {
 }
 
 impl PredictionError {
-    /// The mean over the latent positions of this error as a share of another's: below 1 if this one predicts better.
-    ///
-    /// These are what the dynamics predict. The robot's coordinates are made of them by the decoder: one for which no
-    /// latent coordinate stands, such as pitch in a model of legs, can be off by much where it hardly moves.
+    /// Mean over the latent positions of this error as a share of another's; coordinates without a latent one do not count.
     pub(super) fn share_of(&self, other: &Self) -> f64 {
         let shares = self.latent.iter().zip(&other.latent);
         shares.map(|(own, other)| own / other).sum::<f64>() / self.latent.len() as f64
@@ -49,7 +45,6 @@ pub(super) struct RecordedStage {
     pub input: DVector<f64>,
 }
 
-/// The stages of a recording that lie within one phase, one after the other.
 pub(super) fn recorded_stages(
     model: &ReducedModel,
     recording: &Recording,
@@ -66,10 +61,7 @@ pub(super) fn recorded_stages(
         for pair in samples.windows(2) {
             let (first, last) = (pair[0], pair[1]);
             let phase = latent.phase[first];
-            if latent.phase[first..=last]
-                .iter()
-                .any(|other| *other != phase)
-            {
+            if (latent.phase[first..=last].iter()).any(|other| *other != phase) {
                 continue;
             }
             let held = latent.u_lat.columns(first, last - first);
@@ -85,8 +77,6 @@ pub(super) fn recorded_stages(
     Ok(stages)
 }
 
-/// The error of predictions over all stages, decoded by `maps`; none without stages. A stage's end is predicted from
-/// its beginning by a model's dynamics with the input held at its mean, or, without a model, by a constant velocity.
 pub(super) fn prediction_error(
     maps: &ReducedModel,
     dynamics: Option<&ReducedModel>,
@@ -125,11 +115,7 @@ pub(super) fn prediction_error(
     }))
 }
 
-/// A copy of a model with `ddz = g u_lat` for dynamics.
-///
-/// Encoder, decoder, robot and input statistics stay. The one number `g` of each phase is the least-squares fit to
-/// these very stages, so that the copy has the right scale and nothing else: no gravity, no coupling of coordinates, no
-/// effect of the state. How far its accelerations are off is its own.
+/// A copy of a model with `ddz = g u_lat`, `g` of each phase the least-squares fit to these stages: right scale, nothing else.
 pub(super) fn uninformed(
     model: &ReducedModel,
     stages: &[RecordedStage],
@@ -140,14 +126,9 @@ pub(super) fn uninformed(
     let mut phases = Vec::with_capacity(model.phases().len());
     let mut statistics = Vec::new();
     for (index, phase) in model.phases().iter().enumerate() {
-        let samples: Vec<(DVector<f64>, &DVector<f64>)> = stages
-            .iter()
-            .filter(|stage| stage.phase == index)
-            .map(|stage| {
-                let ddz = (&stage.end.1 - &stage.start.1) / stage.duration_s;
-                (ddz, &stage.input)
-            })
-            .collect();
+        let of_phase = stages.iter().filter(|stage| stage.phase == index);
+        let rate = |stage: &RecordedStage| (&stage.end.1 - &stage.start.1) / stage.duration_s;
+        let samples: Vec<_> = of_phase.map(|stage| (rate(stage), &stage.input)).collect();
         let product: f64 = samples.iter().map(|(ddz, input)| ddz.dot(input)).sum();
         let square: f64 = samples.iter().map(|(_, input)| input.norm_squared()).sum();
         let gain = if square > 0.0 { product / square } else { 0.0 };
@@ -161,29 +142,22 @@ pub(super) fn uninformed(
         }
         statistics.push((phase.name.clone(), own));
     }
-    let builder = model.clone().into_builder().library(library);
-    Ok(builder
-        .phases(phases)
-        .all_input_statistics(statistics)
-        .build()?)
+    let builder = model.clone().into_builder().library(library).phases(phases);
+    Ok(builder.all_input_statistics(statistics).build()?)
 }
 
-/// Covariance of `ddz - g u_lat` about zero.
 fn error_covariance(samples: &[(DVector<f64>, &DVector<f64>)], gain: f64) -> DMatrix<f64> {
     let d = samples[0].0.len();
     let share = 1.0 / samples.len() as f64;
-    samples
-        .iter()
-        .fold(DMatrix::zeros(d, d), |sum, (ddz, input)| {
-            let left = ddz - *input * gain;
-            sum + &left * left.transpose() * share
-        })
+    (samples.iter()).fold(DMatrix::zeros(d, d), |sum, (ddz, input)| {
+        let left = ddz - *input * gain;
+        sum + &left * left.transpose() * share
+    })
 }
 
 /// Share of the largest singular value below which a direction of the input counts as without effect.
 const RANK_THRESHOLD: f64 = 0.01;
 
-/// One phase, linearised at the mean of the recorded `(z, dz, u_lat)` of that phase.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearisedPhase {
     pub samples: usize,
@@ -194,7 +168,6 @@ pub struct LinearisedPhase {
 }
 
 impl LinearisedPhase {
-    /// Largest real part of the eigenvalues, in 1/s: small deviations grow as `exp(a t)`.
     pub fn growth_rate(&self) -> Option<f64> {
         self.eigenvalues.first().map(|value| value.re)
     }
@@ -206,7 +179,6 @@ impl LinearisedPhase {
         (*smallest > 0.0).then(|| largest / smallest)
     }
 
-    /// Number of singular values of the input gain above 1 % of the largest.
     pub fn input_effective_rank(&self) -> usize {
         let largest = self.input_singular_values.first().copied().unwrap_or(0.0);
         let counts = |value: &&f64| **value > 0.0 && **value >= RANK_THRESHOLD * largest;
@@ -214,8 +186,7 @@ impl LinearisedPhase {
     }
 }
 
-/// Each phase of a model, linearised at its mean over the recorded samples; none for a phase that no sample is in, or
-/// whose Jacobian there is not finite.
+/// Each phase, linearised at the mean `(z, dz, u_lat)` of its samples; none without samples, or with a Jacobian that is not finite.
 pub fn linearise_phases(
     model: &CompiledModel,
     segments: &[&LatentSegment],
@@ -265,7 +236,6 @@ fn linearise_phase(
     })
 }
 
-/// `[0 I; J]`, the matrix of the state `(z, dz)` whose `ddz` has the Jacobian `J` (`d x 2d`).
 pub(crate) fn state_matrix(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
     let d = jacobian.nrows();
     let mut state = DMatrix::zeros(2 * d, 2 * d);
@@ -274,10 +244,7 @@ pub(crate) fn state_matrix(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
     state
 }
 
-/// Eigenvalues of a square matrix; none if one of its entries is not finite, or if they cannot be computed.
-///
-/// Entries of very different size, such as stiff joints beside ones, can keep the iteration from converging: entries
-/// below ever larger shares of their neighbours count as 0 until it does.
+/// Eigenvalues of a square matrix; none if an entry is not finite. Small entries count as 0 where the iteration does not converge.
 pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     if matrix.iter().any(|value| !value.is_finite()) {
         return None;
@@ -288,32 +255,8 @@ pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     }
     let matrix = matrix / size;
     let iterations = 100 * matrix.nrows().max(1);
-    let schur = [f64::EPSILON, 1e-14, 1e-12, 1e-10]
-        .iter()
-        .find_map(|share| Schur::try_new(matrix.clone(), *share, iterations))?;
+    let mut shares = [f64::EPSILON, 1e-14, 1e-12, 1e-10].into_iter();
+    let schur = shares.find_map(|share| Schur::try_new(matrix.clone(), share, iterations))?;
     let values = schur.complex_eigenvalues();
     Some(values.iter().map(|value| value * size).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::evaluate::shipped_model;
-
-    #[test]
-    fn pitch_without_a_latent_coordinate_does_not_make_right_predictions_fail() {
-        let model = shipped_model("go1-d6");
-        let jump = crate::evaluate::shipped("go1-other/jump_04");
-        let stages = recorded_stages(&model, &jump, 0.01).expect("of its robot");
-        let error = |dynamics| {
-            let error = prediction_error(&model, dynamics, &stages);
-            error.expect("complete").expect("stages")
-        };
-        let own = error(Some(&model));
-        let constant = error(None);
-        assert!(own.pitch_rad > 2.0 * constant.pitch_rad, "{own:?}");
-        assert_eq!(own.latent.len(), 6);
-        let share = own.share_of(&constant);
-        assert!(share < 0.7, "{share}: {own:?} {constant:?}");
-    }
 }

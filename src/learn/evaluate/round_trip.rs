@@ -4,14 +4,13 @@
 use nalgebra::DVector;
 
 use super::assessment::EvaluateError;
-use super::coefficient_trials::{CoefficientSlip, CoefficientTrials, GOOD_R2};
+use super::coefficient_trials::{CoefficientTrials, GOOD_R2, Tensors};
 use super::coordinates::{FitSums, PointwiseSums};
 use crate::model::{CoordinateOrder, LibraryOrder, ModelError, ReducedModel, StateMap};
 use crate::recording::Segment;
 use crate::robot::STATE_DIM;
 use crate::sim::LatentSegment;
 
-/// Samples by which slips are looked for, spread over all recordings.
 const SAMPLES: usize = 240;
 /// Relative error beyond which maps do not fit: that of an answer that never changes.
 const LARGEST_ERROR: f64 = 1.0;
@@ -29,43 +28,30 @@ pub struct RoundTrip {
     /// Mean square of `decode(encode(x)) - x` over the mean square of the deviation of `x` from its mean, all
     /// coordinates in the model's scaled units.
     pub error: f64,
-    /// The slip under which `error` is smallest, if it explains the error.
-    pub slip: Option<(Slip, f64)>,
+    /// The slip under which `error` is smallest, if it explains the error: the option of an import that mends it, in
+    /// words.
+    pub slip: Option<(String, f64)>,
     /// Name of each phase and R^2 of its latent accelerations; none without samples of it.
     pub acceleration_r2: Vec<(String, Option<f64>)>,
     pub all_acceleration_r2: Option<f64>,
-    pub acceleration_slip: Option<(AccelerationSlip, f64)>,
+    /// The same of the accelerations, and their R^2.
+    pub acceleration_slip: Option<(String, f64)>,
     pub trials: CoefficientTrials,
 }
 
-#[derive(Debug, Clone, PartialEq)]
-pub enum AccelerationSlip {
-    Coefficients(CoefficientSlip),
-    InputFactor(f64),
-    /// The mean of the training has to be taken off states; the maps hide it where they reproduce it.
-    Centred,
-}
-
 /// What a foreign model is easily given wrong: order or scaling of the coordinates, or both.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Slip {
-    order: Option<CoordinateOrder>,
-    scaling: Option<ScalingSlip>,
-}
+type Slip = (Option<CoordinateOrder>, Option<ScalingSlip>);
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ScalingSlip {
-    /// Scaled values are `factor x` in all coordinates.
     Factor(f64),
-    /// The mean of the training was subtracted before the factors.
     Centred,
-    /// Scaled values are `(x - mean) / standard deviation`.
     Standardised,
 }
 
 impl RoundTrip {
     /// Looks at an imported model along the recordings that came with it; none without recordings or without both maps.
-    /// `order` is that of a standard library's terms in the file.
+    /// `order` is that of a standard library's terms in the file, `tensors` has the names of tensors by their parts.
     ///
     /// # Errors
     /// [`EvaluateError`] for a model without robot, or inputs that cannot be computed.
@@ -73,6 +59,7 @@ impl RoundTrip {
         model: &ReducedModel,
         segments: &[&Segment],
         order: Option<LibraryOrder>,
+        tensors: Tensors<'_>,
     ) -> Result<Option<Self>, EvaluateError> {
         let (Ok(encoder), Ok(decoder)) = (model.encoder_map(), model.decoder_map()) else {
             return Ok(None);
@@ -81,23 +68,22 @@ impl RoundTrip {
             return Ok(None);
         }
         let samples = Samples::new((encoder, decoder), model.state_factors()?, segments);
-        let error = samples.error(&Slip::default())?;
+        let error = samples.error(&(None, None))?;
         let best = samples.best_slip()?;
         let is_explained =
             |found: f64| error > SMALL_ERROR && EXPLAINED * found < error && found < UNEXPLAINED;
         let still = DVector::zeros(STATE_DIM);
         let (acceleration_r2, all) = accelerations(model, segments, 1.0, &still)?;
-        let trials = CoefficientTrials::new(model, segments, order)?;
-        let of_coefficients =
-            (trials.slip.clone()).map(|(slip, r2)| (AccelerationSlip::Coefficients(slip), r2));
+        let trials = CoefficientTrials::new(model, segments, order, tensors)?;
         let other = match all {
             Some(r2) if r2 < 0.0 => acceleration_slip(model, segments, &samples.mean)?,
             _ => None,
         };
-        let slips = of_coefficients.into_iter().chain(other);
+        let slips = trials.slip.clone().into_iter().chain(other);
+        let explained = best.filter(|(_, found)| is_explained(*found));
         Ok(Some(Self {
             error,
-            slip: best.filter(|(_, found)| is_explained(*found)),
+            slip: explained.map(|(slip, found)| (advice(slip), found)),
             acceleration_r2,
             all_acceleration_r2: all,
             acceleration_slip: slips.max_by(|a, b| a.1.total_cmp(&b.1)),
@@ -109,7 +95,6 @@ impl RoundTrip {
         self.error <= LARGEST_ERROR && self.slip.is_none()
     }
 
-    /// Whether the equations say more of the latent accelerations than a constant.
     fn equations_fit(&self) -> bool {
         self.all_acceleration_r2.is_none_or(|r2| r2 >= 0.0)
     }
@@ -120,16 +105,15 @@ impl RoundTrip {
         !self.maps_fit() || self.acceleration_slip.is_some()
     }
 
-    /// What is wrong with the model along the recordings, if anything is, and the option of an import that mends it;
-    /// `tensor` has the names of tensors by their parts.
-    pub fn fault(&self, tensor: &dyn Fn(&str) -> Option<String>) -> Option<String> {
+    /// What is wrong with the model along the recordings, if anything is, and the option of an import that mends it.
+    pub fn fault(&self) -> Option<String> {
         if !self.maps_fit() {
             let found = format!(
                 "decode(encode(x)) misses the recordings by {:.3} times their variance",
                 self.error
             );
             return Some(match &self.slip {
-                Some((slip, error)) => format!("{found}, by {error:.3} times {}", slip.advice()),
+                Some((advice, error)) => format!("{found}, by {error:.3} times {advice}"),
                 None => format!(
                     "{found}, whatever the usual factors, means and orders: has the training \
                      converged, is it this robot, and are these its maps?"
@@ -142,96 +126,50 @@ impl RoundTrip {
         let r2 = self.all_acceleration_r2.unwrap_or(f64::NAN);
         let found = format!("R^2 of the latent accelerations is {r2:.3}");
         Some(match &self.acceleration_slip {
-            Some((AccelerationSlip::Coefficients(slip), better)) => {
-                format!("{found}, {better:.3} {}", slip.advice(tensor))
-            }
-            Some((AccelerationSlip::Centred, better)) => {
-                format!("{found}, {better:.3} {}", ScalingSlip::Centred.advice())
-            }
-            Some((AccelerationSlip::InputFactor(factor), better)) => format!(
-                "{found}, {better:.3} with the inputs times {factor}: expected other factors of the \
-                 inputs (--input-scaling, or a tensor scaling.input or std.input)"
-            ),
-            None => format!("{found}, below that of a constant{}", self.unexplained()),
+            Some((advice, better)) => format!("{found}, {better:.3} {advice}"),
+            None => format!("{found}, below that of a constant, {}", self.unexplained()),
         })
     }
 
     fn unexplained(&self) -> String {
-        let (tried, or) = match self.trials.by_order.is_empty() {
-            true => (
-                "with phases exchanged too",
-                ", or the terms of --library are in another order than the coefficients",
-            ),
-            false => (
-                "in every usual order of the terms and with phases exchanged too",
-                "",
-            ),
+        let or = ", or the terms of --library are in another order than the coefficients";
+        let (orders, or) = match self.trials.by_order.is_empty() {
+            true => ("", or),
+            false => ("in every usual order of the terms and ", ""),
         };
-        let fitted = match self.trials.fitted {
-            Some(r2) => {
-                format!("; fitted to these recordings, the same terms reach {r2:.3}")
-            }
-            None => String::new(),
-        };
+        let reach = |r2| format!("; fitted to these recordings, the same terms reach {r2:.3}");
+        let fitted = self.trials.fitted.map(reach).unwrap_or_default();
         format!(
-            ", {tried}{fitted}: the training has not converged, or these motions are unlike the \
-             training's{or}"
+            "{orders}with phases exchanged too{fitted}: the training has not converged, or these motions are unlike \
+             the training's{or}"
         )
     }
 }
 
-impl CoefficientSlip {
-    fn advice(&self, tensor: &dyn Fn(&str) -> Option<String>) -> String {
-        let (mut with, mut expected) = (Vec::new(), Vec::new());
-        if let Some([a, b]) = &self.exchanged {
-            with.push(format!("the coefficients of {a} and {b} exchanged"));
-            for (part, [to, from]) in ["xi", "mask"]
-                .iter()
-                .flat_map(|part| [(part, [a, b]), (part, [b, a])])
-            {
-                let tensor = tensor(&format!("{part}.{from}"));
-                expected.extend(tensor.map(|tensor| format!("--map {part}.{to}={tensor}")));
-            }
-        }
-        if let Some(option) = &self.order {
-            with.push("the terms in another order".to_owned());
-            expected.push(option.clone());
-        }
-        format!(
-            "with {}: expected {}",
-            with.join(" and "),
-            expected.join(" ")
-        )
-    }
-}
-
-impl Slip {
-    fn advice(&self) -> String {
-        match (&self.order, self.scaling.map(ScalingSlip::advice)) {
-            (None, scaling) => scaling.unwrap_or_default(),
-            (Some(order), None) => format!(
+fn advice((order, scaling): Slip) -> String {
+    match (order, scaling.map(ScalingSlip::advice)) {
+        (None, scaling) => scaling.unwrap_or_default(),
+        (Some(order), None) => {
+            format!(
                 "in another order: expected --order {order}, or another that swaps left and right"
-            ),
-            (Some(order), Some(scaling)) => {
-                format!("in another order, {scaling}, and --order {order}")
-            }
+            )
         }
+        (Some(order), Some(scaling)) => format!("in another order, {scaling}, and --order {order}"),
     }
 }
 
 impl ScalingSlip {
     fn advice(self) -> String {
-        match self {
-            Self::Factor(factor) => format!("with factor {factor}: expected --scaling {factor}"),
-            Self::Centred => {
-                "with their mean taken off: expected a tensor mean.state (SI units)".to_owned()
+        let words = match self {
+            Self::Factor(factor) => {
+                return format!("with factor {factor}: expected --scaling {factor}");
             }
+            Self::Centred => "with their mean taken off: expected a tensor mean.state",
             Self::Standardised => {
-                "as (x - mean) / standard deviation: expected tensors mean.state and std.state (SI \
-                 units)"
-                    .to_owned()
+                "as (x - mean) / standard deviation: expected tensors mean.state and std.state"
             }
-        }
+        };
+        format!("{words} (SI units)")
     }
 }
 
@@ -270,11 +208,11 @@ impl<'m> Samples<'m> {
 
     /// Mean square of the round trip's residual over that of the deviation, where file coordinates follow from recorded
     /// ones by a slip: `y_k = factor_k (x_order(k) - mean_order(k))`.
-    fn error(&self, slip: &Slip) -> Result<f64, ModelError> {
+    fn error(&self, (order, scaling): &Slip) -> Result<f64, ModelError> {
         let same = std::array::from_fn(|k| k);
-        let order = slip.order.as_ref().map_or(same, |order| *order.places());
+        let order = order.as_ref().map_or(same, |order| *order.places());
         let none = DVector::zeros(STATE_DIM);
-        let factors = match slip.scaling {
+        let factors = match *scaling {
             None | Some(ScalingSlip::Centred) => self.factors.clone(),
             Some(ScalingSlip::Factor(factor)) => self.factors.map(|_| factor),
             // Factors of coordinates, not of places.
@@ -282,7 +220,7 @@ impl<'m> Samples<'m> {
                 DVector::from_fn(STATE_DIM, |k, _| 1.0 / self.deviation[order[k]].max(1e-9))
             }
         };
-        let mean = match slip.scaling {
+        let mean = match scaling {
             None | Some(ScalingSlip::Factor(_)) => &none,
             Some(ScalingSlip::Centred | ScalingSlip::Standardised) => &self.mean,
         };
@@ -300,18 +238,14 @@ impl<'m> Samples<'m> {
         Ok(r2.map_or(0.0, |r2| 1.0 - r2))
     }
 
-    /// The slip with the smallest error; two at once only where one is not enough.
     fn best_slip(&self) -> Result<Option<(Slip, f64)>, ModelError> {
         use ScalingSlip::{Centred, Factor, Standardised};
         let orders: Vec<_> = CoordinateOrder::common().into_iter().map(Some).collect();
         let both = [Centred, Standardised];
         let factors = [1.0, 0.1, 10.0, 0.01, 100.0].map(Factor);
-        let one = (orders.iter().map(|order| (order.clone(), None))).chain(
-            factors
-                .into_iter()
-                .chain(both)
-                .map(|scaling| (None, Some(scaling))),
-        );
+        let scalings = factors.into_iter().chain(both);
+        let one = orders.iter().map(|order| (order.clone(), None));
+        let one = one.chain(scalings.map(|scaling| (None, Some(scaling))));
         let best = self.best_of(one)?;
         let error_of = |found: &Option<(Slip, f64)>| found.as_ref().map_or(f64::MAX, |f| f.1);
         if error_of(&best) < SMALL_ERROR * EXPLAINED {
@@ -328,22 +262,18 @@ impl<'m> Samples<'m> {
 
     fn best_of(
         &self,
-        slips: impl Iterator<Item = (Option<CoordinateOrder>, Option<ScalingSlip>)>,
+        slips: impl Iterator<Item = Slip>,
     ) -> Result<Option<(Slip, f64)>, ModelError> {
-        let slips = slips.map(|(order, scaling)| Slip { order, scaling });
-        let found = slips.map(|slip| Ok((self.error(&slip)?, slip)));
-        let found: Vec<(f64, Slip)> = found.collect::<Result<_, ModelError>>()?;
-        let least = found
-            .iter()
-            .fold(f64::INFINITY, |least, (error, _)| least.min(*error));
-        let mut found = found.into_iter().map(|(error, slip)| (slip, error));
-        Ok(found.find(|(_, error)| *error <= ALIKE * least))
+        let found = slips.map(|slip| self.error(&slip).map(|error| (slip, error)));
+        let found: Vec<(Slip, f64)> = found.collect::<Result<_, _>>()?;
+        let least = found.iter().map(|(_, error)| *error);
+        let least = least.fold(f64::INFINITY, f64::min);
+        Ok((found.into_iter()).find(|(_, error)| *error <= ALIKE * least))
     }
 }
 
 type Accelerations = (Vec<(String, Option<f64>)>, Option<f64>);
 
-/// R^2 of the latent accelerations with all inputs multiplied by a factor and a mean taken off `x`.
 fn accelerations(
     model: &ReducedModel,
     segments: &[&Segment],
@@ -361,27 +291,31 @@ fn accelerations(
     }
     let names = model.phases().iter().map(|phase| phase.name.clone());
     let by_phase = names.zip(sums.acceleration.iter().map(FitSums::r2));
-    Ok((
-        by_phase.collect(),
-        FitSums::jointly(&sums.acceleration).r2(),
-    ))
+    let all = FitSums::jointly(&sums.acceleration).r2();
+    Ok((by_phase.collect(), all))
 }
 
-/// The slip with the best latent accelerations, if it makes them any good.
 fn acceleration_slip(
     model: &ReducedModel,
     segments: &[&Segment],
     mean: &DVector<f64>,
-) -> Result<Option<(AccelerationSlip, f64)>, EvaluateError> {
+) -> Result<Option<(String, f64)>, EvaluateError> {
     let still = &DVector::zeros(STATE_DIM);
     let factors = [0.001, 0.01, 0.1, 10.0, 100.0, 1000.0];
-    let slips = factors.map(|factor| (AccelerationSlip::InputFactor(factor), factor, still));
-    let centred = (AccelerationSlip::Centred, 1.0, mean);
-    let mut best: Option<(AccelerationSlip, f64)> = None;
-    for (slip, factor, mean) in slips.into_iter().chain([centred]) {
+    let slips = factors.map(|factor| {
+        let words = format!(
+            "with the inputs times {factor}: expected other factors of the inputs (--input-scaling, or a tensor \
+             scaling.input or std.input)"
+        );
+        (words, factor, still)
+    });
+    // The maps hide a mean of the training that they reproduce.
+    let centred = (ScalingSlip::Centred.advice(), 1.0, mean);
+    let mut best: Option<(String, f64)> = None;
+    for (advice, factor, mean) in slips.into_iter().chain([centred]) {
         let (_, r2) = accelerations(model, segments, factor, mean)?;
         if let Some(r2) = r2.filter(|r2| best.as_ref().is_none_or(|(_, known)| r2 > known)) {
-            best = Some((slip, r2));
+            best = Some((advice, r2));
         }
     }
     Ok(best.filter(|(_, r2)| *r2 > GOOD_R2))

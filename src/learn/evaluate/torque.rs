@@ -7,11 +7,9 @@ use crate::recording::Segment;
 use crate::robot::{ContactFlags, JOINT_DIM, Robot};
 use crate::sim::SimError;
 
-/// Recorded torques beyond this multiple of the robot's limits are no torques of the robot.
 const IMPLAUSIBLE: f64 = 2.0;
 
-/// Whether recorded torques can be the robot's: none beyond twice its limit. Samples with others count in no figure of
-/// torques.
+/// Whether recorded torques can be the robot's; samples with others count in no figure of torques.
 pub fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
     !exceeds(torque_nm, robot.torque_limit_nm(), IMPLAUSIBLE)
 }
@@ -70,18 +68,15 @@ impl Comparison {
         }
     }
 
-    /// The same over all samples, with the mean over all samples.
     pub fn r2_all(&self) -> Option<f64> {
         FitSums::jointly(&self.all).r2()
     }
 
-    /// Root mean square of the difference over all samples and joints, N m.
     pub fn rms(&self) -> Option<f64> {
         FitSums::jointly(&self.all).fit().map(|fit| fit.rms)
     }
 }
 
-/// Lifted force and moment, in N and N m together, below which their inconsistency means nothing.
 const SMALL_FORCE_N: f64 = 1.0;
 
 /// Torques of exactly projected and lifted inputs against the recorded ones.

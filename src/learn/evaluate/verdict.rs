@@ -13,18 +13,14 @@ use crate::model::ReducedModel;
 use crate::recording::Recording;
 use crate::robot::{JOINT_DIM, Robot};
 
-/// Share of a baseline's error from which a model is no better than it.
 const NO_BETTER: f64 = 0.98;
 /// Largest error of a body coordinate over a short time, as a share of that of a constant velocity in x and z together:
 /// on its own, a coordinate that hardly accelerates would ask for more than recordings show.
 const SHORT_SHARE: f64 = 0.25;
-/// Largest error over the whole motion, as a share of that of a constant velocity in the same coordinate.
 const WHOLE_SHARE: f64 = 1.0 / 3.0;
 /// Error of a constant velocity in body x and z below which recordings hardly move the body, m.
 const STILL_M: f64 = 1e-4;
-/// Least R^2 of the torques in contact.
 const TORQUE_R2: f64 = 0.5;
-/// Most of the steps that may be without a plan.
 const UNPLANNED_SHARE: f64 = 0.5;
 /// Least number of latent directions in which inputs act on the ground: forwards and upwards.
 const LEAST_RANK: usize = 2;
@@ -32,15 +28,12 @@ const LEAST_RANK: usize = 2;
 const WHOLE: &str = "whole motion";
 const TORQUES: &str = "torques";
 const CONTROL: &str = "control";
-/// Name of the row of torques that the controller finds itself.
 pub const TORQUES_IN_CONTACT: &str = "R^2 of torques in contact";
-/// Name of the row of feedback.
 pub const AFTER_A_PUSH: &str = "deviation after a push";
 const ONE_STAGE: &str = "error one stage ahead as a share of the baseline's";
 const CONSTANT_VELOCITY: &str = "constant velocity";
 const NO_DYNAMICS: &str = "no dynamics";
 
-/// The side of a threshold on which a value passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Bound {
     #[serde(rename = "at most")]
@@ -64,16 +57,13 @@ pub struct VerdictRow {
     #[serde(rename = "use")]
     pub of: String,
     pub unit: &'static str,
-    /// The model's figure, that of the recording on which it is worst; infinite for a rollout that diverges, none where
-    /// recordings do not show it.
+    /// Of the recording on which it is worst; infinite for a rollout that diverges, none if not measured.
     pub value: Option<f64>,
     pub baseline: Option<f64>,
     pub baseline_name: &'static str,
     pub threshold: f64,
     pub bound: Bound,
-    /// Whether it passes; none without a value.
     pub passed: Option<bool>,
-    /// Whether the verdict depends on the row.
     pub counts: bool,
 }
 
@@ -99,13 +89,6 @@ impl VerdictRow {
             bound,
             passed: value.map(passes),
             counts: true,
-        }
-    }
-
-    fn uncounted(self) -> Self {
-        Self {
-            counts: false,
-            ..self
         }
     }
 
@@ -161,7 +144,6 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Whether predictions of body x or z fail.
     pub fn fails_predictions(&self) -> bool {
         let others = [TORQUES, CONTROL];
         (self.failed.iter()).any(|of| !others.contains(&of.as_str()))
@@ -219,7 +201,6 @@ pub fn verdict_by_default(
     }
 }
 
-/// Rollouts compared with a constant velocity: body x and z count, pitch and legs do not.
 fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> {
     let [whole, restarted] = &assessment.constant_velocity;
     let shares = [(NO_BETTER, SHORT_SHARE), (WHOLE_SHARE, f64::INFINITY)];
@@ -237,7 +218,8 @@ fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> 
                 0 => Some(value).filter(|_| x.hypot(z) > STILL_M),
                 _ => Some(f64::INFINITY),
             };
-            let name = format!("error of {name} over {}", over(of));
+            let the = if of == WHOLE { "the " } else { "" };
+            let name = format!("error of {name} over {the}{of}");
             let against = (CONSTANT_VELOCITY, Some(baseline));
             let bound = (Bound::AtMost, limit(baseline));
             Some(VerdictRow::new((of, &name, unit), value, against, bound))
@@ -252,29 +234,20 @@ fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> 
             row("body.pitch", &["body.pitch"], "rad", &same),
             row("the legs", &joints, "rad", &same),
         ];
-        rows.extend(others.into_iter().flatten().map(VerdictRow::uncounted));
+        rows.extend((others.into_iter().flatten()).map(|row| VerdictRow {
+            counts: false,
+            ..row
+        }));
     }
     rows
 }
 
-/// `the whole motion`, `0.1 s`.
-fn over(of: &str) -> String {
-    match of {
-        WHOLE => format!("the {of}"),
-        short => short.to_owned(),
-    }
-}
-
-/// Root mean square over these coordinates together; none if a model or recording has one of them not.
 fn joint_rms(assessment: &Assessment<'_>, sums: &CoordinateSums, names: &[&str]) -> Option<f64> {
-    let squares = names
-        .iter()
-        .map(|name| Some(assessment.fit(sums, name)?.rms.powi(2)));
+    let squares = (names.iter()).map(|name| Some(assessment.fit(sums, name)?.rms.powi(2)));
     let total: f64 = squares.collect::<Option<Vec<_>>>()?.iter().sum();
     Some((total / names.len() as f64).sqrt())
 }
 
-/// Of each row of [`control_rows`] that of the recording along which it is worst.
 fn worst_of(control: &[&ControlMetrics]) -> Vec<VerdictRow> {
     let mut worst: Vec<VerdictRow> = Vec::new();
     for rows in control.iter().map(|metrics| control_rows(metrics)) {
@@ -288,8 +261,7 @@ fn worst_of(control: &[&ControlMetrics]) -> Vec<VerdictRow> {
     worst
 }
 
-/// Where predictions one stage ahead fail, or those between restarts, what passes of the control is not due to the
-/// dynamics, or due to errors that cancel: it counts as not measured.
+/// What passes of the control while predictions fail is not due to the dynamics: it counts as not measured.
 fn without_predictions(rows: &mut [VerdictRow], fails_soon: bool) {
     let mut one_stage = rows.iter().filter(|row| row.name == ONE_STAGE);
     if fails_soon || one_stage.any(VerdictRow::is_failed) {
@@ -310,7 +282,7 @@ fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
     };
     let (own, other) = (metrics.torque_r2, blind.torque_r2);
     let contact = torque(TORQUES_IN_CONTACT, own.contact, other.contact);
-    let flight = torque("R^2 of torques in flight", own.flight, other.flight);
+    let mut flight = torque("R^2 of torques in flight", own.flight, other.flight);
     let stage = |name, other: &Option<_>| {
         let share = (metrics.prediction_rms.as_ref())
             .zip(other.as_ref())
@@ -338,10 +310,10 @@ fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
         ("", None),
         (Bound::AtMost, UNPLANNED_SHARE),
     );
-    [contact, flight.uncounted(), stage, push, unplanned]
+    flight.counts = false;
+    [contact, flight, stage, push, unplanned]
 }
 
-/// The rows that fail along a recording, in words.
 pub(super) fn failure(metrics: &ControlMetrics) -> Option<String> {
     let rows = control_rows(metrics);
     let failed = rows.iter().filter(|row| row.is_failed());
@@ -349,19 +321,15 @@ pub(super) fn failure(metrics: &ControlMetrics) -> Option<String> {
     (!words.is_empty()).then(|| words.join("; "))
 }
 
-/// The directions in which inputs act, in the phase with feet on the ground that has fewest.
 fn rank_row(model: &ReducedModel, assessment: &Assessment<'_>) -> Option<VerdictRow> {
     let phases = model.phases().iter().zip(&assessment.linearised);
     let on_ground = phases.filter(|(phase, _)| !phase.feet.matches([false; 4]));
     let ranks = on_ground.filter_map(|(_, linear)| linear.as_ref());
     let least = ranks.map(LinearisedPhase::input_effective_rank).min()?;
     let d = model.latent_dim();
+    let name = "latent directions in which inputs act on the ground";
     Some(VerdictRow::new(
-        (
-            CONTROL,
-            "latent directions in which inputs act on the ground",
-            "",
-        ),
+        (CONTROL, name, ""),
         Some(least as f64),
         (NO_DYNAMICS, Some(d as f64)),
         (Bound::AtLeast, LEAST_RANK.min(d) as f64),

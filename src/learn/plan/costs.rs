@@ -15,8 +15,7 @@ const TIME_UNIT_S: f64 = 0.01;
 /// The first latent coordinate that counts as posture: the two before it carry the body.
 const FIRST_OF_POSTURE: usize = 2;
 
-/// Adds the cost about an iterate; half the sum of squares each, so that weights are as documented up to a common
-/// factor.
+/// Half the sum of weighted squares.
 pub(crate) fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
     for (expression, weight) in squares(task, y) {
         builder.square(&expression, weight);
@@ -96,7 +95,6 @@ fn add_feet(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)
     }
 }
 
-/// How far a foot is from where it is in the prior, along the floor and above it, m.
 pub(crate) fn moved_foot(
     task: &Task<'_>,
     y: &[f64],
@@ -115,7 +113,6 @@ pub(crate) fn moved_foot(
     })
 }
 
-/// A foot's place along the floor and above it (m), and the derivatives by `z` (one row each).
 struct FootPlace {
     at: [f64; 2],
     by_z: DMatrix<f64>,

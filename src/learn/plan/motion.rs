@@ -14,20 +14,15 @@ use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 const SOURCE: &str = "plan";
 
-/// How close a motion comes to its bounds, over all its samples.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Margins {
-    /// Largest torque, as a share of its limit.
     pub torque_share: f64,
     /// Farthest that a joint is outside its limits, rad; negative inside.
     pub beyond_joint_limit_rad: f64,
-    /// Farthest that the lifted force is outside the friction cone, N; negative inside.
     pub beyond_friction_n: f64,
-    /// Farthest that a foot on the ground moves beyond what it does in the prior, along and above the floor, at the
-    /// nodes, m.
+    /// At the nodes, beyond what it does in the prior, along and above the floor, m.
     pub foot_slip_m: [f64; 2],
-    /// Farthest that a foot on the ground is from where it came down, along the floor, and below its height at the
-    /// start, m.
+    /// Of a foot on the ground from where it came down, along the floor, and below its height at the start, m.
     pub foot_drift_m: [f64; 2],
 }
 
@@ -67,7 +62,6 @@ pub fn motion(
     Ok((motion, margins))
 }
 
-/// Values and acceleration at a time since the start of a part of this duration.
 fn at(
     task: &Task<'_>,
     y: &[f64],
@@ -118,8 +112,6 @@ fn margins(task: &Task<'_>, y: &[f64], (motion, input): (&Segment, &DMatrix<f64>
     margins
 }
 
-/// Farthest that a foot on the ground moves at a node, beyond what it does in the prior: along the floor from the start
-/// or from touch-down, above it.
 fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let mut farthest = [0.0_f64; 2];
     for (part, of) in task.seed.parts.iter().enumerate() {
@@ -135,8 +127,6 @@ fn foot_slip(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     farthest
 }
 
-/// Farthest that a foot on the ground is, at any sample, from its place at the first sample of that contact, along the
-/// floor, and below its height at the first of all samples.
 fn foot_drift(robot: &Robot, motion: &Segment) -> [f64; 2] {
     let place = |leg: Leg, sample: usize| robot.foot_in_world(leg, &motion.state(sample));
     let mut farthest = [0.0_f64; 2];

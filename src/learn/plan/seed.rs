@@ -10,9 +10,8 @@ use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, STATE_
 
 pub(crate) const PITCH: usize = 16;
 
-/// Difference of an angle of the start to its decoded one that is told, rad.
 const LOST_ANGLE_RAD: f64 = 0.15;
-/// Difference of a place of the body at the start to its decoded one that is told, m.
+/// Differences of the start to its decoded one from which on they are reported.
 const LOST_PLACE_M: f64 = 0.03;
 
 pub(crate) struct Seed<'a> {
@@ -20,9 +19,7 @@ pub(crate) struct Seed<'a> {
     pub rule: InputRule,
     pub latent_dim: usize,
     pub goal: Goal,
-    /// Latent position and velocity at the start.
     pub start: [DVector<f64>; 2],
-    /// What of a given start the latent coordinates do not hold, in words.
     pub start_lost: Vec<String>,
     /// `x = decode z + decode_bias`, SI units.
     pub decode: DMatrix<f64>,
@@ -41,9 +38,7 @@ pub(crate) struct SeedPart<'a> {
     pub z: Vec<DVector<f64>>,
     pub dz: Vec<DVector<f64>>,
     pub u_lat: Vec<DVector<f64>>,
-    /// Mean acceleration over each interval, of which the model explains the changes alone.
     pub ddz: Vec<DVector<f64>>,
-    /// What a position moves beyond the mean velocity of its ends, per second, over each interval.
     pub drift: Vec<DVector<f64>>,
     /// `d ddz / d (zeta, nu, mu)` at each node, in the program's variables, `latent_dim x 3 latent_dim`.
     pub slope: Vec<DMatrix<f64>>,
@@ -182,8 +177,6 @@ fn seed_part<'a>(
     }
 }
 
-/// From the program's variables of a node to `(z, dz, u_lat)`: standard deviations, and the root of the input's
-/// covariance.
 fn scales(prior: &JumpPrior, root: &DMatrix<f64>, d: usize) -> DMatrix<f64> {
     let mut scales = DMatrix::zeros(3 * d, 3 * d);
     for i in 0..2 * d {

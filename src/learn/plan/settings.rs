@@ -30,7 +30,6 @@ macro_rules! settings {
         }
 
         impl PlanSettings {
-            /// Complains about the first number that no plan can be made with.
             pub fn check(&self) -> Result<(), String> {
                 $(check(stringify!($field), self.$field.numbers(), $most)?;)*
                 if self.foot_m.contains(&0.0) || self.input == 0.0 || self.programs == 0 {
@@ -139,7 +138,6 @@ impl Goal {
         })
     }
 
-    /// The same jump from another state and velocity, 18 each, SI units.
     #[must_use]
     pub fn from_start(mut self, x: DVector<f64>, dx: DVector<f64>) -> Self {
         self.start = Some((x, dx));
@@ -150,8 +148,7 @@ impl Goal {
         self.goal_m
     }
 
-    /// Refuses goals that are out of all proportion to the training jumps, so that no time is spent on them: farther
-    /// from their range than `reach` times its width.
+    /// Refuses goals that are farther from the training jumps' range than `reach` times its width.
     pub(super) fn check_within(
         &self,
         prior: &JumpPrior,
@@ -184,8 +181,7 @@ impl Goal {
         Ok(())
     }
 
-    /// The goal inside the ranges of the training jumps less a `share` of them at either end: the goal of the
-    /// trajectory that the plan starts from. A regression over few jumps is not to be trusted at its ends.
+    /// The goal inside the ranges less a `share` at either end: a regression over few jumps is not to be trusted at its ends.
     pub(super) fn clipped(
         &self,
         prior: &JumpPrior,

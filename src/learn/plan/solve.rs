@@ -17,13 +17,10 @@ use crate::recording::mismatch::Balance;
 use crate::recording::{Recording, Segment};
 use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2};
 
-/// Largest violation of an equation that counts as none, in standard deviations.
 const CONVERGED_DEFECT: f64 = 1e-4;
-/// Largest change of a variable from one program to the next that counts as none.
 const CONVERGED_STEP: f64 = 2e-2;
 /// First programs after each of which the node of the apex is placed anew; then it stays, so that they converge.
 const APEX_PROGRAMS: usize = 3;
-/// Largest violation of an equation with which a plan may be used at all.
 const USABLE_DEFECT: f64 = 1e-3;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -36,20 +33,14 @@ pub struct PlannedPart {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     pub goal_m: [f64; 2],
-    /// What the planned motion reaches, m.
     pub reached_m: [f64; 2],
-    /// The motion, sampled as the training's recordings.
     pub motion: Segment,
     pub parts: Vec<PlannedPart>,
-    /// The cost: weighted squares of the deviations from the prior.
     pub cost: f64,
-    /// Largest Mahalanobis deviation of the latent input from the prior's, per coordinate, in standard deviations of
-    /// the training's inputs.
+    /// Largest Mahalanobis deviation of the latent input from the prior's, per coordinate.
     pub input_deviation: f64,
-    /// Expected errors of distance and rise, one standard deviation, m: what the thrusts of jumps that the deviations
-    /// were not fitted to did beside them.
+    /// Expected errors of distance and rise, one standard deviation, m.
     pub error_m: [f64; 2],
-    /// How close the motion comes to its bounds, between the nodes too.
     pub margins: Margins,
     pub verdict: Verdict,
     pub programs: usize,
@@ -143,7 +134,6 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
     })
 }
 
-/// Largest `|mu| / sqrt(latent_dim)` of a node.
 fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
     let d = task.seed.latent_dim;
     let nodes = y[..task.duration(0)].chunks(3 * d);
@@ -154,7 +144,6 @@ fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
     deviations.fold(0.0, f64::max)
 }
 
-/// How far a goal is beyond the training jumps, in widths of their range; zero inside.
 fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
     std::array::from_fn(|i| {
         let range = &seed.prior.ranges()[i];

@@ -30,12 +30,10 @@ use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2, JOINT_DIM};
 
 /// Change of a duration that the variable `tau` counts as one.
 pub(crate) const DURATION_SHARE: f64 = 0.15;
-/// Bounds on `tau`, and on its change from one program to the next.
 const DURATION_BOUND: f64 = 3.0;
 const DURATION_STEP: f64 = 2.0;
 /// Cost per unit of a bound that is not kept: high enough that only bounds that cannot be kept are not.
 const SLACK_COST: f64 = 2000.0;
-/// Force that rows of the friction cone are divided by, N.
 const FORCE_UNIT_N: f64 = 100.0;
 /// Torques below this share of their limit, joints farther than this from theirs (rad), get no row.
 const FAR_TORQUE: f64 = 0.5;
@@ -45,7 +43,6 @@ const FAR_JOINT_RAD: f64 = 0.3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bound {
     Torque,
-    /// Joint angles, rad.
     Joint,
     /// The friction cone, in 100 N.
     Friction,
@@ -65,14 +62,11 @@ pub(crate) struct NodeValues {
 pub(crate) struct Task<'a> {
     pub seed: &'a Seed<'a>,
     pub settings: &'a PlanSettings,
-    /// First variable of each part's nodes, and of the durations.
     first: Vec<usize>,
-    /// Node of the flight where the apex is asked for.
     pub apex_node: usize,
 }
 
 impl<'a> Task<'a> {
-    /// The program of a seed, its apex where the prior has it.
     pub(crate) fn new(seed: &'a Seed<'a>, settings: &'a PlanSettings) -> Self {
         let mut first = vec![0];
         for part in &seed.parts {
@@ -88,7 +82,6 @@ impl<'a> Task<'a> {
         task
     }
 
-    /// First of the `3 latent_dim` variables of a node.
     pub(crate) fn node(&self, part: usize, node: usize) -> usize {
         self.first[part] + 3 * self.seed.latent_dim * node
     }
@@ -123,7 +116,6 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// Mean acceleration over an interval as an expression.
     pub(crate) fn acceleration(&self, part: usize, interval: usize, i: usize) -> Affine {
         let of = &self.seed.parts[part];
         let mut sum = Affine::of(of.ddz[interval][i]);
@@ -146,7 +138,6 @@ impl<'a> Task<'a> {
         Affine::of(prior).plus(variable, self.seed.prior.state_std[i])
     }
 
-    /// A coordinate of the decoded state at a node.
     pub(crate) fn x(&self, part: usize, node: usize, coordinate: usize) -> Affine {
         let factors = self.seed.decode.row(coordinate);
         let terms = (factors.iter().enumerate()).map(|(i, f)| self.latent(part, node, i) * *f);
@@ -159,7 +150,6 @@ impl<'a> Task<'a> {
         terms.fold(Affine::default(), Add::add)
     }
 
-    /// An entry of the lifted input at a node, SI units.
     pub(crate) fn input(&self, part: usize, node: usize, entry: usize) -> Affine {
         let of = &self.seed.parts[part];
         let row = self.seed.lift.row(entry);
@@ -171,7 +161,6 @@ impl<'a> Task<'a> {
             .fold(prior, |sum, (mu, factor)| sum.plus(mu, *factor))
     }
 
-    /// What the joints take at a node of an iterate, N m.
     pub(crate) fn losses(&self, part: usize, node: usize, y: &[f64]) -> [f64; JOINT_DIM] {
         let d = self.seed.latent_dim;
         let of = &self.seed.parts[part];
@@ -223,8 +212,6 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// The difference that an equation demands to be zero with a step of `step` s, and the rate that the step
-    /// multiplies; `i` below `latent_dim` is a position, above a velocity.
     fn equation(&self, part: usize, interval: usize, i: usize, step: f64) -> (Affine, Affine) {
         let d = self.seed.latent_dim;
         let [here, next] = [interval, interval + 1];
@@ -240,7 +227,6 @@ impl<'a> Task<'a> {
         (change - rate.clone() * step, rate)
     }
 
-    /// Largest violation of an equation at a point, in standard deviations of its coordinate.
     pub(crate) fn defect(&self, y: &[f64]) -> f64 {
         let mut worst = 0.0_f64;
         for (part, of) in self.seed.parts.iter().enumerate() {
@@ -301,12 +287,10 @@ impl<'a> Task<'a> {
         (part, self.seed.parts[part].intervals())
     }
 
-    /// A coordinate at the start, as the decoder has it.
     pub(crate) fn start_x(&self, coordinate: usize) -> f64 {
         self.seed.decoded(&self.seed.start[0])[coordinate]
     }
 
-    /// Torques, joints, friction and heights of a part, as far as they are near their bounds.
     fn bounds(&self, part: usize, y: &[f64], builder: &mut Builder) {
         let of = &self.seed.parts[part];
         let robot = self.seed.rule.robot();
@@ -348,7 +332,6 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// Takes the apex at the node of the flight where the body is highest at an iterate.
     pub(crate) fn place_apex(&mut self, y: &[f64]) {
         let flight = self.flight();
         let height = |node: usize| self.x(flight, node, BODY_Z).at(y);
@@ -392,7 +375,6 @@ fn within(builder: &mut Builder, value: &Affine, range: [f64; 2], slack: Option<
     }
 }
 
-/// The row `sign value <= bound`, with a violation if there is a variable for it.
 fn side(builder: &mut Builder, value: &Affine, (sign, bound): (f64, f64), slack: Option<usize>) {
     let row = Affine::of(-bound) + value.clone() * sign;
     builder.at_most(match slack {

@@ -4,22 +4,15 @@ use super::motion::Margins;
 use super::settings::PlanSettings;
 use super::transcribe::Bound;
 
-/// Share of the weight that the torques of a plan have to carry.
 const LEAST_WEIGHT_SHARE: f64 = 0.5;
-/// Violation of a bound at the nodes that counts as none, in its unit.
 const NO_SLACK: f64 = 2e-3;
-/// Farthest outside a joint's limit between nodes, rad.
 const NO_JOINT: f64 = 2e-3;
-/// Force outside the friction cone between nodes beyond that allowed at them, N.
 const NO_FRICTION_N: f64 = 2.0;
-/// Farthest that standing feet may be from where they came down, along the floor, and below it, m: twice what plans and
-/// recordings with rolling, point-like feet show.
+/// Twice what plans and recordings with rolling, point-like feet show.
 const FOOT_DRIFT_M: [f64; 2] = [0.04, 0.02];
 
-/// What a plan is worth.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
-    /// Within what the recordings carry.
     Trusted,
     /// Beyond the recordings, with the reasons: it may miss its goal.
     Extrapolates(Vec<String>),
@@ -51,9 +44,7 @@ pub(crate) struct Findings<'a> {
     pub margins: &'a Margins,
     /// Widths of the recorded ranges that distance and apex are beyond them.
     pub outside: [f64; 2],
-    /// Impulse of the feet over what the robot's weight and change of velocity need.
     pub weight_share: Option<f64>,
-    /// What the latent coordinates do not hold of the start, in words.
     pub start_lost: Vec<String>,
 }
 
@@ -68,7 +59,6 @@ pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
     }
 }
 
-/// The texts whose condition holds.
 fn reasons(rules: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
     rules.into_iter().flatten().collect()
 }

@@ -27,7 +27,6 @@ pub(super) fn object<'de, D: Deserializer<'de>>(source: D) -> Result<Map<String,
     }
 }
 
-/// A value within the number of values that are left.
 struct Bounded<'a>(&'a Cell<usize>);
 
 impl<'de> DeserializeSeed<'de> for Bounded<'_> {

@@ -21,7 +21,6 @@ use crate::model::{
 use crate::robot::{Actuators, Robot, WrenchFrame};
 use crate::robot_file::{self, RobotEntry};
 
-/// Name and version of the format of a model without the keys of [`SCHEMA_2`].
 pub(crate) const SCHEMA: &str = "romc-model/1";
 
 /// The format with `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a `robot` that is
@@ -102,7 +101,6 @@ impl Manifest {
         manifest
     }
 
-    /// The checked model; `file` names it in errors.
     pub(super) fn model(self, file: &str) -> Result<ReducedModel, ArtifactError> {
         let refused = |source: ModelError| ArtifactError::unusable(file, source);
         let incomplete = |part, needs| Err(refused(ModelError::Incomplete { part, needs }));
@@ -132,7 +130,6 @@ impl Manifest {
         builder.build().map_err(refused)
     }
 
-    /// A key that it has and the first schema does not know.
     pub(super) fn later_key(&self) -> Option<&'static str> {
         let mut statistics = self.input_statistics.iter();
         let has_given_state = statistics.any(|(_, entry)| entry.given_state.is_some());
@@ -201,7 +198,6 @@ pub(super) struct SchemaProbe {
     pub schema: Option<Value>,
 }
 
-/// A value that may be left out, but not be `null`.
 fn present<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     deserializer: D,
 ) -> Result<Option<T>, D::Error> {
@@ -264,7 +260,7 @@ impl<'de> Deserialize<'de> for LibraryChoice {
     }
 }
 
-/// A JSON object as pairs in the file's order, in which no key comes twice.
+/// In the file's order, no key twice.
 mod by_phase {
     use super::*;
 

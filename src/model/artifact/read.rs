@@ -25,7 +25,6 @@ pub fn describe(error: &dyn Error) -> String {
     text
 }
 
-/// Largest model file; all of the largest model fits.
 pub const MAX_FILE_BYTES: u64 = Format::Model.most_bytes();
 
 pub fn is_standard_input(path: &Path) -> bool {

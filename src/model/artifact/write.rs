@@ -21,7 +21,6 @@ pub fn to_text(model: &ReducedModel) -> String {
     print(&value)
 }
 
-/// Checks whether [`write()`] would refuse.
 pub fn check_place(
     path: &Path,
     model: &ReducedModel,
@@ -42,7 +41,6 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
     }
 }
 
-/// Writes a model file: into a new file beside `path`, which is then moved there.
 pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
     let text = to_text(model);
     let written = write_whole(path, overwrite, |out| out.write_all(text.as_bytes()));
@@ -58,15 +56,11 @@ pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<
     }
 }
 
-/// SHA-256 of a model in the form in which [`write()`] writes it.
-///
-/// The layout of the file that was read does not matter. For a file that romc wrote the digest is what `sha256sum`
-/// prints.
+/// SHA-256 of the file that [`write()`] would write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Digest([u8; 32]);
 
 impl Digest {
-    /// The first 16 hexadecimal digits, for headers of generated files.
     pub fn short(&self) -> String {
         self.to_string()[..16].to_owned()
     }
@@ -83,7 +77,6 @@ pub fn digest(model: &ReducedModel) -> Digest {
 }
 
 const INDENT: &str = "  ";
-/// Lists of words and small objects keep to this width, without indentation.
 const LINE_WIDTH: usize = 100;
 
 pub(super) fn print(value: &Value) -> String {
@@ -133,7 +126,6 @@ fn push(out: &mut String, value: &Value, depth: Option<usize>) {
     }
 }
 
-/// Rows of numbers stay on one line however long; other lists and objects if they are short.
 fn is_on_one_line(value: &Value) -> bool {
     let is_short = || {
         let mut text = String::new();
@@ -152,7 +144,6 @@ fn is_on_one_line(value: &Value) -> bool {
     }
 }
 
-/// Words with commas between them, as many on a line as fit; no comma at the end of a line.
 fn fill_lines(words: &[Value]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for text in words.iter().map(Value::to_string) {

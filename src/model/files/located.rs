@@ -10,9 +10,7 @@ pub enum Place {
     Whole,
     Row(usize),
     Cell(usize, Box<str>),
-    /// A character of a text: line and column, from 1.
     Character(usize, usize),
-    /// A named entry with what it is used for, such as `` `W_e`[3, 2] as encoder.weight ``.
     Entry(Box<str>),
     /// A path of keys in a JSON file, such as `encoder.weights[3][2]`, with line and column.
     Key(Box<str>, usize, usize),
@@ -21,7 +19,6 @@ pub enum Place {
 }
 
 impl Place {
-    /// The character of a text that begins at a byte.
     pub fn of_byte(text: &str, byte: usize) -> Place {
         let before = text.get(..byte).unwrap_or(text);
         let line = before.matches('\n').count() + 1;
@@ -29,7 +26,6 @@ impl Place {
         Place::Character(line, last.chars().count() + 1)
     }
 
-    /// The row of a table that the place is in.
     pub fn row(&self) -> Option<usize> {
         match self {
             Place::Row(row) | Place::Cell(row, _) => Some(*row),
@@ -56,26 +52,18 @@ impl From<(usize, usize)> for Place {
     }
 }
 
-/// What is wrong at a place; `C` says why the contents of a file cannot be used as a whole.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault<C: Error + 'static = Infallible> {
-    /// The file system refused an action.
     #[error("cannot {action}")]
     Io {
         action: &'static str,
         source: io::Error,
     },
-    /// Something else is there than what is needed, or nothing.
     #[error("found {found}, expected {expected}")]
-    Unexpected {
-        found: Box<str>,
-        /// What could be, or the option that settles it.
-        expected: Box<str>,
-    },
+    Unexpected { found: Box<str>, expected: Box<str> },
     /// A text that breaks a grammar, in the words of its parser, or a fault without alternative.
     #[error("{0}")]
     Text(Box<str>),
-    /// The parts do not make a model; tensors are named as in the model file.
     #[error("not a usable model")]
     Unusable(#[source] Box<C>),
 }

@@ -15,22 +15,18 @@ pub const MAGIC_BYTES: usize = 512;
 
 pub const MCAP: &[u8] = b"\x89MCAP0\r\n";
 
-/// Bytes at either end of a file in which names are looked for.
 const SEARCHED: usize = 1 << 16;
 
-/// Arrays by name become columns; those of two axes one for each of the second.
+/// Arrays become columns; those of two axes one for each of the second.
 const TO_COLUMNS: &str = "; c = {k: np.squeeze(a[k]) for k in a if k[:2] != '__'}; \
      pd.DataFrame({k if v.ndim < 2 else f'{k}_{i}': v.reshape(len(v), -1)[:, i] for k, v in c.items() if v.ndim \
      for i in range(v.size // len(v))}).to_csv(sys.argv[2], index=False)";
 
-/// Another format: its name, and what to type to convert it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OtherFormat {
-    /// What it is, with its article.
     pub what: String,
     /// The lines; empty for arrays that `romc import` reads as they are.
     pub remedy: String,
-    /// Whether the lines make the file that was meant rather than arrays for `romc import`.
     pub(crate) is_packed: bool,
 }
 
@@ -57,7 +53,6 @@ struct Row {
     table: Option<String>,
 }
 
-/// Formats without fixed bytes.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Test {
@@ -100,13 +95,11 @@ pub(crate) fn arrays(path: &Path, bytes: &[u8]) -> Option<OtherFormat> {
     arrays_by_content(path, bytes).or_else(|| arrays_by_ending(path))
 }
 
-/// The format of a file that holds a model's arrays, by its content.
 pub fn arrays_by_content(path: &Path, bytes: &[u8]) -> Option<OtherFormat> {
     let rows = table().iter().filter(|row| row.holds(bytes));
     rows.filter_map(|row| row.of_arrays(path)).next()
 }
 
-/// The same by its extension.
 pub fn arrays_by_ending(path: &Path) -> Option<OtherFormat> {
     let ending = path.extension()?.to_string_lossy().to_lowercase();
     let row = (table().iter()).find(|row| row.endings.contains(&ending))?;
@@ -187,7 +180,6 @@ fn has(bytes: &[u8], text: &[u8]) -> bool {
     windows.any(|window| window == text)
 }
 
-/// Lines with the file's names in them, each as `spelled`.
 fn filled(lines: &str, path: &Path, spelled: impl Fn(&Path) -> String) -> String {
     let folder = path
         .parent()
@@ -202,7 +194,6 @@ fn in_shell(line: &str, path: &Path) -> String {
     filled(line, path, shell_path)
 }
 
-/// Names stand in quotes already.
 fn in_python(lines: &str, path: &Path) -> String {
     let escaped = |path: &Path| {
         path.display()

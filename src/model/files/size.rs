@@ -16,7 +16,6 @@ pub enum Format {
     Equations,
     Tensors,
     Recording,
-    /// One chunk of an MCAP log, packed or unpacked.
     Chunk,
 }
 
@@ -86,7 +85,6 @@ impl<R: Read> Read for Capped<R> {
     }
 }
 
-/// The bytes of a file, or of a device or pipe, up to the most of its format.
 pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let file = File::open(path)?;
@@ -94,7 +92,6 @@ pub fn read_capped(path: &Path, format: Format) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// [`read_capped`] of a text.
 pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     let bytes = read_capped(path, format)?;
     let invalid = |text: String| io::Error::new(io::ErrorKind::InvalidData, text);
@@ -106,8 +103,7 @@ pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))
 }
 
-/// Most tables and dotted keys of a file, by their signs: a parsed table takes several hundred times the two bytes that
-/// it has in a file.
+/// By their signs: a parsed table takes several hundred times its two bytes in a file.
 const MOST_TABLES: usize = 20_000;
 
 pub fn read_toml(path: &Path) -> io::Result<String> {

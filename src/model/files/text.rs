@@ -2,9 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Characters beyond control characters that act on the text around them or are not seen: separators of lines,
-/// directions of writing, joiners and spaces without width, tags (Unicode's categories Zl, Zp and what is invisible of
-/// Cf).
+/// Unicode's categories Zl, Zp and what is invisible of Cf.
 const INVISIBLE: [(char, char); 10] = [
     ('\u{ad}', '\u{ad}'),
     ('\u{61c}', '\u{61c}'),
@@ -18,8 +16,7 @@ const INVISIBLE: [(char, char); 10] = [
     ('\u{e0000}', '\u{e007f}'),
 ];
 
-/// Whether a character acts on the text around it instead of being shown: no name has one, and texts for terminals and
-/// pages have it written out.
+/// Whether a character acts on the text around it instead of being shown.
 pub fn is_invisible(c: char) -> bool {
     c.is_control() || (INVISIBLE.iter()).any(|(first, last)| (*first..=*last).contains(&c))
 }

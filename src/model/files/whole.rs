@@ -9,7 +9,6 @@ use std::hash::{BuildHasher as _, Hasher as _};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// A generated file, not yet on disk.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EmittedFile {
     /// Path relative to the output folder, with `/` between its parts.
@@ -26,7 +25,6 @@ impl EmittedFile {
     }
 }
 
-/// Whether a file that is there already may be replaced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overwrite {
     Refuse,
@@ -79,16 +77,13 @@ pub fn write_whole(
     part.put(overwrite)
 }
 
-/// How names of parts end, after a random number in hexadecimal digits.
 const ENDING: &str = ".part";
 
 const DIGITS: usize = 16;
 
 const MAX_TRIED: usize = 16;
 
-/// A new file with a random, hidden name in the folder of its place; removed in the end unless it was moved there.
-///
-/// A lock shows that its process lives; parts without one are what ended processes have left.
+/// A new hidden file, removed unless it is moved to its place; its lock shows that the process lives.
 #[derive(Debug)]
 pub(super) struct Part {
     pub file: File,
@@ -98,7 +93,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Beside `place`. A link or file of that name that somebody else has put there is never opened.
+    /// A link or file of that name is never opened.
     pub(crate) fn beside(place: &Path) -> io::Result<Self> {
         let name = place.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
         let mut last = None;
@@ -130,8 +125,7 @@ impl Part {
         Err(last.unwrap_or_else(|| io::ErrorKind::AlreadyExists.into()))
     }
 
-    /// Moves the file to its place in one step: what is there is replaced, or refused with
-    /// [`io::ErrorKind::AlreadyExists`]. Of several processes that refuse, one alone succeeds.
+    /// In one step. Of several processes that refuse, one alone succeeds.
     pub(crate) fn put(&mut self, overwrite: Overwrite) -> io::Result<()> {
         if overwrite == Overwrite::Refuse {
             match fs::hard_link(&self.path, &self.place) {
@@ -160,7 +154,6 @@ impl Drop for Part {
     }
 }
 
-/// Removes the parts in a folder whose processes have ended. What cannot be read or removed stays.
 pub(super) fn remove_left_in(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());

@@ -12,7 +12,6 @@ use std::str::FromStr;
 
 pub use table::of_training;
 
-/// Numbers that a setting may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Name of the setting: that of its flag without dashes.
@@ -29,11 +28,9 @@ enum Kind {
     Above,
 }
 
-/// A number outside the range of its setting.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name} is {found}, expected {expected}")]
 pub struct OutOfRange {
-    /// Name of the setting, that of its flag without dashes.
     pub name: &'static str,
     pub found: String,
     pub expected: String,
@@ -48,7 +45,6 @@ impl Range {
         Self::new(name, Kind::Real, least, most)
     }
 
-    /// Numbers above `least`, up to `most`.
     pub const fn above(name: &'static str, least: f64, most: f64) -> Self {
         Self::new(name, Kind::Above, least, most)
     }
@@ -84,7 +80,6 @@ impl Range {
         (self.contains(value as f64).then_some(value)).ok_or_else(|| self.refusal(value))
     }
 
-    /// The number that a text spells.
     pub fn parse<T: FromStr + Copy + fmt::Display>(&self, text: &str) -> Result<T, String> {
         let in_range = |number: &T| {
             // A whole number beyond 2^53 is far beyond every range, so that its rounding does not matter.
@@ -114,7 +109,6 @@ impl Range {
     }
 }
 
-/// Decimals, or powers of ten where these are shorter.
 fn short(value: f64) -> String {
     let (plain, power) = (format!("{value}"), format!("{value:e}"));
     match plain.len() > power.len() {

@@ -13,7 +13,6 @@ macro_rules! ranges {
 
 ranges! {
     LATENT_DIM = Range::whole("latent-dim", 1, 18);
-    /// Latent coordinates of a model from elsewhere.
     IMPORTED_LATENT_DIM = Range::whole("latent-dim", 1, 64);
     SEEDS = Range::whole("seeds", 1, 10_000);
     EPOCHS = Range::whole("epochs", 1, 1_000_000);
@@ -24,12 +23,10 @@ ranges! {
     REFINEMENTS = Range::whole("refinements", 0, 1000);
     /// Growth rate of deviations, 1/s.
     GROWTH = Range::real("growth", 1e-2, 1e6);
-    /// Samples per step of the window of predictions.
     BPTT_STRIDE = Range::whole("bptt-stride", 1, 1000);
     BPTT_DECAY = Range::above("bptt-decay", 0.0, 1.0);
     SLACK = Range::real("slack", 0.0, 1e3);
     DEGREE = Range::whole("degree", 0, 8);
-    /// Samples of the mean over accelerations.
     MOVING_AVERAGE = Range::whole("moving-average", 1, 10_001);
     /// Standard deviation under which a coordinate is masked, rad or m.
     MASK_STD = Range::real("mask-std", 0.0, 1e3);
@@ -38,36 +35,25 @@ ranges! {
     /// Scaled units of the state in one rad or m. Squares of far smaller ones underflow, and rollouts with far larger
     /// ones would count as diverged.
     STATE_SCALING = Range::real("state-scaling", 1e-6, 1e4);
-    /// Scaled units of joint torques in one N m.
     TORQUE_SCALING = Range::real("torque-scaling", 1e-6, 1e4);
-    /// Scaled units of forces on the body in one N.
     FORCE_SCALING = Range::real("force-scaling", 1e-6, 1e4);
-    /// Scaled units of moments on the body in one N m.
     MOMENT_SCALING = Range::real("moment-scaling", 1e-6, 1e4);
     LAYER_WIDTH = Range::whole("layers", 1, 1024);
     LAMBDA = Range::real("lambda", 0.0, 1e6);
-    /// Stages of the controller's horizon.
     HORIZON = Range::whole("horizon", 1, 500);
-    /// Length of a stage in seconds.
     STEP = Range::real("step", 1e-4, 1.0);
     /// Largest change of a commanded torque in N m/s.
     TORQUE_RATE = Range::real("torque-rate", 1e-3, 1e9);
-    /// Time between restarts of rollouts in seconds.
     RESTART_EVERY = Range::real("restart-every", 1e-3, 1e4);
     /// Reach of a domain beyond the recordings, as a share of each variable's range.
     MARGIN = Range::real("margin", 0.0, 100.0);
-    /// Longest printed line in em.
     WIDTH = Range::real("width", 1.0, 1000.0);
     DIGITS = Range::whole("digits", 0, 40);
     SIGNIFICANT = Range::whole("significant", 1, 40);
-    /// Scaled units in one SI unit, of a model from elsewhere.
     SCALING = Range::real("scaling", 1e-9, 1e9);
     INPUT_SCALING = Range::real("input-scaling", 1e-9, 1e9);
-    /// Sampling period of training recordings in seconds.
     SAMPLE_TIME = Range::real("sample-time", 1e-6, 1.0);
-    /// Distance of the body in a planned jump, m.
     DISTANCE = Range::real("distance", -1000.0, 1000.0);
-    /// Rise of the body in a planned jump, m.
     APEX = Range::real("apex", -1000.0, 1000.0);
 }
 

@@ -89,13 +89,11 @@ impl ModelBuilder {
         provenance: Map<String, Value>;
     }
 
-    /// Appends a phase; rules are tried in the order of appending.
     pub fn phase(mut self, phase: Phase) -> Self {
         self.phases.push(phase);
         self
     }
 
-    /// Adds the statistics of the training inputs of the phase with this name (SI units).
     pub fn input_statistics(
         mut self,
         phase: impl Into<String>,
@@ -105,19 +103,16 @@ impl ModelBuilder {
         self
     }
 
-    /// Replaces the input statistics of all phases.
     pub fn all_input_statistics(mut self, statistics: Vec<(String, InputStatistics)>) -> Self {
         self.statistics = statistics;
         self
     }
 
-    /// Sets the encoder, an [`AffineMap`] or a [`StateMap`] (scaled units, `latent_dim x state_dim`).
     pub fn encoder(mut self, encoder: impl Into<StateMap>) -> Self {
         self.encoder = Some(encoder.into());
         self
     }
 
-    /// Sets the decoder, an [`AffineMap`] or a [`StateMap`] (scaled units, `state_dim x latent_dim`).
     pub fn decoder(mut self, decoder: impl Into<StateMap>) -> Self {
         self.decoder = Some(decoder.into());
         self
@@ -272,7 +267,6 @@ impl ModelBuilder {
         }
     }
 
-    /// A prior is that of a robot's jumps in the coordinates of linear maps.
     fn check_prior(&self, prior: &JumpPrior) -> Result<(), ModelError> {
         let linear = |map: &Option<StateMap>| map.as_ref().is_some_and(|m| m.as_affine().is_some());
         let needs = match () {
@@ -285,7 +279,6 @@ impl ModelBuilder {
         Err(ModelError::Incomplete { part, needs })
     }
 
-    /// Checks the statistics and puts them in the order of the phases.
     fn check_statistics(&mut self, state_dim: Option<usize>) -> Result<(), ModelError> {
         let place_of = |name: &str| self.phases.iter().position(|phase| phase.name == name);
         for (index, (name, statistics)) in self.statistics.iter().enumerate() {

@@ -8,10 +8,7 @@ use crate::robot::Robot;
 
 const MAX_TEXT_LEN: usize = 64;
 
-/// Names and units of the coordinates of a vector, in order.
-///
-/// They reach comments and tables of generated files, so [`ReducedModel`](super::ReducedModel) accepts only characters
-/// which mean nothing in C, Rust and CSV.
+/// In order; of characters that mean nothing in C, Rust and CSV, for comments and tables of generated files.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoordinateNames {
@@ -20,7 +17,6 @@ pub struct CoordinateNames {
 }
 
 impl CoordinateNames {
-    /// Those of the robots' state and input.
     pub fn of_robot() -> [Self; 2] {
         [
             (Robot::state_names(), Robot::state_units()),
@@ -36,8 +32,7 @@ impl CoordinateNames {
         self.names.len()
     }
 
-    /// Refuses other than `dim` different names, those of a robot if there is one, and `dim` units of harmless
-    /// characters.
+    /// Refuses other than `dim` different names, those of a robot if there is one, and units of harmless characters.
     pub(super) fn check(
         &self,
         signals: &str,
@@ -68,7 +63,6 @@ impl CoordinateNames {
     }
 }
 
-/// Refuses texts of other characters than letters, digits and `punctuation`, which `allowed` describes.
 fn check_texts(
     list: &str,
     texts: &[String],
@@ -95,7 +89,6 @@ pub enum ScaleFactors {
 }
 
 impl ScaleFactors {
-    /// One factor per coordinate, whichever way they are stored.
     pub fn expand(&self, dim: usize) -> DVector<f64> {
         match self {
             ScaleFactors::Uniform(factor) => DVector::from_element(dim, *factor),
@@ -119,9 +112,7 @@ impl ScaleFactors {
     }
 }
 
-/// Scale factors of state and input.
-///
-/// The paper trains on all quantities times 0.1 (its "normalisation 1/10"): factor 0.1.
+/// The paper trains on all quantities times 0.1 (its "normalisation 1/10").
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scaling {

@@ -12,7 +12,6 @@ use crate::symbolic::ParseError;
 /// Why a model was refused, or could not answer.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ModelError {
-    /// The model's or a phase's name cannot become an identifier.
     #[error("{what} {name:?} cannot be used in generated code")]
     Name {
         /// `model name` or `phases[i].name`.
@@ -21,7 +20,6 @@ pub enum ModelError {
         #[source]
         source: IdentifierError,
     },
-    /// A part has another size or value than it can have, or does not fit the others; a vector has the wrong length.
     #[error("{place}: found {found}, expected {expected}")]
     Invalid {
         /// Path in the model file, such as `` `phases[0].xi` ``.
@@ -29,7 +27,6 @@ pub enum ModelError {
         found: String,
         expected: String,
     },
-    /// A candidate term, counted from 0, is no expression over the model's variables.
     #[error("`library`[{index}]: {text:?} is not a candidate term")]
     Term {
         index: usize,
@@ -41,7 +38,6 @@ pub enum ModelError {
         "phases[{phase}].feet of {name:?}: no foot pattern selects this phase, because earlier phases take all that it names"
     )]
     UnreachablePhase { phase: usize, name: String },
-    /// A tensor holds an infinity or a NaN; row and column count from 0.
     #[error("`{tensor}`[{row}][{column}]: found {found}, expected a finite number")]
     NonFinite {
         tensor: String,
@@ -51,20 +47,17 @@ pub enum ModelError {
     },
     #[error(transparent)]
     Robot(#[from] RobotError),
-    /// A part of the file makes sense only with another.
     #[error("`{part}` needs `{needs}`, which the model does not have")]
     Incomplete {
         part: &'static str,
         needs: &'static str,
     },
-    /// The model was asked for something it does not carry; `part` is the key of the model file.
     #[error("model {model} has no `{part}`, needed for {purpose}")]
     Missing {
         model: String,
         part: &'static str,
         purpose: &'static str,
     },
-    /// `part` is `encoder` or `decoder`.
     #[error("model {model}: found a nonlinear {part}, expected a linear one, needed for {purpose}")]
     Nonlinear {
         model: String,
@@ -99,7 +92,6 @@ impl ModelError {
     }
 }
 
-/// Refuses what is found at a place unless it is as expected.
 pub(super) fn check<F: ToString>(
     is_expected: bool,
     place: &str,
@@ -112,7 +104,6 @@ pub(super) fn check<F: ToString>(
     }
 }
 
-/// Refuses a number of things outside a range.
 pub(super) fn check_count(
     place: &str,
     found: usize,
@@ -143,7 +134,6 @@ pub(super) fn check_tensor<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     check_finite(tensor, found)
 }
 
-/// Refuses the first entry, row by row, that is infinite or not a number.
 pub(super) fn check_finite<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     tensor: &str,
     values: &Matrix<f64, R, C, S>,

@@ -13,7 +13,6 @@ pub(crate) const MAX_IDENTIFIER_LEN: usize = 40;
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Identifier(String);
 
-/// Why a name cannot be an identifier, in words.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{0}")]
 pub struct IdentifierError(String);
@@ -66,7 +65,6 @@ impl fmt::Display for Identifier {
     }
 }
 
-/// Refuses a name that a model cannot have, before one is made.
 pub fn check_name(name: &str) -> Result<(), ModelError> {
     identifier_of("model name", name).map(|_| ())
 }

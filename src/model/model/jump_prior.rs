@@ -14,13 +14,10 @@ use super::listed::{self, Listed};
 use super::rom::{Phase, selected};
 use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
 
-/// Numbers of a goal: distance, rise of the body at the apex, height of the body at the start, m.
 pub const GOAL_DIM: usize = 3;
-/// Features of the prior: one, and the normalised numbers of the goal.
 pub const FEATURE_DIM: usize = 1 + GOAL_DIM;
 const MAX_NODES: usize = 200;
 
-/// The features of a goal that the prior multiplies.
 pub type GoalFeatures = [f64; FEATURE_DIM];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +28,7 @@ pub struct GoalRange {
     pub most: f64,
 }
 
-/// Standard deviation of numbers that hardly differ: they say nothing of how jumps depend on them, m.
+/// Numbers that differ less say nothing of how jumps depend on them, m.
 const LEAST_STD_M: f64 = 1e-3;
 
 impl GoalRange {
@@ -50,7 +47,6 @@ impl GoalRange {
         })
     }
 
-    /// Features of a goal in m: one, and its numbers normalised.
     pub fn features(ranges: &[Self; GOAL_DIM], goal: &[f64; GOAL_DIM]) -> GoalFeatures {
         std::array::from_fn(|k| match k.checked_sub(1) {
             None => 1.0,
@@ -75,14 +71,12 @@ pub struct Landmarks {
     pub parts: Vec<Landmark>,
 }
 
-/// A part of every jump.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Landmark {
     /// Name: crouch, thrust, flight, landing, or the phase's.
     pub name: String,
     pub phase: String,
-    /// Feet on the ground, which select that phase.
     #[serde(with = "listed")]
     pub feet: ContactFlags,
     /// Shortest and longest duration in the training jumps, s.
@@ -90,13 +84,11 @@ pub struct Landmark {
 }
 
 impl Landmark {
-    /// Whether a foot is on the ground.
     pub fn is_grounded(&self) -> bool {
         self.feet.contains(&true)
     }
 }
 
-/// Flags as 0 and 1.
 impl Listed for ContactFlags {
     type List = [u8; FOOT_DIM];
 
@@ -131,8 +123,7 @@ pub struct JumpPart {
     /// Covariance of the training's latent inputs in the part, `latent_dim x latent_dim`.
     #[serde(with = "listed")]
     pub input_covariance: DMatrix<f64>,
-    /// Standard deviation over the jumps of the mean acceleration that `xi` leaves unexplained in a jump that it was
-    /// not fitted to, `latent_dim`.
+    /// Over the jumps, of the mean acceleration that `xi` leaves unexplained in a jump that it was not fitted to.
     #[serde(with = "listed")]
     pub acceleration_std: DVector<f64>,
 }
@@ -199,7 +190,6 @@ pub struct JumpPrior {
 }
 
 impl JumpPrior {
-    /// Ranges of distance, rise and height at the start.
     pub fn ranges(&self) -> [GoalRange; GOAL_DIM] {
         GoalRange::of(&self.landmarks.jumps)
     }
@@ -208,7 +198,6 @@ impl JumpPrior {
         GoalRange::features(&self.ranges(), &goal)
     }
 
-    /// Refuses tables that do not fit the model's dimensions and phases, and numbers that are none.
     pub(super) fn check(&self, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
         self.landmarks.check(phases)?;
         let (n_parts, n_landmarks) = (self.parts.len(), self.landmarks.parts.len());

@@ -35,7 +35,6 @@ const KINDS: [(&str, fn(usize) -> LatentVariable); 3] = [
 ];
 
 impl LatentVariable {
-    /// The variable with this name, if there is one at `latent_dim`.
     pub fn from_name(name: &str, latent_dim: usize) -> Option<Self> {
         let digits_at = name.find(|c: char| c.is_ascii_digit())?;
         let (kind, digits) = name.split_at(digits_at);
@@ -54,13 +53,11 @@ impl LatentVariable {
         }
     }
 
-    /// Its place in [`Self::all`], if it is there at `latent_dim`.
     pub fn place(self, latent_dim: usize) -> Option<usize> {
         let (kind, index) = self.parts();
         (index < latent_dim).then_some(kind * latent_dim + index)
     }
 
-    /// All variables at `latent_dim`: z, then dz, then u.
     pub fn all(latent_dim: usize) -> impl Iterator<Item = Self> {
         (KINDS.into_iter()).flat_map(move |(_, variable)| (0..latent_dim).map(variable))
     }
@@ -79,7 +76,6 @@ impl fmt::Display for LatentVariable {
     }
 }
 
-/// One column of Theta.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CandidateTerm {
     text: String,
@@ -92,12 +88,10 @@ impl CandidateTerm {
         Self { text, expr }
     }
 
-    /// The term as the model file writes it.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The term in the library's pool.
     pub fn expr(&self) -> ExprId {
         self.expr
     }
@@ -107,9 +101,7 @@ impl CandidateTerm {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(untagged)]
 pub enum LibraryChoice {
-    /// A list of expressions over `z1..zd`, `dz1..dzd`, `u1..ud`.
     Terms(Vec<String>),
-    /// The shorthand: polynomials, sines and cosines, inputs.
     Standard(StandardLibrary),
 }
 
@@ -117,7 +109,6 @@ pub enum LibraryChoice {
 #[derive(Clone, Debug)]
 pub struct Library {
     latent_dim: usize,
-    /// The shorthand, if the library was given by it.
     standard: Option<StandardLibrary>,
     pool: ExprPool,
     symbols: Vec<SymbolId>,
@@ -126,12 +117,10 @@ pub struct Library {
 }
 
 impl Library {
-    /// The library with these terms, in the expression syntax of the model file.
     pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, ModelError> {
         Self::of(latent_dim, LibraryChoice::Terms(texts.to_vec()))
     }
 
-    /// The standard library, in the order of the published arrays.
     pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, ModelError> {
         Self::of(latent_dim, LibraryChoice::Standard(standard))
     }
@@ -170,8 +159,7 @@ impl Library {
         })
     }
 
-    /// Refuses a library in which a term equals an earlier one under another spelling: its coefficients cannot be
-    /// learned.
+    /// Refuses terms that are equal: their coefficients cannot be learned.
     pub fn check_distinct(&self) -> Result<(), ModelError> {
         let mut first_use = HashMap::new();
         for (second, term) in self.terms.iter().enumerate() {
@@ -184,7 +172,6 @@ impl Library {
         Ok(())
     }
 
-    /// The terms as steps of one pass over their subexpressions.
     pub fn tape(&self) -> &Tape {
         &self.tape
     }
@@ -193,12 +180,10 @@ impl Library {
         self.latent_dim
     }
 
-    /// Number of terms: the rows of Xi.
     pub fn len(&self) -> usize {
         self.terms.len()
     }
 
-    /// Never true of a library that was built.
     pub fn is_empty(&self) -> bool {
         self.terms.is_empty()
     }
@@ -209,8 +194,7 @@ impl Library {
         standard.unwrap_or_else(|| LibraryChoice::Terms(texts()))
     }
 
-    /// The standard library that has the same terms in whatever order, and for each of its terms in romc's order the
-    /// row of this library; none for other terms.
+    /// The standard library of the same terms, and for each of its terms in romc's order the row of this one.
     pub fn as_standard(&self) -> Option<(StandardLibrary, Vec<usize>)> {
         if let Some(standard) = self.standard {
             return Some((standard, (0..self.len()).collect()));
@@ -279,7 +263,6 @@ impl Library {
 }
 
 impl PartialEq for Library {
-    /// Equal as given: same dimension, form and texts.
     fn eq(&self, other: &Self) -> bool {
         self.latent_dim == other.latent_dim
             && self.standard == other.standard
@@ -337,9 +320,7 @@ fn constants_are_finite(pool: &ExprPool, expr: ExprId) -> bool {
 /// The terms of a library as steps, each of which reads the results of earlier ones.
 #[derive(Clone, Debug)]
 pub struct Tape {
-    /// In an order in which every step follows its operands.
     pub steps: Vec<Step>,
-    /// The steps that are the terms, in library order.
     pub terms: Vec<usize>,
 }
 
@@ -360,7 +341,6 @@ pub enum Step {
 }
 
 impl Tape {
-    /// The steps for `terms`; `symbols` holds the variables in order.
     pub(crate) fn new(pool: &ExprPool, terms: &[ExprId], symbols: &[SymbolId]) -> Self {
         let mut builder = Builder {
             pool,

@@ -19,7 +19,6 @@ use super::error::{ModelError, check_finite};
 use super::rom::ReducedModel;
 use super::state_map::{AffineMap, StateMap};
 
-/// Velocities and inputs between robot and latent coordinates at one state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tangent {
     /// `dz = encode dx`: `J_E s_x`, `latent_dim x state_dim`.
@@ -32,7 +31,6 @@ pub struct Tangent {
 }
 
 impl ReducedModel {
-    /// Whether encoder and decoder, as far as the model has them, are single affine maps.
     pub fn is_linear(&self) -> bool {
         let mut maps = self.parts.encoder.iter().chain(&self.parts.decoder);
         maps.all(|map| map.as_affine().is_some())
@@ -58,17 +56,13 @@ impl ReducedModel {
         self.affine("decoder", self.decoder_map()?)
     }
 
-    /// `pinv(W_e^T)` of a linear model, `latent_dim x state_dim`, in scaled units.
     pub fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
         self.encoder()?;
         let projection = self.input_projection.as_ref();
         self.require(projection, "encoder", "projecting inputs")
     }
 
-    /// The model with encoder and decoder linearised: the encoder about the state `x`, the decoder about `z = E(s_x
-    /// x)`. The dynamics and linear maps stay the same.
-    ///
-    /// Positions, velocities and inputs of the two models agree at `x` and differ elsewhere.
+    /// Encoder linearised about the state `x`, decoder about its latent state; the dynamics stay.
     pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel, ModelError> {
         let scaled = self.scaled_state(x)?;
         let encoder = self.encoder_map()?;
@@ -260,9 +254,7 @@ pub enum Activation {
     Softplus,
 }
 
-/// sqrt(2/pi), of [`Activation::GeluTanh`].
 pub const GELU_RATE: f64 = 0.797_884_560_802_865_4;
-/// Of [`Activation::GeluTanh`].
 pub const GELU_CUBIC: f64 = 0.044_715;
 
 impl Activation {
@@ -374,7 +366,6 @@ impl Activation {
     }
 }
 
-/// The larger of `a` and zero; NaN of NaN.
 fn positive_part(a: f64) -> f64 {
     if a < 0.0 { 0.0 } else { a }
 }
@@ -446,7 +437,6 @@ pub const TAIL: [f64; 22] = [
     -1.446_797_769_320_091_7e-14,
 ];
 
-/// `1/sqrt(2 pi)`.
 pub const DENSITY_AT_ZERO: f64 = 0.398_942_280_401_432_7;
 
 /// Probability that a normal number is below `a`.

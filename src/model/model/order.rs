@@ -30,10 +30,6 @@ impl CoordinateOrder {
         &self.places
     }
 
-    /// A vector or matrix whose rows are in this order, with its rows in romc's.
-    ///
-    /// # Panics
-    /// If it does not have 18 rows.
     pub fn sorted<C: Dim>(&self, rows: &OMatrix<f64, Dyn, C>) -> OMatrix<f64, Dyn, C>
     where
         DefaultAllocator: Allocator<Dyn, C>,

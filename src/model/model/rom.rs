@@ -34,7 +34,6 @@ use crate::robot::{Actuators, ContactFlags, FeetRule, InputRule, Robot, WrenchFr
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Phase {
-    /// Name, such as `contact`.
     pub name: String,
     /// Foot patterns that select it; the first phase that matches wins.
     pub feet: FeetRule,
@@ -44,7 +43,6 @@ pub struct Phase {
 }
 
 impl Phase {
-    /// Number of coefficients that are not zero.
     pub fn active_count(&self) -> usize {
         self.xi.iter().filter(|&&value| value != 0.0).count()
     }

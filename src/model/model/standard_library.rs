@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 use super::error::{ModelError, check};
 use super::library::check_term_count;
 
-/// Largest polynomial degree of the standard library.
 pub(crate) const MAX_DEGREE: u32 = 8;
 
 /// The shorthand of the model file: which groups of terms a library has.
@@ -21,9 +20,7 @@ pub(crate) const MAX_DEGREE: u32 = 8;
 pub struct StandardLibrary {
     /// Highest degree of the monomials: 0 is the constant alone, 1 adds z and dz.
     pub degree: u32,
-    /// Sines and cosines of each z and dz.
     pub trigonometric: bool,
-    /// The latent inputs.
     pub inputs: bool,
 }
 
@@ -38,12 +35,10 @@ impl Default for StandardLibrary {
     }
 }
 
-/// A group of terms that orders of a library keep together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Group {
     Constant,
     Linear,
-    /// Monomials of degree 2 and more.
     Higher,
     Trigonometric,
     Inputs,
@@ -101,7 +96,6 @@ impl LibraryOrder {
         run: Run::Single,
         ..Self::ROMC
     };
-    /// The orders that have names.
     pub const NAMED: [Self; 3] = [Self::PAPER, Self::INTERLEAVED, Self::ROMC];
 
     const NAMES: [(&str, &str); 3] = [
@@ -121,7 +115,6 @@ impl LibraryOrder {
         Some(Self::NAMES[place])
     }
 
-    /// `paper`, `interleaved` or `romc`, for orders that have a name.
     pub fn name(&self) -> Option<&'static str> {
         self.named().map(|(name, _)| name)
     }
@@ -193,7 +186,6 @@ impl StandardLibrary {
         Some(count)
     }
 
-    /// The libraries up to degree 3, the richest of a degree first.
     pub fn small() -> impl Iterator<Item = Self> {
         (0..=3).flat_map(|degree| {
             let more = [(true, true), (true, false), (false, true), (false, false)];
@@ -209,7 +201,6 @@ impl StandardLibrary {
         self.texts_in(LibraryOrder::ROMC, latent_dim)
     }
 
-    /// The terms in another order; the texts are the same.
     pub fn texts_in(
         &self,
         order: LibraryOrder,
@@ -246,7 +237,6 @@ impl StandardLibrary {
         Ok(texts)
     }
 
-    /// For each term in another order its row in romc's.
     pub fn rows_in(
         &self,
         order: LibraryOrder,

@@ -10,9 +10,7 @@ use super::error::{ModelError, check, check_count, check_finite, check_shape};
 use super::listed;
 use super::maps::Activation;
 
-/// Most layers of a map.
 pub const MAX_LAYERS: usize = 16;
-/// Most units of a layer.
 pub const MAX_LAYER_WIDTH: usize = 1024;
 
 /// The map `x -> W x + b`, in scaled units.
@@ -26,7 +24,6 @@ pub struct AffineMap {
 }
 
 impl AffineMap {
-    /// The map with these weights and this bias; `tensor` names it in errors.
     pub fn new(
         tensor: &str,
         weights: DMatrix<f64>,
@@ -44,7 +41,6 @@ impl AffineMap {
         check_finite(&bias_name, &self.bias)
     }
 
-    /// `W`, `output_dim x input_dim`.
     pub fn weights(&self) -> &DMatrix<f64> {
         &self.weights
     }
@@ -65,7 +61,6 @@ impl AffineMap {
         Ok(self.apply_linear(x)? + &self.bias)
     }
 
-    /// `W dx`: how velocities and accelerations map.
     fn apply_linear(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         ModelError::check_dimension("argument of an affine map", dx.len(), self.input_dim())?;
         Ok(&self.weights * dx)
@@ -122,7 +117,6 @@ impl From<Layer> for LayerKeys {
     }
 }
 
-/// A map in a model file: weights and bias of an affine one, or layers.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct MapKeys {
@@ -176,7 +170,6 @@ impl From<AffineMap> for StateMap {
 }
 
 impl StateMap {
-    /// The chain of these layers, the first applied first; `tensor` names it in errors.
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
         let map = Self { layers };
         map.check_chain(tensor)?;
@@ -213,7 +206,6 @@ impl StateMap {
         &self.layers
     }
 
-    /// The map as an affine one, if it is a single linear layer.
     pub fn as_affine(&self) -> Option<&AffineMap> {
         match self.layers.as_slice() {
             [only] if only.activation == Activation::Linear => Some(&only.map),
@@ -264,7 +256,6 @@ impl StateMap {
         Ok([y, dy, ddy])
     }
 
-    /// The Jacobian `J(x) = dy/dx`, `output_dim x input_dim`.
     pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
         let mut y = x.clone();
         let mut jacobian = None;

@@ -9,8 +9,7 @@ use super::error::{ModelError, check, check_tensor};
 use super::listed;
 use super::maps::complement;
 
-/// Largest asymmetry, and most negative eigenvalue, that count as rounding: relative to the largest entry, and to the
-/// largest eigenvalue.
+/// Largest relative asymmetry and most negative eigenvalue that count as rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// Mean and covariance of the generalised input `u = [torques; F_lin; F_ang]` in one phase, SI.
@@ -22,13 +21,11 @@ pub struct InputStatistics {
     /// `input_dim x input_dim`, symmetric positive semidefinite.
     #[serde(with = "listed")]
     pub covariance: DMatrix<f64>,
-    /// What the latent state says of the latent input, if it was learned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub given_state: Option<InputGivenState>,
 }
 
 impl InputStatistics {
-    /// Mean and covariance of SI inputs in columns; all zero without a sample.
     pub fn of_samples(samples: &DMatrix<f64>) -> Self {
         let n = samples.ncols().max(1) as f64;
         let mut mean = DVector::zeros(samples.nrows());
@@ -42,7 +39,6 @@ impl InputStatistics {
         }
     }
 
-    /// Mean and covariance of the latent input `u_lat = projection u`, scaled units.
     pub fn projected(&self, projection: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let covariance = projection * &self.covariance * projection.transpose();
         (projection * &self.mean, covariance)
@@ -113,9 +109,7 @@ fn check_positive(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelEr
     Ok(())
 }
 
-/// Samples per number of a regression, below which it is left out.
 const LEAST_SAMPLES: usize = 4;
-/// Ridge relative to the variance of each coordinate.
 const RIDGE: f64 = 1e-2;
 
 /// The latent input of one phase given the latent state, `u_lat | z, dz ~ (mean [1; z; dz], covariance)`, and how far
@@ -123,7 +117,6 @@ const RIDGE: f64 = 1e-2;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputGivenState {
-    /// `latent_dim x (1 + 2 latent_dim)`.
     #[serde(with = "listed")]
     pub mean: DMatrix<f64>,
     /// `latent_dim x latent_dim`, symmetric positive semidefinite.

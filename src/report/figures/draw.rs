@@ -6,7 +6,6 @@ const LEFT: f64 = 38.0;
 const TOP: f64 = 17.0;
 const BOTTOM: f64 = 26.0;
 const RIGHT: f64 = 8.0;
-/// Points of a line that are drawn; CSV has them all.
 const MAX_POINTS: usize = 240;
 pub(super) const FONT: f64 = 9.0;
 
@@ -22,7 +21,6 @@ pub(crate) enum Paint {
     Axis,
     Grid,
     Shade,
-    /// A magnitude from 0 to 1.
     Heat(f64),
 }
 
@@ -32,7 +30,6 @@ pub(crate) enum Mark {
     Rectangle([f64; 4], Paint),
     Rule([f64; 4], Paint),
     Line(Vec<(f64, f64)>, Role),
-    /// A text at the left end of its baseline, or as anchored.
     Text(f64, f64, Anchor, String),
 }
 
@@ -73,7 +70,6 @@ fn legend_height(figure: &Figure) -> f64 {
     }
 }
 
-/// The marks of a figure's legend, then of each of its panels.
 pub(super) fn placed_marks(figure: &Figure) -> Vec<Vec<Mark>> {
     let (width, height) = figure.panel_size;
     let place = |(place, panel): (usize, &Panel)| {
@@ -98,7 +94,6 @@ fn legend_marks(figure: &Figure) -> Vec<Mark> {
     marks
 }
 
-/// Draws one panel in the given size, the first mark below the others; `x_label` stands below its axis.
 pub(crate) fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<Mark> {
     let title = panel.title.as_str();
     match &panel.drawing {
@@ -167,8 +162,7 @@ fn draw_lines(
     marks
 }
 
-/// Values that the range of y follows: a prediction that runs away does not flatten the record, a limit is always in
-/// sight.
+/// A prediction that runs away does not flatten the record; a limit is always in sight.
 fn visible(series: &[Series]) -> impl Iterator<Item = f64> {
     let recorded = (series.iter()).find(|series| series.role == Role::Recorded);
     let bounds = recorded.map(|series| padded(series.points.iter().filter_map(|p| p.1)));
@@ -283,7 +277,6 @@ fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
     marks
 }
 
-/// Round values within a range, about four of them, with texts of the decimal places that they need.
 fn ticks((low, high): (f64, f64)) -> Vec<(f64, String)> {
     let rough = (high - low) / 4.0;
     if !rough.is_finite() || rough <= 0.0 {
@@ -303,7 +296,6 @@ fn ticks((low, high): (f64, f64)) -> Vec<(f64, String)> {
     values.map(|value| (value, number(value, places))).collect()
 }
 
-/// A value along an axis or in a title, with so many decimal places and a minus of the width of a plus.
 fn number(value: f64, places: usize) -> String {
     format!("{value:.places$}").replace('-', "\u{2212}")
 }
@@ -316,7 +308,6 @@ pub(crate) fn subscript(index: usize) -> String {
     index.to_string().chars().map(below).collect()
 }
 
-/// The least and the largest of some values; infinities in reverse where there is none.
 pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let none = (f64::INFINITY, f64::NEG_INFINITY);
     let values = values.into_iter();

@@ -5,21 +5,15 @@ use super::sticks::{Extent, Sticks};
 /// The meaning of a line, which selects its colour and dashes in every figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// Measured, or encoded from what was measured.
     Recorded,
-    /// Predicted over the whole recording.
     Full,
-    /// Predicted between restarts.
     Restarted,
-    /// A template model, or the first of two things compared.
     Baseline,
     SecondBaseline,
-    /// A bound that the others keep, always within the frame.
     Limit,
 }
 
-/// Of each role the class of its lines in SVG, their colour on white (red, green and blue from 0 to 255), and the
-/// lengths of dashes and gaps as SVG and PDF list them, none for a full line; by these lines differ in grey print too.
+/// Class in SVG, colour on white, and lengths of dashes and gaps, by which lines differ in grey print too.
 pub(crate) const STYLES: [(&str, [u8; 3], &str); 6] = [
     ("recorded", [31, 95, 168], ""),
     ("full", [194, 87, 12], "6 2.5"),
@@ -75,13 +69,10 @@ pub(crate) enum Drawing {
 pub(crate) struct HeatMap {
     pub rows: Vec<String>,
     pub columns: Vec<String>,
-    /// Row by row.
     pub values: Vec<f64>,
 }
 
-/// Robots as sticks in a vertical plane, one length for a metre in both directions.
 pub(crate) struct StickPlot {
-    /// The robots, the first below the others.
     pub sticks: Vec<(Role, Sticks)>,
     pub extent: Extent,
     pub floor_m: f64,
@@ -107,18 +98,14 @@ impl Panel {
 pub(crate) struct Figure {
     pub id: String,
     pub caption: String,
-    /// The common axis below, such as `time, s`.
     pub x_label: String,
-    /// Size of a panel in points: width and height.
     pub panel_size: (f64, f64),
-    /// Panels side by side when drawn on a page of their own.
     pub columns: usize,
     pub panels: Vec<Panel>,
     pub legend: Vec<(Role, String)>,
 }
 
 impl Figure {
-    /// Small panels over time, three side by side; the legend explains the lines.
     pub(crate) fn over_time(
         id: impl Into<String>,
         caption: impl Into<String>,

@@ -37,7 +37,6 @@ pub(crate) fn pdf(figure: &Figure) -> String {
     )
 }
 
-/// A mark on a page of this height, on which y grows upwards.
 fn spelled(mark: &Mark, height: f64) -> String {
     match mark {
         Mark::Rectangle([x, y, w, h], paint) => {
@@ -81,7 +80,6 @@ fn colour(paint: Paint) -> [f64; 3] {
     }
 }
 
-/// Width of a text in Helvetica, near enough to place it.
 fn width(text: &str) -> f64 {
     let of = |letter: char| match letter {
         '0'..='9' => 0.556,

@@ -82,7 +82,6 @@ impl Extent {
 pub(crate) struct Motion {
     pub role: Role,
     pub words: String,
-    /// The state (18, as [`Sticks::of`] takes it) at each time; none where there is no prediction.
     pub states: Vec<Option<DVector<f64>>>,
 }
 
@@ -95,7 +94,6 @@ impl Motion {
         }
     }
 
-    /// A plan at the times of the jump that follows it, from where that jump begins; none after the plan's end.
     pub(crate) fn planned(plan: &Segment, followed: &Segment) -> Self {
         let (starts, times) = ([plan, followed].map(|s| s.time_s.first()), &followed.time_s);
         let state = |time: f64| {
@@ -133,8 +131,7 @@ impl Motion {
     }
 }
 
-/// Height of the floor, in m: the median over samples of the lowest foot in contact; of the lowest foot where no sample
-/// has one.
+/// Median over samples of the lowest foot in contact, or of the lowest foot, in m.
 pub(crate) fn floor_m(robot: &Robot, segment: &Segment) -> f64 {
     let lowest = |k: usize, all: bool| {
         let sticks = Sticks::of(robot, segment.x.column(k).as_slice(), 0.0);
@@ -151,8 +148,7 @@ pub(crate) fn floor_m(robot: &Robot, segment: &Segment) -> f64 {
     feet.get(feet.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Motions at `n_frames` instants, evenly chosen from the first to the last of `time_s`, side by side to one scale,
-/// seen from the right of a robot that looks along `heading_rad`.
+/// Side by side to one scale, seen from the right of a robot that looks along `heading_rad`.
 pub(crate) fn film_strip(
     robot: &Robot,
     (id, caption): (String, String),
@@ -196,22 +192,18 @@ pub(crate) fn film_strip(
 
 const MOST_FRAMES: usize = 72;
 
-/// An animation: the drawing at its first instant in sight, and the lines of every instant.
 pub(crate) struct Film {
     /// An `svg` element with a `g` for each motion, which holds a polyline for each of [`Sticks::NAMES`].
     pub svg: String,
     /// JSON: `{"time": [s], "lines": [[motion][instant]]}` with the points of all lines of a motion at an instant,
     /// joined by semicolons as `polyline` takes them; empty where there is no prediction.
     pub frames: String,
-    /// The instant that the drawing shows: the highest point of the first motion.
     pub shown: usize,
     pub count: usize,
-    /// Time of the instant that is shown, from the first sample, in s.
     pub shown_s: f64,
     pub legend: Vec<(Role, String)>,
 }
 
-/// A line in mm, y downwards.
 fn points(line: impl IntoIterator<Item = (f64, f64)>) -> String {
     let points = line.into_iter();
     let points = points.map(|(forward, up)| format!("{:.0},{:.0}", 1e3 * forward, -1e3 * up));
@@ -224,13 +216,11 @@ fn joined(sticks: &Option<Sticks>) -> String {
     lines.collect::<Vec<_>>().join(";")
 }
 
-/// Middle of the trunk: forward and up, in m.
 fn middle(sticks: &Sticks) -> (f64, f64) {
     let (one, other) = (sticks.lines[0][0], sticks.lines[0][2]);
     (0.5 * (one.0 + other.0), 0.5 * (one.1 + other.1))
 }
 
-/// The animation of `motions` over `time_s`, seen from the right of a robot that looks along `heading_rad`.
 pub(crate) fn film(
     robot: &Robot,
     (time_s, motions): (&[f64], &[Motion]),
