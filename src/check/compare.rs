@@ -4,10 +4,10 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::CheckOptions;
-use super::point::{Gap, Sides, search};
-use super::side::{Floats, RightSide, Side, SidePhase};
-use crate::symbolic::{CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPool, Node, Number};
+use super::point::{Sides, search};
+use super::side::{Floats, RightSide, SidePhase};
+use super::*;
+use crate::symbolic::{CanonicalForm, CanonicalForms, Node};
 
 const MAX_TERMS: usize = 5;
 
@@ -81,10 +81,8 @@ impl Comparison {
 
 pub fn compare(left: &Side, right: &Side, options: &CheckOptions) -> Comparison {
     let outputs = left.latent_dim.max(right.latent_dim);
-    let phases = paired(&left.phases, &right.phases)
-        .into_iter()
-        .enumerate()
-        .map(|(place, pair)| {
+    let phases =
+        (paired(&left.phases, &right.phases).into_iter().enumerate()).map(|(place, pair)| {
             let name = (pair.iter().flatten()).find_map(|phase| phase.name.clone());
             let name = name.unwrap_or_else(|| (place + 1).to_string());
             let equations = (0..outputs).map(|output| {
@@ -240,9 +238,7 @@ fn proof(
 }
 
 fn sum(pool: &mut ExprPool, side: usize, rows: &[&Row]) -> ExprId {
-    let terms: Vec<ExprId> = (rows.iter())
-        .flat_map(|row| row.terms[side].clone())
-        .collect();
+    let terms: Vec<ExprId> = ((rows.iter()).flat_map(|row| row.terms[side].clone())).collect();
     pool.sum(&terms)
 }
 

@@ -34,7 +34,12 @@ pub use point::Gap;
 pub(crate) use side::read_sides;
 pub use side::{CheckError, Side};
 
-use crate::import::SymbolNames;
+use std::path::Path;
+
+use crate::files::Place;
+use crate::import::{ImportError, SymbolNames};
+use crate::model::LatentVariable;
+use crate::symbolic::{Coefficient, ExprId, ExprPool, Number};
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {

@@ -1,16 +1,13 @@
-//! Search for a point where two expressions differ by more than rounding explains.
-//!
-//! Ranges of variables in which two sides are compared.
+//! Search in ranges of variables for a point where two expressions differ by more than rounding explains.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 
-use super::side::CheckError;
-use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::{ExprId, ExprPool, Interval, SymbolId};
+use super::*;
+use crate::model::MAX_LATENT_DIM;
+use crate::symbolic::{Interval, SymbolId};
 
 /// Points that are tried without a proof of equality, and with one, where they only show where both sides have values.
 const POINTS: usize = 3_000;
@@ -84,8 +81,7 @@ pub(super) struct Sides<'s> {
     pub(super) guards: [&'s [ExprId]; 2],
 }
 
-/// Tries points of a fixed sequence: all variables at once, and single groups of them with the others zero, so that one
-/// small term can be seen beside large ones. The last point has zeros alone.
+/// All variables at once, and single groups with the others zero, so that a small term can be seen beside large ones.
 pub(super) fn search(
     sides: &Sides<'_>,
     phase: &str,
@@ -154,8 +150,7 @@ impl Sides<'_> {
         self.pool.evaluate_all(exprs, &value_of)
     }
 
-    /// Both values; NaN for a side that has none, also if what has none cancelled, and an infinity where floats
-    /// overflow.
+    /// NaN for a side that has no value, also if what has none cancelled; an infinity where floats overflow.
     fn at(&self, values: &BTreeMap<SymbolId, f64>) -> Gap {
         let both = [0, 1].map(|side| {
             let all = [&[self.whole[side]], self.guards[side]].concat();
@@ -200,11 +195,9 @@ pub struct CheckDomain {
 
 impl CheckDomain {
     /// Reads a TOML text: a table per phase with ranges such as `z1 = [-0.2, 0.4]`, scaled units.
-    pub(crate) fn from_toml(path: &Path, text: &str) -> Result<Self, CheckError> {
-        let refused = |message: String| CheckError::Domain {
-            path: path.to_owned(),
-            message,
-        };
+    pub(crate) fn from_toml(path: &Path, text: &str) -> Result<Self, ImportError> {
+        let file = path.display().to_string();
+        let refused = |message: String| ImportError::text(&file, Place::Whole, message);
         let phases: BTreeMap<String, BTreeMap<String, [f64; 2]>> =
             toml::from_str(text).map_err(|error| refused(error.to_string()))?;
         for (phase, ranges) in &phases {

@@ -1,15 +1,12 @@
 //! One of two files that are compared, with its numbers as they are written.
 
-use std::io;
-use std::path::{Path, PathBuf};
-
-use super::CheckOptions;
+use super::*;
 use crate::artifact;
 use crate::equations::Equations;
 use crate::files::size;
-use crate::import::{Format, ImportError, read_equations};
-use crate::model::{LatentVariable, ReducedModel};
-use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, Reading};
+use crate::import::{Format, read_equations};
+use crate::model::ReducedModel;
+use crate::symbolic::{ParseError, ParseLimits, Reading};
 
 /// Digits that a rounded float has at least; decimals with more digits are nearer to one float than to any other.
 const FLOAT_DIGITS: usize = 16;
@@ -18,12 +15,6 @@ const LARGEST_HALF: f64 = 4e15;
 
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
-    #[error("{}: cannot read the file", path.display())]
-    Io { path: PathBuf, source: io::Error },
-    #[error(
-        "{file}: found {found}, expected a model (.json), equations as text (.txt), or LaTeX (.tex, .md)"
-    )]
-    Kind { file: String, found: String },
     #[error(transparent)]
     File(#[from] ImportError),
     #[error("{file}:{line}: not a usable equation")]
@@ -32,8 +23,6 @@ pub enum CheckError {
         line: usize,
         source: ParseError,
     },
-    #[error("{}: {message}", path.display())]
-    Domain { path: PathBuf, message: String },
 }
 
 #[derive(Clone, Debug)]
@@ -70,11 +59,10 @@ pub(crate) fn read_sides(
             true => size::Format::Model,
             false => size::Format::Equations,
         };
-        let bytes = size::read_capped(path, format).map_err(|source| CheckError::Io {
-            path: path.to_owned(),
-            source,
-        })?;
-        Side::from_bytes(&path.display().to_string(), &bytes, options, known)
+        let file = path.display().to_string();
+        let refused = |source| ImportError::io(&file, "read the file", source);
+        let bytes = size::read_capped(path, format).map_err(refused)?;
+        Side::from_bytes(&file, &bytes, options, known)
     };
     if is_latex(paths[0]) && !is_latex(paths[1]) {
         let second = read(paths[1], &[])?;
@@ -102,10 +90,9 @@ impl Side {
         let Ok(format @ (Format::Equations | Format::Latex)) = Format::of_path(Path::new(file))
         else {
             let found = ending.map(|ending| format!("the ending `.{ending}`"));
-            return Err(CheckError::Kind {
-                file: file.to_owned(),
-                found: found.unwrap_or("no ending".to_owned()),
-            });
+            let found = found.unwrap_or("no ending".to_owned());
+            let expected = "a model (.json), equations as text (.txt), or LaTeX (.tex, .md)";
+            return Err(ImportError::at(file, Place::Whole, found, expected).into());
         };
         let usual = ["contact", "flight"].map(str::to_owned);
         let known: Vec<String> = known.iter().cloned().chain(usual).collect();
@@ -176,8 +163,8 @@ impl Side {
         pool.parse_defined(text, &known, &literal, ParseLimits::default())
     }
 
-    /// A decimal as it is written. Integers are numbers of the pool, and multiples of 1/2 of exact files, which floats
-    /// hold exactly. Decimals of 17 digits or more are the shortest one of the same float.
+    /// Integers, and halves of exact files, are numbers of the pool; of 17 digits or more the shortest of the float
+    /// counts.
     fn decimal(&self, pool: &mut ExprPool, number: &str) -> Option<ExprId> {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
             return None;
@@ -197,8 +184,8 @@ impl Side {
         pool.decimal(&text, is_rounded)
     }
 
-    /// Builds a right side, with symbols for decimals, and its guards; where a model's `floats` count as rounded, those
-    /// of as many digits as floats have stand for all numbers near them.
+    /// With symbols for decimals; where a model's `floats` are rounded, those of many digits stand for all numbers
+    /// near.
     pub(super) fn build(
         &self,
         right_side: &RightSide,

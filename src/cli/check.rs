@@ -1,13 +1,12 @@
 //! `romc check`: two files in, equal or a point of difference out.
 
-use super::args::CheckArguments;
 use super::*;
 use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, Gap, Side, TermDifference, Verdict, compare,
     read_sides,
 };
-use crate::files::read_toml;
-use crate::import::SymbolNames;
+use crate::files::{Place, read_toml};
+use crate::import::{ImportError, SymbolNames};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let options = CheckOptions {
@@ -20,8 +19,8 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
     let phases: Vec<&str> = (comparison.phases.iter().map(|phase| phase.name.as_str())).collect();
     let foreign = (options.domain).foreign(&phases, left.latent_dim.max(right.latent_dim));
     if let (Some(path), Some(message)) = (&arguments.domain, foreign) {
-        let path = path.clone();
-        return Err(CheckError::Domain { path, message }.into());
+        let file = path.display().to_string();
+        return Err(CheckError::File(ImportError::text(&file, Place::Whole, message)).into());
     }
     Ok(answer(&left, &right, &comparison))
 }
@@ -30,11 +29,10 @@ fn domain(arguments: &CheckArguments) -> Result<CheckDomain, CheckError> {
     let Some(path) = &arguments.domain else {
         return Ok(CheckDomain::default());
     };
-    let text = read_toml(path).map_err(|source| CheckError::Io {
-        path: path.clone(),
-        source,
-    })?;
-    CheckDomain::from_toml(path, &text)
+    let file = path.display().to_string();
+    let text = read_toml(path);
+    let text = text.map_err(|source| ImportError::io(&file, "read the file", source))?;
+    Ok(CheckDomain::from_toml(path, &text)?)
 }
 
 fn answer(left: &Side, right: &Side, comparison: &Comparison) -> Answer {

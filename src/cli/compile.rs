@@ -1,6 +1,5 @@
 //! `romc compile`: a model file to equations and code.
 
-use super::args::{CompileArguments, UnitsChoice};
 use super::simplification::{self, Outcome, exact_words};
 use super::*;
 use crate::deploy::{self, EmitOptions, PlannedJump, Target};
@@ -104,12 +103,8 @@ fn text(
     let phases: Vec<String> = (equations.phases().iter())
         .map(|phase| format!("{} active terms in {}", phase.active_count(), phase.name))
         .collect();
-    let mut text = format!(
-        "model `{}`: {} latent coordinates, {}\n\n{table}",
-        model.name(),
-        model.latent_dim(),
-        phases.join(", ")
-    );
+    let (name, d, phases) = (model.name(), model.latent_dim(), phases.join(", "));
+    let mut text = format!("model `{name}`: {d} latent coordinates, {phases}\n\n{table}");
     let saved = arguments.simplification.save_model.as_deref();
     text += &lines("simplified model: ", saved.map(Path::display));
     if arguments.emit.contains(&Target::C) {

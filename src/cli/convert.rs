@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use super::args::ConvertArguments;
 use super::*;
 use crate::recording::{RecordingFault, WriteOptions, write_as, write_mcap};
 

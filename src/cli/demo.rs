@@ -1,10 +1,7 @@
-//! `romc demo`: the main job on the shipped model and recordings, from a recorded jump to torques.
-//!
-//! Model and recordings are part of the binary, so that the demo runs anywhere.
+//! `romc demo`: the main job on the shipped model and recordings, which are part of the binary.
 
 use std::process::Command;
 
-use super::args::DemoArguments;
 use super::simplification::RESTART_S;
 use super::*;
 use crate::deploy::{self, EmitOptions, Target};
@@ -30,8 +27,6 @@ const JUMPS: [(&str, &[u8]); 3] = [
 
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
-/// Runs the whole path and reports its files and metrics. The exit code is 1 if predictions of body x or z, the
-/// self-test or a run fail.
 pub(super) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let folder = &arguments.out_dir;
     let inputs = Inputs::default().into_folder(Some(folder))?;

@@ -1,7 +1,4 @@
-//! Where a command may write: its output says its format by its ending, and is none of the files that the command
-//! reads.
-//!
-//! What every command reads, and its words and progress.
+//! What every command reads, where it may write, its words and progress.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -13,7 +10,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::args::ReadingArguments;
 use super::*;
 use crate::Error;
 use crate::files::{Emitted, Overwrite, is_invisible, read_toml, write_files_since, write_whole};
@@ -38,8 +34,7 @@ impl Format {
     pub(super) const PAGE: Self = Self(&[".html", ".htm"]);
 }
 
-/// The files that a command reads, none of which it may replace, forced or not; and the folder that it writes into, as
-/// it is when the command begins.
+/// The files that a command reads and never replaces; the folder that it writes into, as it is when the command begins.
 #[derive(Debug, Default)]
 pub(super) struct Inputs<'a>(Vec<&'a Path>, Option<Emitted>);
 
@@ -255,10 +250,6 @@ pub(super) fn note(text: &str) {
     eprintln!("note: {}", printable(text));
 }
 
-pub(super) fn warn(text: &str) {
-    eprintln!("warning: {}", printable(text));
-}
-
 pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
     (mismatch::notes(recording, robot).iter()).for_each(|found| note(found));
 }
@@ -296,8 +287,7 @@ pub(super) fn note_late_restarts(recordings: &[Recording], restart_every_s: f64)
     }
 }
 
-/// A text for a terminal: characters that act instead of being shown, as a file's name or cell may have them, are
-/// written out. Line ends and tabs stay.
+/// Characters that act instead of being shown, but for line ends and tabs, are written out.
 pub(super) fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }

@@ -1,6 +1,5 @@
 //! `romc identify`: gravity, mass and the joints' losses from recordings.
 
-use super::args::IdentifyArguments;
 use super::*;
 use crate::identify::{Identification, Legs, identify};
 use crate::robot::Robot;

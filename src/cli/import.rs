@@ -1,6 +1,5 @@
 //! `romc import`: a model trained elsewhere in, a model file out.
 
-use super::args::{ImportArguments, LibraryArgument};
 use super::*;
 use crate::evaluate::RoundTrip;
 use crate::import::{
@@ -24,9 +23,7 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
         .and_robot(arguments.robot.as_deref())
         .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
     let options = options(arguments)?;
-    let kind = options
-        .format
-        .or_else(|| FileKind::of_path(&arguments.file).ok());
+    let kind = (options.format).or_else(|| FileKind::of_path(&arguments.file).ok());
     let is_text = matches!(kind, Some(FileKind::Equations | FileKind::Latex));
     if is_text && !arguments.inputs_from.is_empty() {
         let (found, expected) = ("a file of equations", "a file with encoder and decoder");
@@ -73,8 +70,11 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
 /// An imported model, compared with recordings if there are any.
 #[derive(Debug)]
 pub struct Compared {
+    /// With the statistics of the recorded inputs.
     pub imported: Imported,
+    /// What the recordings show.
     pub check: Option<RoundTrip>,
+    /// No reason to refuse it.
     pub fault: Option<String>,
 }
 
@@ -217,9 +217,7 @@ fn describe(report: &ImportReport) -> String {
     let filled = |table: Table| lines("", Some(table).filter(|table| !table.is_empty()));
     let unused = report.unused.iter();
     let unused = unused.map(|of| format!("{} ({})", of.tensor, shape(&of.shape)));
-    let state = report
-        .state_dim
-        .map(|dim| format!("{dim} robot coordinates, "));
+    let state = (report.state_dim).map(|dim| format!("{dim} robot coordinates, "));
     format!(
         "{} ({}): {} latent coordinates, {}{} candidate terms\n\n",
         report.file,

@@ -1,12 +1,8 @@
 //! `romc inspect`: what a recording or a model holds, and what is implausible in it.
-//!
-//! Of a model its parts, its phases, the pattern of Xi and the composition of each latent coordinate; of a recording
-//! ranges, phases on a time bar, implausible samples.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::args::InspectArguments;
 use super::simplification::exact_words;
 use super::*;
 use crate::equations::Equations;
@@ -185,10 +181,8 @@ fn input_rule(model: &ReducedModel) -> String {
 }
 
 fn pattern(equations: &Equations<'_>, phase: usize) -> String {
-    let mut text = format!(
-        "Xi of {} (one column per term, + positive, - negative)\n",
-        equations.phases()[phase].name
-    );
+    let name = &equations.phases()[phase].name;
+    let mut text = format!("Xi of {name} (one column per term, + positive, - negative)\n");
     for (output, row) in equations.coefficients(phase).column_iter().enumerate() {
         let cells = row.iter().map(|value| match value {
             value if *value > 0.0 => '+',

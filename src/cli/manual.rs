@@ -2,7 +2,6 @@
 
 use clap::CommandFactory as _;
 
-use super::args::{CompletionsArguments, ManualArguments};
 use super::*;
 use crate::files::write_files;
 

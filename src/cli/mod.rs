@@ -43,14 +43,12 @@ use crate::recording::{Clocks, Recording, Segment};
 use crate::typeset::words::counted;
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact};
-use args::{Arguments, Command};
+use args::*;
 use destination::*;
 use destination::{Format, Inputs};
 
-/// The result of a command, for people and for programs.
 #[derive(Debug, Clone)]
 pub(crate) struct Answer {
-    /// Human text, complete with its last newline.
     pub text: String,
     /// The same as one JSON object; that of a command gets the command's name before these entries.
     pub json: Value,
@@ -72,15 +70,12 @@ impl Answer {
     }
 }
 
-/// Parses the process's arguments, runs the command, prints its answer.
-///
-/// Wrong usage gives exit code 2 (by clap, or for an option whose value turns out to be none); a failed run gives 1.
+/// Runs the command of the process's arguments and prints its answer.
 pub fn run() -> ExitCode {
     ExitCode::from(run_with(std::env::args_os()))
 }
 
-/// The same with the arguments of another program that has the command line in it, the first of them its name; returns
-/// the exit code.
+/// The same with the arguments of another program, the first of them its name; returns the exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,

@@ -1,6 +1,5 @@
 //! `romc mpc`: the latent-space controller along recordings.
 
-use super::args::MpcArguments;
 use super::simplification::RESTART_S;
 use super::*;
 use crate::evaluate::{
@@ -132,10 +131,7 @@ pub(super) fn runs_json(runs: &[NamedRun]) -> Vec<Value> {
     runs.iter().map(run_json).collect()
 }
 
-/// One run: figures that depend on the dynamics, and what happened.
-///
-/// `steps` to `prepare_us` count and time the solver's work, `lift` is what the maps and the lift make of recorded
-/// inputs: none of these depends on whether the dynamics are right.
+/// `steps` to `prepare_us` and `lift` do not depend on whether the dynamics are right.
 fn run_json((path, run): &NamedRun) -> Value {
     let summary = &run.summary;
     let mut value = json!({
@@ -180,9 +176,7 @@ pub(super) fn command_table(model: &ReducedModel, runs: &[NamedRun]) -> Table {
     let steps = steps.flat_map(|(path, run)| run.rows.iter().map(move |row| (path, row)));
     for (path, row) in steps {
         let command = &row.command;
-        let phase = command
-            .phase
-            .map(|phase| model.phases()[phase].name.clone());
+        let phase = (command.phase).map(|phase| model.phases()[phase].name.clone());
         let values = (command.u_lat.iter())
             .chain(&row.input)
             .chain(&command.torque_nm)

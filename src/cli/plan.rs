@@ -1,6 +1,5 @@
 //! `romc plan`: a jump that nobody recorded, as a recording.
 
-use super::args::PlanArguments;
 use super::convert::write_recording;
 use super::*;
 use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict};
@@ -41,7 +40,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
             return Err(Error::Distrusted(reasons.join("; ")));
         }
         Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
-            reasons.iter().for_each(|reason| warn(reason));
+            (reasons.iter()).for_each(|reason| eprintln!("warning: {}", printable(reason)));
         }
         Verdict::Trusted => {}
     }

@@ -1,6 +1,5 @@
 //! `romc report`: a one-page assessment of a model, and its figures as files.
 
-use super::args::ReportArguments;
 use super::mpc::{judged, run_with_both_lifts};
 use super::*;
 use crate::evaluate::{Assessment, LAMBDA, verdict};

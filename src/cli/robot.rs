@@ -1,6 +1,5 @@
 //! `--robot` of every command, and `romc robot`: what a robot's file says.
 
-use super::args::RobotArguments;
 use super::*;
 use crate::robot::{JOINT_NAMES, Leg, Robot};
 use crate::robot_file::{self, RobotEntry, RobotOptions};

@@ -1,6 +1,5 @@
 //! Simplification for the commands that offer it: the domain from files, the effect on rollouts.
 
-use super::args::SimplifyArguments;
 use super::*;
 use crate::equations::Equations;
 use crate::evaluate::Assessment;
@@ -257,19 +256,19 @@ fn ladder_table(steps: &[Step], restart_every_s: f64) -> Table {
         let text = share.map(|share| format!("{}\u{a0}%", text(100.0 * share)));
         text.into()
     };
+    let certified = |made: &Certificate| percent(made.largest_bound_share(), bound_words);
+    let measured = |share: Option<f64>| percent(share, significant);
     Table::of(steps)
         .column("tolerance", "", |(name, ..)| name)
         .column("terms", "", |(_, made, _)| made.terms().after)
         .column("digits", "", |(_, made, _)| made.digits().after)
         .column("operations", "", |(_, made, _)| made.operations().after)
-        .column("certified error", "", |(_, made, _)| {
-            percent(made.largest_bound_share(), bound_words)
-        })
+        .column("certified error", "", |(_, made, _)| certified(made))
         .column("measured max", "", |(_, made, _)| {
-            percent(made.largest_measured_share(), significant)
+            measured(made.largest_measured_share())
         })
         .column("measured rms", "", |(_, made, _)| {
-            percent(made.largest_rms_share(), significant)
+            measured(made.largest_rms_share())
         })
         .column("body.x", "m", |(.., [x, _])| x[0])
         .column("body.z", "m", |(.., [_, z])| z[0])

@@ -2,7 +2,6 @@
 
 use nalgebra::DVector;
 
-use super::args::SimulateArguments;
 use super::*;
 use crate::evaluate::{Assessment, verdict_by_default};
 use crate::report::{
@@ -65,10 +64,8 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
         baseline_table(assessment)
     );
     let baselines = assessment.baselines.iter();
-    text += &lines(
-        "  ",
-        baselines.map(|of| format!("{}: {}", of.name, of.template.constants())),
-    );
+    let constants = baselines.map(|of| format!("{}: {}", of.name, of.template.constants()));
+    text += &lines("  ", constants);
     text += &format!("\n{}\n", dynamics_table(model, assessment));
     let mean_square = assessment.decoder_mean_square().map(significant);
     let mean_square = mean_square.map(|value| format!("{value} (scaled units)"));
@@ -88,11 +85,8 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     text + &lines("\nnote: ", &assessment.remarks)
 }
 
-/// One row per sample: time, phase, recorded and predicted latent state and coordinates.
-///
-/// Columns: `segment, time, phase`, then `z_i, z_i_full, z_i_restarted` for each latent coordinate, the same three of
-/// its velocity `dz_i`, the latent input `u_lat_i`, then the three of every robot coordinate in SI units. A prediction
-/// that diverged leaves its cell empty.
+/// `segment, time, phase`, then recorded, full and restarted of each latent coordinate, of its velocity, the latent
+/// input, and the three of every robot coordinate in SI units; empty after a divergence.
 fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Table, Error> {
     let thrice = |name: String| ["", "_full", "_restarted"].map(|kind| format!("{name}{kind}"));
     let latent = |name: &'static str| numbered(name, model.latent_dim());

@@ -1,6 +1,5 @@
 //! `romc study`: trainings over latent dimensions and seeds, joined and summarised.
 
-use super::args::{StudyArguments, TrainSettings};
 use super::prepared_recordings::RecordedSets;
 use super::*;
 use crate::files::check_folder;
@@ -47,12 +46,8 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
 fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     let mut settings = settings(arguments)?;
     let robot = settings.robot()?;
-    let mut recorded = RecordedSets::whole(
-        [&arguments.recordings, &arguments.validation, &[]],
-        &arguments.reading,
-        &settings,
-        robot,
-    )?;
+    let sets = [&arguments.recordings, &arguments.validation, &[][..]];
+    let mut recorded = RecordedSets::whole(sets, &arguments.reading, &settings, robot)?;
     recorded.read()?;
     recorded.report_findings();
     let [training, validation, _] = &recorded.sets;

@@ -1,7 +1,4 @@
-//! The figures of a report, from an assessment and the controller's runs.
-//!
-//! Figures of the controller's runs: torques beside the recorded ones and the limits, latent inputs, latent tracking,
-//! solve times.
+//! The figures of a report: from an assessment, from the controller's runs, from a study.
 
 use super::figures::{Drawing, HeatMap, subscript};
 use super::jump::{Jump, JumpName};
@@ -38,8 +35,7 @@ pub(crate) struct JumpFigures {
     pub body_rms_m: [Option<f64>; 2],
     pub motion: Option<(Figure, Film)>,
     pub body: Figure,
-    /// Figures to fold away, each with a title: accelerations, template models, joints, and the controller's run if
-    /// this is the first jump of a recording.
+    /// Figures to fold away, each with a title.
     pub folded: Vec<(&'static str, Figure)>,
 }
 
@@ -123,8 +119,7 @@ fn encoder(
     Ok(figure.in_columns(1, (120.0 + 40.0 * d.min(18) as f64, 330.0)))
 }
 
-/// Figures 10 (decoder error and active coefficients) and 11 (combined loss) of a study; bars are one standard
-/// deviation over the seeds to either side.
+/// Figures 10 and 11 of the paper; bars are one standard deviation over the seeds to either side.
 pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
     let legend = [
         (Role::Recorded, "mean over seeds"),
@@ -132,9 +127,7 @@ pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
     ];
     let figure = |id: &str, caption: &str, panels: Vec<Panel>| {
         let figure = Figure::over_time(id, caption, panels, &legend);
-        figure
-            .over("latent coordinates")
-            .in_columns(2, (360.0, 210.0))
+        (figure.over("latent coordinates")).in_columns(2, (360.0, 210.0))
     };
     let panel = |title: &str, bar: fn(&DimensionSummary) -> [f64; 3]| {
         let (mut means, mut bars) = (Vec::new(), Vec::new());
@@ -155,10 +148,8 @@ pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
     ];
     let combined = panel("combined loss", |row| range(row.combined_loss));
     let accuracy = "Accuracy against complexity over the latent dimension (figure 10 of the paper)";
-    let loss = format!(
-        "Combined loss 2 E_dec + 2 lambda log |Xi| with lambda = {} (figure 11 of the paper)",
-        summary.lambda
-    );
+    let (loss, lambda) = ("Combined loss 2 E_dec + 2 lambda log |Xi|", summary.lambda);
+    let loss = format!("{loss} with lambda = {lambda} (figure 11 of the paper)");
     vec![
         figure("complexity", accuracy, over_dimensions),
         figure("combined-loss", &loss, vec![combined]),

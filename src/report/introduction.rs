@@ -1,5 +1,4 @@
-//! A report's first words: what the model is fit for, which robot and recordings, whether its training saw them,
-//! errors.
+//! A report's first words: what the model is fit for, whether its training saw the recordings, errors.
 
 use std::collections::BTreeSet;
 
@@ -193,14 +192,11 @@ fn commands(content: &Content<'_>) -> Option<String> {
         let sum: f64 = recoveries.iter().map(|pair| pair[which]).sum();
         millimetres(sum / recoveries.len() as f64)
     };
-    let recovery = match recoveries.is_empty() {
-        true => String::new(),
-        false => format!(
-            " After a push of 0.1 m/s the body stays off by {} on average, and by {} with feedback off.",
-            mean(0),
-            mean(1)
-        ),
-    };
+    let recovery = (!recoveries.is_empty()).then(|| {
+        let (own, off) = (mean(0), mean(1));
+        format!(" After a push of 0.1 m/s the body stays off by {own} on average, and by {off} with feedback off.")
+    });
+    let recovery = recovery.unwrap_or_default();
     (steps > 0).then(|| {
         format!(
             "Along these recordings the latent controller solves {solved} of {steps} steps, and {limits}.{recovery}"
@@ -246,29 +242,7 @@ fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn headline_lists_what_a_model_is_fit_for_and_what_not() {
-        let uses = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-        let of = |fit: &[&str], failed: &[&str]| {
-            let verdict = Verdict {
-                fit_for: uses(fit),
-                failed: uses(failed),
-                rows: Vec::new(),
-            };
-            headline(&verdict, false)
-        };
-        let predictions = ["0.1 s", "whole motion"];
-        assert_eq!(
-            of(&predictions, &["torques", "control"]),
-            "Fit for predictions over 0.1 s and predictions of the whole motion; not fit for torques and control."
-        );
-        assert_eq!(of(&["control"], &[]), "Fit for control.");
-        assert_eq!(of(&[], &["torques"]), "Not fit for torques.");
-        assert!(of(&[], &[]).starts_with("Not judged"));
-        let doubtful = headline(&Verdict::default(), true);
-        assert!(doubtful.starts_with("Do not rely on it here"), "{doubtful}");
-    }
+#[test]
+fn a_model_without_measured_rows_is_not_judged() {
+    assert!(headline(&Verdict::default(), false).starts_with("Not judged"));
 }

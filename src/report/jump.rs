@@ -65,8 +65,6 @@ pub(super) struct Jump<'a> {
 }
 
 impl<'a> Jump<'a> {
-    /// # Errors
-    /// [`ModelError`] for a model without encoder or decoder.
     fn new(
         content: &Content<'a>,
         index: usize,
@@ -92,8 +90,7 @@ impl<'a> Jump<'a> {
 
     pub(super) fn all(content: &Content<'a>) -> Result<Vec<Self>, ModelError> {
         let runs = content.assessment.runs.iter().enumerate();
-        runs.map(|(index, run)| Self::new(content, index, run))
-            .collect()
+        (runs.map(|(index, run)| Self::new(content, index, run))).collect()
     }
 
     /// As a strip and as an animation; none without a robot.

@@ -1,14 +1,13 @@
 //! A one-page assessment of a model, its tables and its figures.
 //!
 //! An assessment and controller runs come in; a self-contained HTML page and figures leave. `introduction.rs` has the
-//! first words, `tables.rs` holds the tables, `json.rs` the same numbers for programs, `contents.rs` and `jump.rs` pick
+//! first words, `tables.rs` holds the tables and the same numbers for programs, `contents.rs` and `jump.rs` pick
 //! what is drawn, `figures/` draws it, `sections.rs` and `page.rs` place all. Start with `page.rs`. What this file
 //! imports is what its files import with `use super::*`.
 
 mod contents;
 mod figures;
 mod introduction;
-mod json;
 mod jump;
 mod page;
 mod plan;
@@ -20,13 +19,13 @@ pub(crate) use contents::{
 };
 pub(crate) use figures::{Figure, figure_files, range};
 pub(crate) use introduction::{Introduction, introduction};
-pub use json::{assessment_json, plan_json};
 pub(crate) use page::{PageOptions, page};
 pub(crate) use plan::{plan_figures, reach_figure};
 pub(crate) use tables::{
     NamedRun, baseline_table, body_rms, control_table, coordinate_table, dynamics_table,
     failed_runs, failures, invariance_table, phase_table, run_table, verdict_lines,
 };
+pub use tables::{assessment_json, plan_json};
 
 use std::path::{Path, PathBuf};
 

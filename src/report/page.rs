@@ -1,6 +1,4 @@
-//! The page: an introduction, equations, jumps, sections of words, tables and figures, placed by a template.
-//!
-//! A model's origin as tables: values by their place, and lists of objects folded away.
+//! The page: introduction, equations, jumps, sections, placed by a template; a model's origin as tables.
 
 use askama::Template;
 
@@ -17,7 +15,6 @@ use crate::typeset::{EquationSystem, Rounding, SymbolTable, Typeset, TypesetErro
 
 const WIDTH_EM: f64 = 44.0;
 
-#[derive(Debug, Clone, Default)]
 pub(crate) struct PageOptions {
     pub simplification: Vec<Table>,
     pub commands: Vec<String>,
@@ -150,8 +147,7 @@ fn add(facts: &mut Vec<(String, String)>, lists: &mut Vec<Table>, place: &str, v
             let mut table = Table::new(keys.iter().map(|key| spaced(key)));
             for item in items {
                 table.row(
-                    keys.iter()
-                        .map(|key| item.get(key.as_str()).map_or(String::new(), text)),
+                    (keys.iter()).map(|key| item.get(key.as_str()).map_or(String::new(), text)),
                 );
             }
             lists.push(table.captioned(format!("{}: {}", spaced(place), items.len())));

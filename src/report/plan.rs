@@ -1,5 +1,4 @@
-//! Figures of a planned jump: posture over time, path of the body, torques within their limits, phases; and of all the
-//! jumps that can be planned.
+//! Figures of a planned jump, and of all the jumps that can be planned.
 
 use super::*;
 use crate::model::JumpPrior;
@@ -104,17 +103,13 @@ fn torques(plan: &Plan, robot: &Robot, goal: &str) -> Figure {
 }
 
 pub(crate) fn reach_figure(reach: &GoalMap, prior: &JumpPrior) -> Figure {
-    let crosses = prior
-        .landmarks
-        .jumps
-        .iter()
-        .flat_map(|&[distance, apex, _]| {
-            let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
-            let gap = (distance, None);
-            [[-1.0, 1.0], [1.0, -1.0]]
-                .map(|[from, to]| [at(-1.0, from), at(1.0, to), gap])
-                .concat()
-        });
+    let crosses = (prior.landmarks.jumps.iter()).flat_map(|&[distance, apex, _]| {
+        let at = |x: f64, y: f64| (distance + x * CROSS_M, Some(apex + 0.25 * y * CROSS_M));
+        let gap = (distance, None);
+        [[-1.0, 1.0], [1.0, -1.0]]
+            .map(|[from, to]| [at(-1.0, from), at(1.0, to), gap])
+            .concat()
+    });
     let series = vec![
         Series::through(Role::Recorded, crosses),
         border(reach, Role::Full, &["trusted"]),

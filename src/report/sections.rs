@@ -62,7 +62,7 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
         let [x, z] = body_rms(assessment, sums).map(|rms| with(rms, 1e3, 2));
         format!("{x}, {z} mm")
     };
-    let pair = |name: &str, unit: f64| {
+    let pair = |(name, unit): (&str, f64)| {
         let row = content.verdict.rows.iter().find(|row| row.name == name);
         let row = row.map(|row| [row.value, row.baseline].map(|value| with(value, unit, 3)));
         row.map_or("-".to_owned(), |pair| pair.join(", "))
@@ -71,30 +71,19 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
     let loss = shown(assessment.combined_loss());
     let lift_r2 = assessment.lift.torque.r2().contact;
     let restarted = format!("body x, z: rms error, restarted every {every} s");
-    let tiles = [
-        (
-            "body x, z: rms error over whole jumps",
-            errors(&assessment.full),
-        ),
-        (&restarted, errors(&assessment.restarted)),
-        (
-            "torque R² in contact that the controller finds itself: worst recording; no dynamics",
-            pair(TORQUES_IN_CONTACT, 1.0),
-        ),
-        (
-            "deviation after a push, mm: worst recording; feedback off",
-            pair(AFTER_A_PUSH, 1e3),
-        ),
-        (
-            "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod",
-            format!("{d}, {terms}, {loss}"),
-        ),
-        (
-            "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact",
-            shown(lift_r2),
-        ),
+    let names = [
+        "body x, z: rms error over whole jumps",
+        &restarted,
+        "torque R² in contact that the controller finds itself: worst recording; no dynamics",
+        "deviation after a push, mm: worst recording; feedback off",
+        "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod",
+        "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact",
     ];
-    tiles.map(|(name, value)| (name.to_owned(), value)).into()
+    let [whole, restarted] = [&assessment.full, &assessment.restarted].map(errors);
+    let [torques, push] = [(TORQUES_IN_CONTACT, 1.0), (AFTER_A_PUSH, 1e3)].map(pair);
+    let size = format!("{d}, {terms}, {loss}");
+    let values = [whole, restarted, torques, push, size, shown(lift_r2)];
+    names.map(str::to_owned).into_iter().zip(values).collect()
 }
 
 pub(super) fn sections<'a>(
@@ -145,10 +134,7 @@ fn beside_pendulum(content: &Content<'_>) -> Section<'static> {
     let is_springless = baselines.iter().any(|b| b.template.stiffness_n_m == 0.0);
     let springless = is_springless.then(|| SPRINGLESS.to_owned());
     let table = baseline_table(assessment).captioned("Body position: the model and the pendulum");
-    Section::new("aslip")
-        .and(constants)
-        .and(springless)
-        .with([table])
+    (Section::new("aslip").and(constants).and(springless)).with([table])
 }
 
 fn control(content: &Content<'_>) -> Section<'static> {

@@ -4,9 +4,10 @@ use super::introduction::headline;
 use super::jump::modelled;
 use super::*;
 use crate::evaluate::{
-    AslipSums, ByContact, ControlMetrics, FitSums, Invariance, LinearisedPhase, PredictionError,
-    Run,
+    AslipSums, Baseline, ByContact, ControlMetrics, FitSums, Invariance, LinearisedPhase,
+    PredictionError, Run,
 };
+use crate::plan::{self, Plan};
 
 pub(crate) type NamedRun = (PathBuf, Run);
 
@@ -74,12 +75,9 @@ pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
     let rows = ["body.x", "body.z"].map(|name| ["whole jump", &every].map(|kind| (name, kind)));
     let rows = rows.concat().into_iter();
+    let rows = rows.map(|(name, kind)| format!("{name}, {kind}"));
     let mut table = Table::default();
-    table.column(
-        "rms error",
-        "m",
-        rows.map(|(name, kind)| format!("{name}, {kind}")),
-    );
+    table.column("rms error", "m", rows);
     let sums = [&assessment.full, &assessment.restarted];
     let mut column = |name: &str, [full, restarted]: [[Option<f64>; 2]; 2]| {
         let cells = [full[0], restarted[0], full[1], restarted[1]];
@@ -97,26 +95,17 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
     let fits = assessment.pointwise.acceleration.iter().map(FitSums::fit);
     let linearised = assessment.linearised.iter().map(Option::as_ref);
     let rows = model.phases().iter().zip(linearised).zip(fits);
-    let rank = |linear: &LinearisedPhase| {
-        format!(
-            "{} of {}",
-            linear.input_effective_rank(),
-            model.latent_dim()
-        )
-    };
+    let d = model.latent_dim();
+    let rank = |linear: &LinearisedPhase| format!("{} of {d}", linear.input_effective_rank());
     Table::of(rows.map(|((phase, linear), fit)| (phase, linear, fit)))
         .column("phase", "", |(phase, ..)| &phase.name)
-        .column("samples", "", |(_, linear, _)| {
-            linear.map_or(0, |linear| linear.samples)
-        })
+        .column("samples", "", |row| row.1.map_or(0, |of| of.samples))
         .column("active terms", "", |(phase, ..)| phase.active_count())
         .column("latent acceleration R^2", "", |(.., fit)| r2(*fit))
-        .column("largest Re of eigenvalues", "1/s", |(_, linear, _)| {
-            linear.and_then(LinearisedPhase::growth_rate)
+        .column("largest Re of eigenvalues", "1/s", |row| {
+            row.1?.growth_rate()
         })
-        .column("input gain condition", "", |(_, linear, _)| {
-            linear.and_then(LinearisedPhase::input_condition)
-        })
+        .column("input gain condition", "", |row| row.1?.input_condition())
         .column("input gain rank", "", |(_, linear, _)| linear.map(rank))
         .table()
 }
@@ -158,9 +147,7 @@ pub(crate) fn control_table(runs: &[NamedRun]) -> Table {
         .column("x one stage ahead", "mm", stage(|e| 1e3 * e.body_x_m))
         .column("z one stage ahead", "mm", stage(|e| 1e3 * e.body_z_m))
         .column("joints one stage ahead", "rad", stage(|e| e.joints_rad))
-        .column("own input: torque R^2 contact", "", |(_, row)| {
-            row.2.contact
-        })
+        .column("own input: torque R^2 contact", "", |row| row.1.2.contact)
         .column("torque R^2 flight", "", |(_, row)| row.2.flight)
         .column("off after a push", "mm", |(_, row)| row.3.map(|m| 1e3 * m))
         .table()
@@ -186,11 +173,8 @@ fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
 }
 
 fn of_runs(runs: &[NamedRun], fault: impl Fn(&Run) -> Option<String>) -> Vec<String> {
-    let faults = runs
-        .iter()
-        .filter_map(|(path, run)| Some((path, fault(run)?)));
-    let lines = faults.map(|(path, fault)| format!("{}: {fault}", file_name(path)));
-    lines.collect()
+    let line = |(path, run): &NamedRun| Some(format!("{}: {}", file_name(path), fault(run)?));
+    runs.iter().filter_map(line).collect()
 }
 
 pub(crate) fn failures(runs: &[NamedRun]) -> Vec<String> {
@@ -260,10 +244,105 @@ pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
         .column("lift R^2 contact", "", |(_, run)| run.lift_r2.contact)
         .column("lift R^2 flight", "", |(_, run)| run.lift_r2.flight)
         .column("limit violations", "", |(_, run)| run.limit_violations)
-        .column("friction violations", "", |(_, run)| {
-            run.friction_violations
-        })
+        .column("friction violations", "", |row| row.1.friction_violations)
         .column("step, median", "us", |(_, run)| whole(run.step_us.p50))
         .column("step, p99", "us", |(_, run)| whole(run.step_us.p99))
         .table()
+}
+
+/// Every metric of an assessment, under the names of the documentation; rms in the units of each coordinate.
+pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Value {
+    let (lift, lift_r2) = (&assessment.lift, assessment.lift.torque.r2());
+    json!({
+        "segments": assessment.runs.len(),
+        "restart_every_s": assessment.restart_every_s,
+        "full": rollouts_json(model, assessment, &assessment.full),
+        "restarted": rollouts_json(model, assessment, &assessment.restarted),
+        "acceleration_r2": by_phase(model, |index| {
+            let fit = assessment.pointwise.acceleration[index].fit();
+            json!(fit.and_then(|fit| fit.r2))
+        }),
+        "linearised": by_phase(model, |index| {
+            json!(assessment.linearised[index].as_ref().map(linearised_json))
+        }),
+        "decoder_mean_square_scaled": assessment.decoder_mean_square(),
+        "active_terms": assessment.active_terms,
+        "combined_loss": assessment.combined_loss(),
+        "lift": {
+            "torque_r2": {
+                "contact": lift_r2.contact,
+                "flight": lift_r2.flight,
+                "all": lift.torque.r2_all(),
+            },
+            "inconsistency": lift.inconsistency(),
+        },
+        "baselines": assessment.baselines.iter().map(baseline_json).collect::<Vec<_>>(),
+        "remarks": assessment.remarks,
+    })
+}
+
+fn by_phase(model: &ReducedModel, value: impl Fn(usize) -> Value) -> Map<String, Value> {
+    let names = model.phases().iter().map(|phase| phase.name.clone());
+    names.zip((0..).map(value)).collect()
+}
+
+fn linearised_json(phase: &LinearisedPhase) -> Value {
+    json!({
+        "samples": phase.samples,
+        "eigenvalues_per_s": phase.eigenvalues.iter().map(|v| [v.re, v.im]).collect::<Vec<_>>(),
+        "input_singular_values": phase.input_singular_values,
+        "input_condition": phase.input_condition(),
+        "input_effective_rank": phase.input_effective_rank(),
+    })
+}
+
+fn baseline_json(baseline: &Baseline) -> Value {
+    let sums = [&baseline.full, &baseline.restarted].map(template_rms);
+    let [full, restarted] = sums.map(|[x, z]| json!({ "body.x": x, "body.z": z }));
+    json!({
+        "name": baseline.name,
+        "constants": baseline.template.constants(),
+        "rms_m": { "full": full, "restarted": restarted },
+    })
+}
+
+fn rollouts_json(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    sums: &CoordinateSums,
+) -> Value {
+    let named = |fits: Vec<Option<Fit>>| -> Map<String, Value> {
+        let names = assessment.names.iter().cloned();
+        let fits = assessment.units.iter().zip(fits).map(|(unit, fit)| {
+            let (rms, r2) = (fit.map(|fit| fit.rms), fit.and_then(|fit| fit.r2));
+            json!({ "unit": unit, "rms": rms, "r2": r2 })
+        });
+        names.zip(fits).collect()
+    };
+    json!({
+        "rollouts": sums.windows,
+        "diverged": sums.diverged,
+        "coordinates": named(sums.fits()),
+        "phases": by_phase(model, |index| json!(named(sums.phase_fits(index)))),
+    })
+}
+
+/// A plan under the names of `docs/planning.md`.
+pub fn plan_json(planned: &Plan) -> Value {
+    let durations = (planned.parts.iter()).map(|part| (part.name.clone(), json!(part.duration_s)));
+    json!({
+        "distance_m": planned.reached_m[0],
+        "apex_m": planned.reached_m[1],
+        "goal_m": planned.goal_m,
+        "expected_error_m": { "distance": planned.error_m[0], "apex": planned.error_m[1] },
+        "durations_s": durations.collect::<Map<_, _>>(),
+        "cost": planned.cost,
+        "input_deviation": planned.input_deviation,
+        "extrapolates": planned.verdict != plan::Verdict::Trusted,
+        "reasons": planned.verdict.reasons(),
+        "margins": planned.margins,
+        "programs": planned.programs,
+        "solve_ms": planned.solve_ms,
+        "status": planned.verdict.word(),
+    })
 }

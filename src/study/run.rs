@@ -1,21 +1,18 @@
-//! Trains the missing cells of a study on all cores.
-//!
-//! Which trainings a study consists of.
+//! The trainings of a study, and their run on all cores.
 
 use std::io;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use serde::{Deserialize, Serialize};
-
-use super::store::Store;
-use super::summary::{Cell, Metrics, Outcome};
+use super::summary::Metrics;
+use super::*;
 use crate::limits::table::SEEDS;
 use crate::recording::Recording;
 use crate::robot::{Robot, STATE_DIM};
 use crate::train::{Method, Monitor, Origin, Recordings, TrainError, TrainOptions, Trained};
 
-/// Trains the cells of a shard that the store misses; each is kept as soon as it is finished.
+/// Trains the cells of a shard that the store misses. Seeds of the joint method are random starts; the closed form
+/// finds the same model from every start, so that its seeds leave out jumps. Where the mask leaves fewer coordinates
+/// than the latent space has, it is lifted.
 pub(crate) fn run(
     store: &Store,
     shard: Shard,
@@ -160,9 +157,7 @@ impl Shard {
         let number = |text: &str| text.parse::<usize>().map_err(|_| expected());
         let (index, count) = (number(index)?, number(count)?);
         let is_part = (1..=count).contains(&index);
-        is_part
-            .then_some(Self { index, count })
-            .ok_or_else(expected)
+        (is_part.then_some(Self { index, count })).ok_or_else(expected)
     }
 
     /// The cells of this part: every `count`-th, so that all parts have dimensions of all sizes.

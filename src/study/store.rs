@@ -2,19 +2,16 @@
 
 use std::fs;
 use std::io::{self, ErrorKind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::run::{CellId, Plan, StudyError};
-use super::summary::Cell;
+use super::*;
 use crate::files::size::{Format, read_text_capped};
 use crate::files::{Overwrite, write_whole};
 
 const PLAN: &str = "study.json";
 
-#[derive(Clone, Debug)]
 pub(crate) struct Store {
     folder: PathBuf,
     plan: Plan,
@@ -100,8 +97,7 @@ impl Store {
     }
 
     fn path(&self, CellId { latent_dim, seed }: CellId) -> PathBuf {
-        self.folder
-            .join(format!("cell-d{latent_dim:02}-s{seed:02}.json"))
+        (self.folder).join(format!("cell-d{latent_dim:02}-s{seed:02}.json"))
     }
 }
 

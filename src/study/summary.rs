@@ -1,8 +1,6 @@
 //! Outcomes of the trainings of a study, means and spreads over its seeds, and its tables.
 
-use serde::{Deserialize, Serialize};
-
-use super::run::CellId;
+use super::*;
 use crate::evaluate::combined_loss;
 use crate::train::{SetMetrics, TrainReport};
 use crate::typeset::Table;
@@ -53,8 +51,7 @@ impl Metrics {
         values.into_iter().all(f64::is_finite)
     }
 
-    /// `L_mod = 2 E_dec + 2 lambda ln |Xi|` (29), over the active coefficients of all phases; without any, the
-    /// logarithm counts as 0.
+    /// `L_mod` (29) over the active coefficients of all phases; without any, the logarithm counts as 0.
     pub(crate) fn combined_loss(&self, lambda: f64) -> f64 {
         combined_loss(self.decoder_mse, self.active_all_phases.max(1), lambda)
             .expect("at least one coefficient")

@@ -98,6 +98,20 @@ fn exit_codes_follow_the_purpose_of_each_command_and_the_verdict_is_the_same_in_
         assert_eq!(verdicts[0], verdicts[1], "{model}");
         assert_eq!(verdicts[0], verdicts[2], "{model}");
     }
+    headlines_say_it(
+        &page,
+        [
+            (MODEL, "Fit for predictions over 0.1 s, "),
+            (
+                &broken,
+                "Do not rely on it here, see the notes. Not fit for ",
+            ),
+            (
+                &doubled,
+                "Fit for torques; not fit for predictions over 0.1 s and predictions of the whole motion.",
+            ),
+        ],
+    );
     let run = romc(&["mpc", without_torques, JUMP]);
     let said = text(&run.stdout);
     assert!(said.contains("not fit for torques and control"), "{said}");
@@ -105,4 +119,73 @@ fn exit_codes_follow_the_purpose_of_each_command_and_the_verdict_is_the_same_in_
         said.contains("worse than constant velocity, does not count: error of body.pitch"),
         "{said}"
     );
+}
+
+fn headlines_say_it(page: &str, models: [(&str, &str); 3]) {
+    for (model, words) in models {
+        let run = romc(&["report", model, JUMP, "--output", page, "--force", "--json"]);
+        let answer: Value = serde_json::from_str(&text(&run.stdout)).expect("one JSON value");
+        let headline = answer["headline"].as_str().expect("words");
+        assert!(headline.starts_with(words), "{headline}");
+        assert!(headline.ends_with('.'), "{headline}");
+    }
+}
+
+/// Points of the polylines of a class in a drawing.
+fn points(drawing: &str, class: &str) -> Vec<[f64; 2]> {
+    let start = format!("<polyline class=\"{class}\" points=\"");
+    let lines = drawing.split(&start).skip(1);
+    let lines = lines.map(|rest| rest.split('"').next().expect("points"));
+    let numbers = lines.flat_map(|line| line.split([' ', ',']));
+    let numbers: Vec<f64> = numbers
+        .map(|text| text.parse().expect("a number"))
+        .collect();
+    numbers.chunks(2).map(|pair| [pair[0], pair[1]]).collect()
+}
+
+#[test]
+fn every_line_of_a_runaway_prediction_stays_inside_the_frame() {
+    let folder = folder();
+    let (broken, page, figures) = (
+        path(&folder, "broken.json"),
+        path(&folder, "page.html"),
+        path(&folder, "figures"),
+    );
+    with_xi("go1-d4", &broken, |value| -value);
+    romc(&[
+        "report",
+        &broken,
+        JUMP,
+        "--output",
+        &page,
+        "--figures",
+        &figures,
+    ]);
+    let read = |name: &str| fs::read_to_string(format!("{figures}/{name}")).expect("drawn");
+    let body = read("body_1.csv");
+    let full = body
+        .lines()
+        .filter(|line| line.contains("model, whole jump"));
+    let values = full.filter_map(|line| line.rsplit(',').next()?.parse::<f64>().ok());
+    let farthest = values.fold(0.0, |most, value| value.abs().max(most));
+    assert!(farthest > 10.0, "it runs away: {farthest}");
+    for (name, classes) in [
+        ("body_1.svg", ["recorded", "full"]),
+        ("torques_1.svg", ["recorded", "limit"]),
+    ] {
+        let drawing = read(name);
+        let number = |name: &str| -> f64 {
+            let rest = drawing.split(&format!(" {name}=\"")).nth(1).expect(name);
+            rest.split("pt\"").next().expect(name).parse().expect(name)
+        };
+        let size = [number("width"), number("height")];
+        for class in classes {
+            let points = points(&drawing, class);
+            assert!(points.len() > 10, "{name} {class}");
+            for point in points {
+                let inside = (0..2).all(|axis| (0.0..=size[axis]).contains(&point[axis]));
+                assert!(inside, "{name} {class}: {point:?} in {size:?}");
+            }
+        }
+    }
 }

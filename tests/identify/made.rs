@@ -14,7 +14,7 @@ use romc::identify::parameters::{
 use romc::identify::{Identification, IdentifyError, identify};
 use romc::recording::clock::timed;
 use romc::recording::{Recording, Segment};
-use romc::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
+use romc::robot::{BODY_Z, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 const STEP_S: f64 = 0.002;
 const MASS_KG: f64 = 11.0;
@@ -272,6 +272,54 @@ fn identify_noise_is_inside_three_standard_errors() {
         error.mass_kg < 0.02 * MASS_KG && error.gravity_m_s2 < 0.1,
         "{error:?}"
     );
+}
+
+/// The standard error of gravity that hops give which all fall by another one.
+fn gravity_error(hops: &[Segment], offsets: &[f64]) -> f64 {
+    let mut hops = hops.to_vec();
+    for (hop, offset) in hops.iter_mut().zip(offsets) {
+        for sample in 0..hop.len() {
+            hop.dx[(BODY_Z, sample)] += offset * hop.time_s[sample];
+        }
+    }
+    let found = identify(&[recording(hops)], go1()).unwrap();
+    found.standard_error.gravity_m_s2
+}
+
+#[test]
+fn identify_errors_that_a_jump_has_in_common_count_once_a_jump() {
+    let offsets = [0.1, -0.2, 0.15, -0.05, 0.1, -0.1];
+    let hops = vec![hop(0.0); 6];
+    // Deviation of the mean of independent numbers.
+    let mean = offsets.iter().sum::<f64>() / 6.0;
+    let squares = offsets.iter().map(|offset| (offset - mean).powi(2));
+    let expected = (squares.sum::<f64>() / (6.0 * 5.0)).sqrt();
+    let six = gravity_error(&hops, &offsets);
+    assert!((0.8..1.3).contains(&(six / expected)), "{six} {expected}");
+    // Of fewer jumps, and of six of which one has more than a third of all equations, blocks alone are left out.
+    let five = gravity_error(&hops[..5], &offsets);
+    let mut uneven = vec![hops[0].clone()];
+    uneven.resize(6, hops[0].slice(0..240));
+    let uneven = gravity_error(&uneven, &offsets);
+    for blocks in [five, uneven] {
+        assert!(blocks < 0.6 * expected, "{blocks} {expected}");
+    }
+}
+
+#[test]
+fn identify_errors_that_jumps_do_not_have_in_common_count_once_a_block() {
+    let mut seed = 1_u32;
+    let mut noise = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / f64::from(1_u32 << 23) - 1.0
+    };
+    let mut hops = vec![hop(0.0); 6];
+    for hop in &mut hops {
+        (hop.dx.rows_mut(JOINT_DIM, 3)).apply(|rate| *rate += 0.004 * noise());
+    }
+    let blocks = gravity_error(&hops[..5], &[0.0; 5]) * (5.0_f64 / 6.0).sqrt();
+    let six = gravity_error(&hops, &[0.0; 6]);
+    assert!((0.6..2.0).contains(&(six / blocks)), "{six} {blocks}");
 }
 
 #[test]

@@ -280,22 +280,12 @@ pub(crate) struct PlanArguments {
     /// Model file with `landmarks` and `prior`, as `romc train` writes them
     pub model: PathBuf,
     /// Distance of the body from start to end, in metres
-    #[arg(
-        long,
-        value_name = "M",
-        value_parser = real(&DISTANCE),
-        allow_negative_numbers = true,
-        required_unless_present = "reach"
-    )]
+    #[arg(long, value_name = "M", value_parser = real(&DISTANCE), required_unless_present = "reach")]
+    #[arg(allow_negative_numbers = true)]
     pub distance: Option<f64>,
     /// Rise of the body above its height at the start, in metres
-    #[arg(
-        long,
-        value_name = "M",
-        value_parser = real(&APEX),
-        allow_negative_numbers = true,
-        required_unless_present = "reach"
-    )]
+    #[arg(long, value_name = "M", value_parser = real(&APEX), required_unless_present = "reach")]
+    #[arg(allow_negative_numbers = true)]
     pub apex: Option<f64>,
     /// Start from the first sample of this recording (default: the mean start of the training jumps)
     #[arg(long, value_name = "RECORDING")]
@@ -345,12 +335,8 @@ pub(crate) struct ReportArguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = real(&RESTART_EVERY))]
     pub restart_every: f64,
     /// List what simplification within this error changes: 1% or 0.05, as in `romc compile`
-    #[arg(
-        long,
-        value_name = "ERROR",
-        default_value = "1%",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "ERROR", default_value = "1%")]
+    #[arg(allow_negative_numbers = true)]
     pub tolerance: Tolerance,
     /// Replace an existing page, or write into a folder that holds files romc did not make
     #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]

@@ -20,13 +20,8 @@ pub(crate) struct CompileArguments {
     /// Model file
     pub model: PathBuf,
     /// Targets, separated by commas
-    #[arg(
-        long,
-        value_enum,
-        value_name = "TARGET",
-        value_delimiter = ',',
-        default_value = "latex,c,rust"
-    )]
+    #[arg(long, value_enum, value_name = "TARGET")]
+    #[arg(value_delimiter = ',', default_value = "latex,c,rust")]
     pub emit: Vec<Target>,
     /// Folder for the emitted files
     #[arg(long, value_name = "DIR")]
@@ -117,24 +112,15 @@ pub(crate) struct EquationArguments {
 pub(crate) struct SimplifyArguments {
     /// Drop and round terms as long as no ddz is off by more than this anywhere in the domain: 1% (of its root mean
     /// square over the recordings) or 0.05 (scaled units per s^2); nothing changes at 0
-    #[arg(
-        long,
-        value_name = "ERROR",
-        requires = "domain",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "ERROR", requires = "domain")]
+    #[arg(allow_negative_numbers = true)]
     pub tolerance: Option<Tolerance>,
     /// Recordings whose bounding box in each phase is the domain; or one .toml file of ranges
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     pub domain: Vec<PathBuf>,
     /// How far the domain reaches beyond the recordings, as a share of each variable's range (0.1 unless given)
-    #[arg(
-        long,
-        value_name = "SHARE",
-        value_parser = real(&MARGIN),
-        requires = "domain",
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "SHARE", value_parser = real(&MARGIN))]
+    #[arg(requires = "domain", allow_negative_numbers = true)]
     pub margin: Option<f64>,
     /// Also write the simplified model to this file
     #[arg(long, value_name = "MODEL.json", requires = "domain")]

@@ -1,13 +1,8 @@
 //! Flags that a command would ignore beside its other arguments, refused as wrong usage.
-//!
-//! What files would have to be read for, such as settings of a training, is refused or noted by the command itself.
 
 use std::path::Path;
 
-use super::{
-    Arguments, Command, CompileArguments, ImportArguments, InspectArguments, ReadingArguments,
-};
-use super::{CheckArguments, UnitsChoice};
+use super::*;
 use crate::Error;
 use crate::artifact::is_standard_input;
 use crate::codegen::{Precision, SineCosine};
@@ -16,7 +11,7 @@ use crate::import::Format;
 use crate::mpc::Lift;
 
 impl Arguments {
-    pub fn refuse_idle(&self) -> Result<(), Error> {
+    pub(crate) fn refuse_idle(&self) -> Result<(), Error> {
         match &self.command {
             Command::Compile(arguments) => of_compile(arguments),
             Command::Inspect(arguments) => of_inspect(arguments),

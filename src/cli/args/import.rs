@@ -124,12 +124,8 @@ pub(crate) struct ImportArguments {
     #[arg(long)]
     pub name: Option<String>,
     /// Free text about the model
-    #[arg(
-        long,
-        value_name = "TEXT",
-        default_value = "",
-        hide_default_value = true
-    )]
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    #[arg(hide_default_value = true)]
     pub description: String,
     /// Replace an existing output file
     #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]

@@ -1,6 +1,4 @@
-//! The command line's grammar: the commands, their options, and an example for each.
-//!
-//! The command line enters; [`Arguments`] leaves, with everything checked that needs no file. Read `command.rs` first.
+//! The command line's grammar: commands, options, an example for each. Read `command.rs` first.
 
 mod command;
 mod compile;
@@ -10,13 +8,9 @@ mod train;
 mod value;
 
 pub use command::Arguments;
-pub(crate) use command::{
-    CheckArguments, Command, CompletionsArguments, ConvertArguments, DemoArguments,
-    IdentifyArguments, InspectArguments, ManualArguments, MpcArguments, PlanArguments,
-    ReportArguments, RobotArguments, SimulateArguments,
-};
+pub(crate) use command::*;
 pub use compile::UnitsChoice;
-pub(crate) use compile::{CompileArguments, SimplifyArguments};
-pub(crate) use import::{ImportArguments, LibraryArgument};
-pub(crate) use train::{PhaseSet, StudyArguments, TrainArguments, TrainSettings, Widths};
+pub(crate) use compile::*;
+pub(crate) use import::*;
+pub(crate) use train::*;
 pub(crate) use value::ReadingArguments;

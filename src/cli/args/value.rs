@@ -30,9 +30,7 @@ pub(super) fn finite(range: &'static Range) -> impl Fn(&str) -> Result<Finite, S
 pub(super) fn choice<T: Copy + Send + Sync>(
     table: &'static [(&'static str, &'static str, T)],
 ) -> impl TypedValueParser<Value = T> {
-    let names = table
-        .iter()
-        .map(|(name, help, _)| PossibleValue::new(*name).help(*help));
+    let names = (table.iter()).map(|(name, help, _)| PossibleValue::new(*name).help(*help));
     PossibleValuesParser::new(names).map(|found| {
         let row = table.iter().find(|(name, ..)| *name == found);
         row.expect("clap accepts names of the table alone").2

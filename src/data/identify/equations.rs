@@ -13,19 +13,14 @@
 //! Velocities of directions follow from the recorded rates; accelerations are differences of velocities, those of the
 //! recording included, so that all carry the same errors.
 
-use nalgebra::{DMatrix, Matrix3, Rotation3, Unit, Vector3};
+use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-use super::parameters::{
-    ARMATURE, CALF, CALF_FRONT, CALF_SECOND, DELAY, DRY, FOOT_RADIUS, GRAVITY, INVERSE_MASS,
-    LEG_SIDE, PARAMETER_DIM, ROLLING, THIGH, THIGH_FRONT, THIGH_SECOND, TRUNK_FORWARD, TRUNK_UP,
-    VISCOUS,
-};
-use crate::recording::Segment;
+use super::parameters::{CALF_FRONT, FOOT_RADIUS, ROLLING, THIGH_FRONT, TRUNK_FORWARD, TRUNK_UP};
+use super::*;
 use crate::recording::preprocess::differences;
 use crate::recording::segment::between;
+use crate::robot::LegLinks;
 use crate::robot::input_rule::DRY_SPEED_RAD_S;
-use crate::robot::joints::LEG_JOINT_DIM;
-use crate::robot::{JOINT_DIM, Leg, LegLinks, Robot};
 
 pub(crate) const LEAST_MANIPULABILITY: f64 = 0.04;
 const ROLLING_SPEED_RAD_S: f64 = 0.05;
@@ -54,9 +49,7 @@ pub struct SampleEquations {
 }
 
 impl SampleEquations {
-    /// The equations of a segment whose torques run `delay_s` ahead of its motion.
-    ///
-    /// `gravity_m_s2` is used only for the weight of the links of a leg.
+    /// Torques run `delay_s` ahead of the motion; `gravity_m_s2` is used only for the weight of the links of a leg.
     pub fn of(
         segment: &Segment,
         motion: &Motion,
@@ -206,7 +199,7 @@ impl LegSample {
     }
 }
 
-/// Torques at the joints per unit of each unknown of [`OWN`]: a mass at `s` from a point that accelerates by `a` needs the moment `s x (a + s'')`.
+/// Per unit of each of [`OWN`]: a mass at `s` from a point that accelerates by `a` needs the moment `s x (a + s'')`.
 fn own_torques(
     robot: &Robot,
     motion: &Motion,

@@ -1,31 +1,21 @@
-//! From recordings to an [`Identification`]: equations, fit and delay in turn until they agree.
-//!
-//! Whether recordings are of one robot: each jump's torques bear its weight, it falls in flight, and its mass is that
-//! of the others.
-//!
-//! A payload that all recordings have is no contradiction; one log without torques, or of another robot, is.
+//! From recordings to an [`Identification`]: equations, fit and delay in turn until they agree; and whether recordings
+//! are of one robot: torques bear its weight, it falls in flight, and its mass is that of the others.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
-use std::path::Path;
 
-use super::equations::{Motion, SampleEquations};
-use super::error::IdentifyError;
+use thiserror::Error;
+
+use super::equations::Motion;
 use super::fit::{Estimate, Iteration, explained, force_alone};
-use super::identification::{
-    Fit, ForceAlone, Identification, Legs, PerKind, Samples, StandardError,
-};
-use super::parameters::{
-    ARMATURE, CALF, CALF_SECOND, DELAY, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
-    THIGH_SECOND, VISCOUS, priors,
-};
-use super::windows::{Group, Row, Windows};
-use crate::recording::Recording;
+use super::identification::{ForceAlone, Samples};
+use super::parameters::priors;
+use super::windows::Windows;
+use super::*;
 use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
 use crate::recording::mismatch::{Balance, contradiction};
 use crate::recording::preprocess::median;
-use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
+use crate::recording::{Recording, RecordingError};
 
 const LEAST_CONTACT_SAMPLES: usize = 100; // fewest samples with feet on the ground
 const LEAST_WINDOWS: usize = 30; // fewest windows with moving legs; there are 23 unknowns
@@ -336,7 +326,7 @@ fn refused(recording: &Recording, segment: Option<usize>, found: String) -> Iden
     }
 }
 
-/// Mass of each segment by its vertical acceleration in contact, and its standard error as a share (jackknife over blocks).
+/// Mass of each segment by its vertical acceleration in contact, and its standard error as a share (jackknife).
 fn masses(windows: &Windows, estimate: &Estimate) -> Vec<(usize, f64, f64)> {
     let mut blocks = vec![(0.0, 0.0); windows.blocks.len()];
     let upwards = (windows.rows.iter()).filter(|row| row.group == Group::Contact(2));
@@ -364,4 +354,45 @@ fn masses(windows: &Windows, estimate: &Estimate) -> Vec<(usize, f64, f64)> {
         is_known.then(|| (segment, 1.0 / inverse, variance.sqrt() / inverse))
     };
     (0..segments).filter_map(of_segment).collect()
+}
+
+/// Why recordings do not say what the robot is, or a file does not.
+#[derive(Debug, Error)]
+pub enum IdentifyError {
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    #[error(
+        "{recordings} recordings: found {found} samples with feet on the ground that are 20 ms \
+         away from a change of feet and from a singular leg, expected at least {expected}"
+    )]
+    Contact {
+        recordings: usize,
+        found: usize,
+        expected: usize,
+    },
+    #[error(
+        "{recordings} recordings: found {found} windows of 30 ms in which the legs move, expected \
+         at least {expected}; a robot that stands still does not show its losses"
+    )]
+    Still {
+        recordings: usize,
+        found: usize,
+        expected: usize,
+    },
+    #[error(
+        "the trunk's acceleration does not follow the feet's forces: found {inverse:.3e} as \
+         1/mass, expected about {expected:.3e} 1/kg; are signs, units and order of the \
+         torques those of `{robot}`?"
+    )]
+    Mass {
+        inverse: f64,
+        expected: f64,
+        robot: String,
+    },
+    #[error(
+        "{recording}: {found}; expected recordings of one robot with its torques: leave this one out, or use it alone"
+    )]
+    Contradiction { recording: String, found: String },
+    #[error(transparent)]
+    File(#[from] Located<Fault>),
 }

@@ -1,14 +1,12 @@
-//! Weighted least squares with losses that are not negative, and honest standard errors.
-//!
-//! Rows of a group (contact, flight, joints in the air; by axis or kind) share one residual deviation, estimated with
-//! the unknowns; residuals beyond three deviations count less (Huber). Residuals of neighbouring windows are alike, and
-//! those of one jump may be, so standard errors come from leaving out blocks of 0.1 s in turn and, where there are
-//! enough, whole jumps (jackknife).
+//! Weighted least squares with losses that are not negative. Rows of a group share one residual deviation, estimated
+//! with the unknowns; residuals beyond three deviations count less (Huber). Standard errors come from leaving out
+//! blocks of 0.1 s in turn and, where there are enough, whole jumps (jackknife).
 
-use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{Cholesky, DVector, SMatrix, SVector};
 
-use super::parameters::{DELAY, GRAVITY, INVERSE_MASS, PARAMETER_DIM, Prior, not_negative};
-use super::windows::{Group, OVERLAP, Row};
+use super::parameters::{Prior, not_negative};
+use super::windows::OVERLAP;
+use super::*;
 
 pub(crate) type Estimate = SVector<f64, PARAMETER_DIM>;
 type Square = SMatrix<f64, PARAMETER_DIM, PARAMETER_DIM>;
@@ -116,7 +114,7 @@ fn left(row: &Row, mass_kg: f64) -> f64 {
 }
 
 impl Iteration {
-    /// Solves once, then takes the deviations of the new residuals. `None` if the equations are singular with the priors.
+    /// Solves once, then takes the deviations of the new residuals. `None` if singular even with the priors.
     pub(crate) fn step(&mut self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Option<()> {
         let normal = self.normal(rows, priors, mass_kg);
         let (estimate, _) = normal.solve_not_negative()?;
@@ -189,10 +187,7 @@ impl Iteration {
     }
 
     fn normal(&self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Normal {
-        let mut normal = self
-            .normals(rows, mass_kg, |_| 0, 1)
-            .next()
-            .unwrap_or_default();
+        let mut normal = (self.normals(rows, mass_kg, |_| 0, 1).next()).unwrap_or_default();
         for prior in priors {
             let weight = (mass_kg / prior.deviation).powi(2);
             for (i, a) in &prior.terms {

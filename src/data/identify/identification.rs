@@ -1,17 +1,10 @@
-//! The result: what a robot is by its recordings.
-//!
-//! An identification as a TOML file.
-
-use std::fmt::Write as _;
-use std::path::Path;
-
-use super::error::IdentifyError;
-use crate::files::{Fault, Located, Place, read_toml};
-use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES};
+//! What a robot is by its recordings, also as a TOML file.
 
 use serde::{Deserialize, Serialize};
 
-use crate::robot::joints::LEG_JOINT_DIM;
+use super::*;
+use crate::files::{Place, read_toml};
+use crate::robot::JOINT_NAMES;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -167,54 +160,54 @@ impl Identification {
 impl Identification {
     pub fn to_toml(&self) -> String {
         let (error, alone) = (&self.standard_error, &self.force_alone);
-        let mut out = String::from(
-            "# What `romc identify` found in recordings. SI units: m, s, kg, N m, rad.\n",
-        );
-        for note in &self.notes {
-            let _ = writeln!(out, "# {}", note.replace(['\n', '\r'], " "));
-        }
-        let _ = writeln!(out, "robot = {:?}", self.robot);
-        numbers(&mut out, &gravity_and_mass(self.gravity_m_s2, self.mass_kg));
-        numbers(&mut out, &[("delay_s", self.delay_s)]);
-        let _ = writeln!(out, "\n# {}\n[actuators]", JOINT_NAMES.join(" "));
-        for (name, values) in self.actuators.named() {
-            let _ = writeln!(out, "{name} = [{}]", values.map(number).join(", "));
-        }
-        table(&mut out, "legs", &legs(&self.legs));
-        table(
-            &mut out,
-            "standard_error",
-            &gravity_and_mass(error.gravity_m_s2, error.mass_kg),
-        );
-        numbers(&mut out, &[("delay_s", error.delay_s)]);
-        for (name, kinds) in [
+        let body = |gravity, mass, delay: Option<f64>| {
+            let known = gravity_and_mass(gravity, mass).into_iter();
+            entries(known.chain(delay.map(|delay| ("delay_s", delay))))
+        };
+        let fit = |fit: Fit| entries([("x", fit.x), ("z", fit.z)]);
+        let actuators = (self.actuators.named())
+            .map(|(name, values)| format!("{name} = [{}]\n", values.map(number).join(", ")));
+        let losses = [
             ("viscous_nm_s_rad", error.viscous_nm_s_rad),
             ("dry_nm", error.dry_nm),
             ("armature_kg_m2", error.armature_kg_m2),
-        ] {
+        ];
+        let losses = losses.map(|(name, kinds)| {
             let [hx, hy, kn] = kinds.to_array().map(number);
-            let _ = writeln!(out, "{name} = {{ hx = {hx}, hy = {hy}, kn = {kn} }}");
-        }
-        table(&mut out, "standard_error.legs", &legs(&error.legs));
-        table(&mut out, "r2", &fit(self.r2));
-        table(
-            &mut out,
-            "force_alone",
-            &gravity_and_mass(alone.gravity_m_s2, alone.mass_kg),
-        );
-        table(&mut out, "force_alone.r2", &fit(alone.r2));
+            format!("{name} = {{ hx = {hx}, hy = {hy}, kn = {kn} }}\n")
+        });
+        let errors = body(error.gravity_m_s2, error.mass_kg, Some(error.delay_s));
         let Samples { contact, flight } = self.samples;
-        let _ = writeln!(out, "\n[samples]\ncontact = {contact}\nflight = {flight}");
+        let mut out = String::from(
+            "# What `romc identify` found in recordings. SI units: m, s, kg, N m, rad.\n",
+        );
+        let notes = self.notes.iter();
+        out.extend(notes.map(|note| format!("# {}\n", note.replace(['\n', '\r'], " "))));
+        out += &format!("robot = {:?}\n", self.robot);
+        out += &body(self.gravity_m_s2, self.mass_kg, Some(self.delay_s));
+        out += &format!("\n# {}", JOINT_NAMES.join(" "));
+        for (name, entries) in [
+            ("actuators", actuators.concat()),
+            ("legs", legs(&self.legs)),
+            ("standard_error", errors + &losses.concat()),
+            ("standard_error.legs", legs(&error.legs)),
+            ("r2", fit(self.r2)),
+            ("force_alone", body(alone.gravity_m_s2, alone.mass_kg, None)),
+            ("force_alone.r2", fit(alone.r2)),
+            (
+                "samples",
+                format!("contact = {contact}\nflight = {flight}\n"),
+            ),
+        ] {
+            out += &format!("\n[{name}]\n{entries}");
+        }
         out
     }
 
     /// Reads a file of [`Identification::to_toml`] without its notes.
     pub fn read(path: &Path) -> Result<Self, IdentifyError> {
         let file = path.display().to_string();
-        let action = "read";
-        let refused = |source| -> Located<Fault> {
-            Located::new(&file, Place::Whole, Fault::Io { action, source })
-        };
+        let refused = |source| Located::<Fault>::io(&file, "read", source);
         Self::from_toml(&file, &read_toml(path).map_err(refused)?)
     }
 
@@ -255,29 +248,19 @@ fn gravity_and_mass(gravity_m_s2: f64, mass_kg: f64) -> [Entry; 2] {
     [("gravity_m_s2", gravity_m_s2), ("mass_kg", mass_kg)]
 }
 
-fn legs(legs: &Legs) -> [Entry; 5] {
-    [
+fn legs(legs: &Legs) -> String {
+    entries([
         ("side_kg_m", legs.side_kg_m),
         ("thigh_kg_m", legs.thigh_kg_m),
         ("calf_kg_m", legs.calf_kg_m),
         ("thigh_kg_m2", legs.thigh_kg_m2),
         ("calf_kg_m2", legs.calf_kg_m2),
-    ]
+    ])
 }
 
-fn fit(fit: Fit) -> [Entry; 2] {
-    [("x", fit.x), ("z", fit.z)]
-}
-
-fn table(out: &mut String, name: &str, entries: &[Entry]) {
-    let _ = writeln!(out, "\n[{name}]");
-    numbers(out, entries);
-}
-
-fn numbers(out: &mut String, entries: &[Entry]) {
-    for (name, value) in entries {
-        let _ = writeln!(out, "{name} = {}", number(*value));
-    }
+fn entries(entries: impl IntoIterator<Item = Entry>) -> String {
+    let lines = (entries.into_iter()).map(|(name, value)| format!("{name} = {}\n", number(value)));
+    lines.collect()
 }
 
 /// Six significant digits, spelled as TOML has floating-point numbers.

@@ -1,10 +1,9 @@
 //! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia.
 //!
 //! Enters: recordings and the robot's geometry. Leaves: an [`Identification`], each value with its standard error, and
-//! the file that keeps it. [`motion`] has the directions of the links and their accelerations, [`equations`] the linear
-//! equations that these obey at every sample, `windows` their averages, `fit` the weighted least squares, `estimate`
-//! the loop around it, `agreement` the refusal of recordings that contradict each other. Read `estimate` first;
-//! `docs/identify.md` has the method and measured figures.
+//! the file that keeps it. [`equations`] has the linear equations of every sample, `windows` their averages, `fit` the
+//! weighted least squares, `estimate` the loop around it and the refusal of recordings that contradict each other. Read
+//! `estimate` first; `docs/identify.md` has the method and measured figures.
 //!
 //! ```
 //! use std::path::Path;
@@ -23,12 +22,26 @@
 pub mod equations;
 pub mod parameters;
 
-mod error;
 mod estimate;
 mod fit;
 mod identification;
 mod windows;
 
-pub use error::IdentifyError;
-pub use estimate::identify;
+pub use estimate::{IdentifyError, identify};
 pub use identification::{Fit, Identification, Legs, PerKind, StandardError};
+
+use std::ops::Range;
+use std::path::Path;
+
+use nalgebra::DMatrix;
+
+use crate::files::{Fault, Located};
+use crate::recording::Segment;
+use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
+use equations::SampleEquations;
+use parameters::{
+    ARMATURE, CALF, CALF_SECOND, DELAY, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
+    THIGH_SECOND, VISCOUS,
+};
+use windows::{Group, Row};

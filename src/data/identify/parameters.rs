@@ -1,5 +1,4 @@
-//! The unknowns of the regression, in the order of the columns. All but gravity stand in the equations divided by the
-//! robot's mass.
+//! Columns of the regression. All but gravity stand in the equations divided by the robot's mass.
 
 use crate::robot::LegGeometry;
 
@@ -28,7 +27,6 @@ pub(crate) fn not_negative() -> impl Iterator<Item = usize> {
 }
 
 /// A wide deviation of a linear combination about zero: it matters where the recordings leave a direction open.
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prior {
     pub terms: Vec<(usize, f64)>, // coefficients by unknown
     pub deviation: f64,
@@ -81,6 +79,5 @@ pub(crate) fn priors(
         (terms, relative * losses[first + 1].max(smallest))
     });
     let all = singles.into_iter().chain(rods).chain(hips);
-    all.map(|(terms, deviation)| Prior { terms, deviation })
-        .collect()
+    (all.map(|(terms, deviation)| Prior { terms, deviation })).collect()
 }

@@ -1,20 +1,9 @@
-//! Equations of samples averaged over short windows within one stance.
-//!
-//! The same average is taken on both sides of every equation, so it stays an equation, and noise of differences of
-//! velocities is averaged out. No window crosses a change of the feet on the ground or comes near one: impacts are not
-//! what torques explain.
+//! Equations averaged over short windows within one stance, away from impacts: noise of differences is averaged out.
 
-use std::ops::Range;
-
-use nalgebra::DMatrix;
-
-use super::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
-use super::error::IdentifyError;
-use super::parameters::PARAMETER_DIM;
-use crate::recording::Segment;
+use super::equations::{BODY_ROWS, JOINT_ROWS, joint_unknowns};
+use super::*;
 use crate::recording::preprocess::SavitzkyGolay;
 use crate::recording::segment::stretches;
-use crate::robot::JOINT_DIM;
 
 const WINDOW_S: f64 = 0.03; // length of a window, s
 const MARGIN_S: f64 = 0.02; // distance of windows from a change of the feet on the ground, s
@@ -49,7 +38,6 @@ impl Group {
     }
 }
 
-#[derive(Debug, Clone)]
 pub(crate) struct Row {
     pub coefficients: [f64; PARAMETER_DIM],
     pub left: f64, // left side: m/s^2, or N m for a joint
@@ -58,7 +46,7 @@ pub(crate) struct Row {
     pub moving: bool, // whether joints move enough for their friction to have a direction
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Default)]
 pub(crate) struct Windows {
     pub rows: Vec<Row>,
     pub blocks: Vec<usize>, // the segment that each block lies in, counted from zero
@@ -114,7 +102,7 @@ impl Windows {
         Ok(())
     }
 
-    /// Groups of blocks that are left out in turn for standard errors: single blocks, and whole jumps where there are enough.
+    /// Blocks that are left out in turn for standard errors: single ones, and whole jumps where there are enough.
     pub(crate) fn groupings(&self) -> Vec<Vec<usize>> {
         let mut groupings = vec![(0..self.blocks.len()).collect()];
         let mut counts = vec![0; self.segments];

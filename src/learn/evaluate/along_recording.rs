@@ -2,33 +2,15 @@
 //!
 //! This is not a closed loop, the robot does not feel the commands. It asks what the controller would have commanded
 //! where the robot really was, and compares with what was commanded then.
-//!
-//! ```
-//! use std::path::Path;
-//! use romc::evaluate::{ReferenceInput, along_recording};
-//! use romc::mpc::{Controller, MpcSettings};
-//!
-//! let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-//! let model = romc::artifact::read(&root.join("models/go1-d4.json"))?;
-//! let jump = romc::recording::read(&root.join("examples/recordings/go1/test_01.csv.gz"))?;
-//! let mut controller = romc::mpc::controller(&model, MpcSettings::default())?;
-//! let run = along_recording(&mut controller, &jump, ReferenceInput::Recorded, |_, _| {})?;
-//! assert_eq!(run.summary.limit_violations, 0);
-//! assert!(run.summary.torque_r2.contact > Some(0.85));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::control_metrics::{ControlMetrics, Summary, Tally};
-use super::torque::{Comparison, exceeds, is_plausible};
-use crate::mpc::{
-    Command, Controller, Lift, Measurement, MpcError, ReferenceSamples, STEP_SLACK, StanceState,
-    foot_forces, to_upright,
-};
-use crate::recording::{Recording, Segment};
-use crate::robot::{GRAVITY_M_S2, JOINT_DIM, STATE_DIM};
+use super::control_metrics::Tally;
+use super::coordinates::exceeds;
+use super::*;
+use crate::mpc::{Lift, ReferenceSamples, StanceState, foot_forces, to_upright};
+use crate::robot::GRAVITY_M_S2;
 
 /// Where the controller's input reference comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
@@ -81,16 +63,11 @@ impl Run {
     }
 }
 
-/// Runs the controller along a recording, one segment after the other.
-///
-/// Recorded torques beyond twice the robot's limits are no torques of the robot: steps with one are left out of the
-/// comparison and counted. As reference input torques are clamped to the limits. `progress(done, total)` is called once
-/// a control step.
-///
+/// Runs the controller along a recording, one segment after the other. Recorded torques beyond twice the robot's limits
+/// are left out of the comparison and counted. `progress(done, total)` is called once per control step.
 /// # Errors
-/// Those of [`Controller::set_reference`], [`MpcError::Step`] if the controller's step is shorter than the recording's,
-/// [`MpcError::NoStep`] if no segment is as long as one step, and [`MpcError::Recording`] if the recording's inputs
-/// cannot be computed.
+/// Those of [`Controller::set_reference`], [`MpcError::Step`], [`MpcError::NoStep`] for segments that are all shorter
+/// than one step, [`MpcError::Recording`].
 pub fn along_recording(
     controller: &mut Controller,
     recording: &Recording,
@@ -144,11 +121,7 @@ pub fn along_recording(
     })
 }
 
-/// R² of the torques that the controller's lift makes of exactly projected recorded inputs, at every sample: what the
-/// lift alone loses.
-///
-/// # Errors
-/// [`MpcError::Recording`] if the recording's inputs cannot be computed.
+/// The torques that the lift makes of exactly projected recorded inputs, at every sample: what the lift alone loses.
 pub fn lift_comparison(
     controller: &mut Controller,
     recording: &Recording,

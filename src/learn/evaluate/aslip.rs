@@ -1,16 +1,12 @@
 //! Template models that a learned model is compared with: the actuated spring-loaded inverted pendulum, equations (27)
 //! and (28), with the published constants and with fitted ones.
 
-use nalgebra::{DMatrix, DVector, Rotation3, Vector2, Vector3};
+use nalgebra::{Rotation3, Vector2};
 
-use super::coordinates::FitSums;
+use super::*;
 use crate::recording::segment::between;
-use crate::recording::{RecordingError, Segment};
-use crate::robot::{BODY_X, BODY_Z, InputRule, JOINT_DIM, Leg, Robot, WrenchFrame};
-use crate::sim::{
-    IntegrationOptions, OdeSystem, Restart, SimError, integrate, integrate_stretches,
-    restart_windows,
-};
+use crate::robot::{InputRule, WrenchFrame};
+use crate::sim::{IntegrationOptions, OdeSystem, integrate, integrate_stretches, restart_windows};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aslip {
@@ -49,13 +45,7 @@ impl Aslip {
         }
     }
 
-    /// Rolls the pendulum out over a segment, from the recorded state at each start.
-    ///
-    /// The pendulum is driven by the same forces as a learned model of this rule, in the world's axes, and switches
-    /// between contact and flight as recorded.
-    ///
-    /// # Errors
-    /// [`SimError::Recording`] if an angle or torque is not finite.
+    /// Rolls the pendulum out, driven by the same forces as a learned model of this rule, in the world's axes.
     pub fn rollout(
         &self,
         rule: &InputRule,
@@ -212,9 +202,6 @@ pub struct Baseline {
 
 impl Baseline {
     /// The pendulum with the published constants, and with those that `segments` fit best.
-    ///
-    /// # Errors
-    /// [`RecordingFault::Wrench`](crate::recording::RecordingFault::Wrench) if an angle or torque is not finite.
     pub fn all(rule: &InputRule, segments: &[&Segment]) -> Result<Vec<Self>, RecordingError> {
         let published = ("ASLIP, published constants", Aslip::PUBLISHED);
         let fitted = fit_aslip(rule, segments)?.map(|fitted| ("ASLIP, fitted constants", fitted));
@@ -229,9 +216,6 @@ impl Baseline {
     }
 
     /// Adds the residuals over one segment; the rollout over the whole of it is returned.
-    ///
-    /// # Errors
-    /// As [`Aslip::rollout`].
     pub fn add(
         &mut self,
         rule: &InputRule,
@@ -246,12 +230,8 @@ impl Baseline {
     }
 }
 
-/// Constants of the pendulum that fit the recorded accelerations in contact best; gravity stays.
-///
-/// With `a = k_s / m`, `b = a l_0` and `c = 1 / m`, equation (27) is linear: `ddx = a (p_f,x - x) + c F_x` and `ddz + g
-/// = a (p_f,z - z) + b + c F_z`; `a`, `b`, `c` minimise the squared residuals over all samples with a foot down. A
-/// spring that pushes away (`a <= 0`) is no spring: it is left out, and only the mass is fitted. None without contact,
-/// or where the forces say nothing about a mass.
+/// Constants that fit the recorded accelerations in contact best: `ddx = a (p_f,x - x) + c F_x` and `ddz + g = a (p_f,z
+/// - z) + b + c F_z` with `a = k_s / m`, `b = a l_0`, `c = 1 / m`. A spring that pushes away (`a <= 0`) is left out.
 fn fit_aslip(rule: &InputRule, segments: &[&Segment]) -> Result<Option<Aslip>, RecordingError> {
     let published = Aslip::PUBLISHED;
     let (mut rows, mut right) = (Vec::new(), Vec::new());

@@ -1,14 +1,9 @@
-use super::aslip::{AslipRollout, Baseline};
-use super::coordinates::{CoordinateSums, Fit, FitSums, PointwiseSums};
-use super::prediction::{LinearisedPhase, linearise_phases};
-use super::torque::{LAMBDA, LiftSums, combined_loss};
-use crate::lower::{CompiledModel, LowerError};
-use crate::model::{ModelError, ReducedModel};
-use crate::mpc::MpcError;
+use super::aslip::AslipRollout;
+use super::coordinates::LiftSums;
+use super::*;
+use crate::lower::LowerError;
 use crate::recording::mismatch::notes;
-use crate::recording::{Recording, RecordingError, Segment};
-use crate::robot::Robot;
-use crate::sim::{LatentSegment, Restart, Rollout, SimError, rollout};
+use crate::sim::rollout;
 
 #[derive(Debug, Clone)]
 pub struct SegmentRun<'a> {
@@ -40,15 +35,11 @@ pub struct Assessment<'a> {
 
 impl<'a> Assessment<'a> {
     /// Simulates `model` over all segments of `recordings` and measures it.
-    ///
-    /// # Errors
-    /// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] and [`EvaluateError::Recording`] for
-    /// samples that cannot be encoded or integrated.
     pub fn over(
         model: &ReducedModel,
         recordings: &'a [Recording],
         restart_every_s: f64,
-    ) -> Result<Self, EvaluateError> {
+    ) -> Result<Self> {
         let segments: Vec<&Segment> = (recordings.iter())
             .flat_map(|recording| &recording.segments)
             .collect();
@@ -117,15 +108,9 @@ impl<'a> Assessment<'a> {
     }
 }
 
-/// What speaks against using a model on these recordings: recordings that cannot be of its robot ([`notes`]), and
-/// accelerations that it does not explain at all.
-///
-/// # Errors
-/// [`EvaluateError::Model`] for a latent-only model, [`EvaluateError::Sim`] for samples that cannot be encoded.
-pub fn remarks(
-    model: &ReducedModel,
-    recordings: &[Recording],
-) -> Result<Vec<String>, EvaluateError> {
+/// What speaks against using a model on these recordings: they are not of its robot ([`notes`]), or it does not explain
+/// their accelerations at all.
+pub fn remarks(model: &ReducedModel, recordings: &[Recording]) -> Result<Vec<String>> {
     let robot = model.robot()?;
     let mut pointwise = PointwiseSums::new(model);
     let segments = recordings.iter().flat_map(|recording| &recording.segments);
@@ -137,10 +122,10 @@ pub fn remarks(
     Ok((of_recordings.chain(unexplained(model, &pointwise))).collect())
 }
 
-/// How far `R^2` of accelerations may be below that of the training; single jumps of another controller are up to 1.1 below.
+/// `R^2` of accelerations below that of the training; single jumps of another controller are up to 1.1 below.
 const BELOW_TRAINING: f64 = 1.5;
 
-/// Accelerations explained worse than by their mean, and than in training; in flight they hardly vary, so it is left out.
+/// Accelerations explained worse than by their mean and than in training; in flight they hardly vary.
 fn unexplained(model: &ReducedModel, pointwise: &PointwiseSums) -> Vec<String> {
     let accelerations = pointwise.acceleration.iter().map(FitSums::r2);
     let phases = model.phases().iter().zip(accelerations).enumerate();

@@ -1,12 +1,7 @@
-//! Latent accelerations along recordings with the coefficients of an imported model read in other ways: their terms in
-//! another order, those of two phases exchanged, or fitted anew.
+//! Coefficients of an imported model read in other ways: terms in another order, two phases exchanged, or fitted anew.
 
-use nalgebra::DMatrix;
-
-use super::assessment::EvaluateError;
-use crate::model::{LibraryChoice, LibraryOrder, ModelError, ReducedModel};
-use crate::recording::Segment;
-use crate::sim::LatentSegment;
+use super::*;
+use crate::model::LibraryChoice;
 
 const SAMPLES: usize = 1000;
 /// R^2 of latent accelerations at which a reading explains that those of another were worse.
@@ -45,7 +40,7 @@ impl CoefficientTrials {
         segments: &[&Segment],
         order: Option<LibraryOrder>,
         tensors: Tensors<'_>,
-    ) -> Result<Self, EvaluateError> {
+    ) -> Result<Self> {
         let samples = samples(model, segments)?;
         let readings = readings(model, order)?;
         let n = model.phases().len();
@@ -176,10 +171,7 @@ fn option(model: &ReducedModel, order: LibraryOrder) -> String {
     }
 }
 
-fn samples(
-    model: &ReducedModel,
-    segments: &[&Segment],
-) -> Result<Vec<PhaseSamples>, EvaluateError> {
+fn samples(model: &ReducedModel, segments: &[&Segment]) -> Result<Vec<PhaseSamples>> {
     let d = model.latent_dim();
     let total: usize = segments.iter().map(|segment| segment.len()).sum();
     let every = total.div_ceil(SAMPLES).max(1);
@@ -207,8 +199,7 @@ fn samples(
     samples.collect()
 }
 
-/// R^2 of all accelerations, deviations taken from the mean of each in its phase; none where the coefficients or the
-/// deviations are none, or a value is not finite.
+/// R^2 of all accelerations; none without coefficients or deviations, or if a value is not finite.
 fn r2(samples: &[PhaseSamples], xi: impl Fn(usize) -> Option<DMatrix<f64>>) -> Option<f64> {
     let (mut residual, mut deviation) = (0.0, 0.0);
     for (phase, (theta, ddz)) in samples.iter().enumerate() {

@@ -1,10 +1,7 @@
-//! Root mean square and coefficient of determination, of one number and of the robot's coordinates in SI units.
+//! Root mean square and coefficient of determination, of one number, of the robot's coordinates
+//! in SI units, and of torques.
 
-use nalgebra::DVector;
-
-use crate::model::{ModelError, ReducedModel};
-use crate::recording::Segment;
-use crate::sim::{LatentSegment, Rollout};
+use super::*;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
@@ -33,7 +30,7 @@ impl FitSums {
         self.deviation_square += from_old_mean * (recorded - self.mean);
     }
 
-    /// Adds the pairs of `other`, deviations taken from its own mean: differences between means do not count as explained.
+    /// Adds the pairs of `other`; differences between the means of the two do not count as explained.
     pub fn merge_keeping_means(&mut self, other: &Self) {
         self.count += other.count;
         self.residual_square += other.residual_square;
@@ -93,10 +90,6 @@ pub struct CoordinateSums {
 }
 
 impl CoordinateSums {
-    /// Sums for a model's coordinates, all empty.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model.
     pub fn new(model: &ReducedModel) -> Result<Self, ModelError> {
         let state_dim = model.decoder_map()?.output_dim();
         Ok(Self {
@@ -108,9 +101,6 @@ impl CoordinateSums {
     }
 
     /// Decodes a rollout of `segment`, encoded as `latent`, and adds its residuals.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model.
     pub fn add_rollout(
         &mut self,
         model: &ReducedModel,
@@ -158,10 +148,6 @@ impl CoordinateSums {
         self.sums.iter().map(FitSums::fit).collect()
     }
 
-    /// Fit of each coordinate over the samples of one phase.
-    ///
-    /// # Panics
-    /// If the model has no such phase.
     pub fn phase_fits(&self, phase: usize) -> Vec<Option<Fit>> {
         self.by_phase[phase].iter().map(FitSums::fit).collect()
     }
@@ -183,10 +169,6 @@ impl PointwiseSums {
         }
     }
 
-    /// Adds a segment.
-    ///
-    /// # Errors
-    /// [`ModelError::Missing`] for a latent-only model.
     pub fn add(
         &mut self,
         model: &ReducedModel,
@@ -215,4 +197,128 @@ impl PointwiseSums {
         }
         Ok(())
     }
+}
+
+const IMPLAUSIBLE: f64 = 2.0;
+
+/// Whether recorded torques can be the robot's; samples with others count in no figure of torques.
+pub fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
+    !exceeds(torque_nm, robot.torque_limit_nm(), IMPLAUSIBLE)
+}
+
+pub(super) fn exceeds(
+    torque_nm: &[f64; JOINT_DIM],
+    limits: &[f64; JOINT_DIM],
+    factor: f64,
+) -> bool {
+    let mut pairs = torque_nm.iter().zip(limits);
+    pairs.any(|(torque, limit)| torque.is_nan() || torque.abs() > factor * limit)
+}
+
+/// A figure for samples with and without ground contact; none where there were too few.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct ByContact {
+    pub contact: Option<f64>,
+    pub flight: Option<f64>,
+}
+
+type JointSums = [FitSums; JOINT_DIM];
+
+/// Running sums of a comparison of torques, contact and flight apart and together.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Comparison {
+    contact: JointSums,
+    flight: JointSums,
+    all: JointSums,
+}
+
+impl Comparison {
+    pub fn add(
+        &mut self,
+        feet: ContactFlags,
+        predicted: &[f64; JOINT_DIM],
+        recorded: &[f64; JOINT_DIM],
+    ) {
+        let of_phase = match feet.contains(&true) {
+            true => &mut self.contact,
+            false => &mut self.flight,
+        };
+        for sums in [of_phase, &mut self.all] {
+            for ((sums, recorded), predicted) in sums.iter_mut().zip(recorded).zip(predicted) {
+                sums.add(*recorded, *predicted);
+            }
+        }
+    }
+
+    /// Over all joints, `1 − Σ_k Σ_j (τ_kj − τ̂_kj)² / Σ_k Σ_j (τ̂_kj − mean_j)²` with `τ̂` recorded.
+    pub fn r2(&self) -> ByContact {
+        ByContact {
+            contact: FitSums::jointly(&self.contact).r2(),
+            flight: FitSums::jointly(&self.flight).r2(),
+        }
+    }
+
+    pub fn r2_all(&self) -> Option<f64> {
+        FitSums::jointly(&self.all).r2()
+    }
+
+    pub fn rms(&self) -> Option<f64> {
+        FitSums::jointly(&self.all).fit().map(|fit| fit.rms)
+    }
+}
+
+const SMALL_FORCE_N: f64 = 1.0;
+
+/// `u_lat = pinv(W_e^T) s_u u`, `u_lift = W_e^T u_lat / s_u` per sample, joint losses added to the lifted torques.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LiftSums {
+    pub torque: Comparison,
+    inconsistency: Mean,
+}
+
+impl LiftSums {
+    /// Adds every sample of a segment whose torques can be the robot's.
+    pub(super) fn add(&mut self, model: &ReducedModel, segment: &Segment) -> Result<(), SimError> {
+        let robot = model.robot()?;
+        let rule = model.input_rule()?;
+        let input = segment.input(&rule)?;
+        let losses = segment.losses(&rule);
+        for sample in 0..segment.len() {
+            let torque = segment.torque(sample);
+            if !is_plausible(robot, &torque) {
+                continue;
+            }
+            let x = segment.x.column(sample).into_owned();
+            let tangent = model.tangent(&x)?;
+            let lifted = tangent.lift * (tangent.project * input.column(sample));
+            let feet = segment.feet[sample];
+            let of_joints = std::array::from_fn(|joint| lifted[joint] + losses[(joint, sample)]);
+            self.torque.add(feet, &of_joints, &torque);
+            if feet.contains(&true) {
+                let torque = std::array::from_fn(|joint| lifted[joint]);
+                let force = lifted.rows(JOINT_DIM, 6).into_owned();
+                if let Ok(produced) = rule.wrench(&segment.state(sample), &torque, feet)
+                    && force.norm() > SMALL_FORCE_N
+                {
+                    let off = (&force - produced).norm() / force.norm();
+                    self.inconsistency.add(off);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Mean of `|F_lift - G tau_lift| / |F_lift|` over samples with a foot down.
+    pub fn inconsistency(&self) -> Option<f64> {
+        self.inconsistency.get()
+    }
+}
+
+/// The published weight of complexity in the combined loss (29).
+pub const LAMBDA: f64 = 0.001;
+
+/// `L_mod = 2 E_dec + 2 lambda ln |Xi|` (equation 29); none for a model without terms.
+pub fn combined_loss(decoder_mean_square: f64, active_terms: usize, lambda: f64) -> Option<f64> {
+    let logarithm = (active_terms > 0).then(|| (active_terms as f64).ln())?;
+    Some(2.0 * decoder_mean_square + 2.0 * lambda * logarithm)
 }

@@ -1,14 +1,9 @@
-//! What a model says of physics that is known: where the robot stands does not matter, bodies fall, forces accelerate
-//! masses, left is like right.
-//!
-//! All figures follow from the model file alone, so they are there for imported models as well. A state is the posture
-//! that the decoder gives for `z = 0`, at rest and at 1 m/s along x, y and z; the input is the phase's mean.
+//! What a model says of known physics, from its file alone: invariance to shifts, gravity, mass, left and right. A
+//! state is the posture decoded from `z = 0`, at rest and at 1 m/s along x, y and z; the input is the phase's mean.
 
-use nalgebra::{DMatrix, DVector, SVector, SymmetricEigen};
-use serde::Serialize;
+use nalgebra::{SVector, SymmetricEigen};
 
-use crate::model::{ModelError, ReducedModel};
-use crate::robot::{BODY_X, BODY_Z, ContactFlags, JOINT_DIM, Leg, STATE_DIM};
+use super::*;
 
 const SHIFT_M: f64 = 0.3;
 const OFF_RAD: f64 = 0.1;
@@ -32,21 +27,16 @@ pub struct PhaseInvariance {
     /// Change of the body's acceleration for a robot 0.3 m further on, (m/s^2)/m.
     pub shift_x: f64,
     pub shift_y: f64,
-    /// Largest difference of forward and upward acceleration between a state with one joint off by 0.1 rad and its
-    /// mirror image, m/s^2.
+    /// Largest difference between a state with one joint off by 0.1 rad and its mirror image, m/s^2.
     pub mirror_asymmetry: f64,
 }
 
 impl Invariance {
-    /// Of a model over the robot's coordinates; `None` without encoder, decoder, scaling or robot.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] if the Jacobian of an encoder with layers lacks rank where the model is asked.
+    /// `None` without encoder, decoder, scaling or robot.
     pub fn of(model: &ReducedModel) -> Result<Option<Self>, ModelError> {
         match Self::of_complete(model) {
-            Ok(invariance) => Ok(Some(invariance)),
             Err(ModelError::Missing { .. }) => Ok(None),
-            Err(error) => Err(error),
+            invariance => invariance.map(Some),
         }
     }
 
@@ -54,7 +44,7 @@ impl Invariance {
         let rest = model.decode(&DVector::zeros(model.latent_dim()))?;
         model.robot()?;
         let phases = 0..model.phases().len();
-        let phases = phases.map(|phase| PhaseInvariance::of(model, phase, &rest));
+        let phases = phases.map(|phase| Probe::new(model, phase, &rest).invariance());
         let [gravity_m_s2, mass_kg] = by_height(model, &rest)?;
         let mut moved = rest.clone();
         moved[BODY_X] += SHIFT_M;
@@ -69,45 +59,86 @@ impl Invariance {
     }
 }
 
-impl PhaseInvariance {
-    fn of(model: &ReducedModel, phase: usize, rest: &DVector<f64>) -> Result<Self, ModelError> {
-        let input = mean_input(model, phase);
+/// A phase, the posture of `z = 0`, and the phase's mean training input (zero if the model has none), SI.
+struct Probe<'m> {
+    model: &'m ReducedModel,
+    phase: usize,
+    rest: &'m DVector<f64>,
+    input: DVector<f64>,
+}
+
+impl<'m> Probe<'m> {
+    fn new(model: &'m ReducedModel, phase: usize, rest: &'m DVector<f64>) -> Self {
+        let statistics = model.input_statistics(phase);
+        Self {
+            model,
+            phase,
+            rest,
+            input: statistics.map_or(DVector::zeros(STATE_DIM), |known| known.mean.clone()),
+        }
+    }
+
+    /// Latent acceleration, scaled units, at a state and an input of the robot, SI.
+    fn ddz(&self, [x, dx, u]: [&DVector<f64>; 3]) -> Result<DVector<f64>, ModelError> {
+        let tangent = self.model.tangent(x)?;
+        let (dz, u_lat) = (&tangent.encode * dx, &tangent.project * u);
+        (self.model).ddz(self.phase, &self.model.encode(x)?, &dz, &u_lat)
+    }
+
+    /// The same at rest.
+    fn ddz_at_rest(&self, u: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+        self.ddz([self.rest, &DVector::zeros(STATE_DIM), u])
+    }
+
+    fn invariance(&self) -> Result<PhaseInvariance, ModelError> {
+        let (model, rest, input) = (self.model, self.rest, &self.input);
         // Linear acceleration of the body, m/s^2.
         let accelerated = |x: &DVector<f64>, dx: &DVector<f64>, u: &DVector<f64>| {
-            let ddz = latent_acceleration(model, phase, [x, dx, u])?;
             let decoder = model.decoder_jacobian(&model.encode(x)?)?;
-            Ok::<_, ModelError>(decoder.rows(BODY_X, 3) * ddz)
+            Ok::<_, ModelError>(decoder.rows(BODY_X, 3) * self.ddz([x, dx, u])?)
         };
         let mut shifts = [0.0_f64; 2];
         for velocity in velocities() {
-            let here = accelerated(rest, &velocity, &input)?;
+            let here = accelerated(rest, &velocity, input)?;
             for (axis, shift) in shifts.iter_mut().enumerate() {
                 let mut moved = rest.clone();
                 moved[BODY_X + axis] += SHIFT_M;
-                let there = accelerated(&moved, &velocity, &input)?;
+                let there = accelerated(&moved, &velocity, input)?;
                 *shift = larger(*shift, (there - &here).norm() / SHIFT_M);
             }
         }
         let mut mirror_asymmetry = 0.0_f64;
-        let still = DVector::zeros(STATE_DIM);
-        for joint in 0..JOINT_DIM {
-            for moving in [false, true] {
-                let (mut x, mut dx) = (rest.clone(), still.clone());
-                let off = if moving { &mut dx } else { &mut x };
-                off[joint] += OFF_RAD;
-                let seen = accelerated(&x, &dx, &input)?;
-                let image = accelerated(&mirrored(&x), &mirrored(&dx), &mirrored(&input))?;
-                let difference = (seen[0] - image[0]).hypot(seen[2] - image[2]);
-                mirror_asymmetry = larger(mirror_asymmetry, difference);
-            }
+        for (joint, moving) in (0..JOINT_DIM).flat_map(|joint| [(joint, false), (joint, true)]) {
+            let (mut x, mut dx) = (rest.clone(), DVector::zeros(STATE_DIM));
+            let off = if moving { &mut dx } else { &mut x };
+            off[joint] += OFF_RAD;
+            let seen = accelerated(&x, &dx, input)?;
+            let image = accelerated(&mirrored(&x), &mirrored(&dx), &mirrored(input))?;
+            let difference = (seen[0] - image[0]).hypot(seen[2] - image[2]);
+            mirror_asymmetry = larger(mirror_asymmetry, difference);
         }
         let [shift_x, shift_y] = shifts;
-        Ok(Self {
-            phase: model.phases()[phase].name.clone(),
+        Ok(PhaseInvariance {
+            phase: model.phases()[self.phase].name.clone(),
             shift_x,
             shift_y,
             mirror_asymmetry,
         })
+    }
+
+    /// By how much `ddz` changes with each of `(z, dz, u_lat)`, `latent_dim x 3 latent_dim`, by differences over a unit.
+    fn gain(&self, ddz: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
+        let (model, d) = (self.model, self.model.latent_dim());
+        let u_lat = &model.tangent(self.rest)?.project * &self.input;
+        let z = model.encode(self.rest)?;
+        let mut out = DMatrix::zeros(d, 3 * d);
+        for column in 0..3 * d {
+            let mut point = [z.clone(), DVector::zeros(d), u_lat.clone()];
+            point[column / d][column % d] += 1.0;
+            let [z, dz, u_lat] = &point;
+            out.set_column(column, &(model.ddz(self.phase, z, dz, u_lat)? - ddz));
+        }
+        Ok(out)
     }
 }
 
@@ -129,24 +160,7 @@ fn velocities() -> [DVector<f64>; 4] {
     })
 }
 
-/// Mean training input of a phase, SI; zero if the model has none.
-fn mean_input(model: &ReducedModel, phase: usize) -> DVector<f64> {
-    let statistics = model.input_statistics(phase);
-    statistics.map_or(DVector::zeros(STATE_DIM), |known| known.mean.clone())
-}
-
-fn latent_acceleration(
-    model: &ReducedModel,
-    phase: usize,
-    [x, dx, u]: [&DVector<f64>; 3],
-) -> Result<DVector<f64>, ModelError> {
-    let tangent = model.tangent(x)?;
-    let (dz, u_lat) = (&tangent.encode * dx, &tangent.project * u);
-    model.ddz(phase, &model.encode(x)?, &dz, &u_lat)
-}
-
-/// The mirror image of a state, a velocity or an input: legs change sides; abduction, y, roll and yaw (and the force
-/// and moments that go with them) change sign.
+/// Legs change sides; abduction, y, roll and yaw, and the force and moments that go with them, change sign.
 fn mirrored(vector: &DVector<f64>) -> DVector<f64> {
     let mut image = vector.clone();
     for leg in Leg::ALL {
@@ -182,10 +196,9 @@ fn by_height(model: &ReducedModel, rest: &DVector<f64>) -> Result<[Option<f64>; 
     let projector = SymmetricEigen::new(DMatrix::identity(d, d) - &inverse * &body);
     let free: Vec<usize> = (0..d).filter(|&i| projector.eigenvalues[i] > 0.5).collect();
     let others = projector.eigenvectors.select_columns(&free);
-    let input = mean_input(model, phase);
-    let still = DVector::zeros(STATE_DIM);
-    let ddz = latent_acceleration(model, phase, [rest, &still, &input])?;
-    let change = gain(model, phase, rest, &input, &ddz)?.transpose();
+    let probe = Probe::new(model, phase, rest);
+    let ddz = probe.ddz_at_rest(&probe.input)?;
+    let change = probe.gain(&ddz)?.transpose();
     let inverse = || (&change * &others).pseudo_inverse(1e-9 * change.amax());
     let combination = match (!free.is_empty()).then(inverse) {
         Some(Ok(inverse)) => &particular - &others * (inverse * (&change * &particular)),
@@ -197,26 +210,6 @@ fn by_height(model: &ReducedModel, rest: &DVector<f64>) -> Result<[Option<f64>; 
         Some(gravity_m_s2).filter(|value| value.is_finite()),
         mass_kg,
     ])
-}
-
-/// By how much `ddz` changes with each of `(z, dz, u_lat)`, `latent_dim x 3 latent_dim`, by differences over a unit.
-fn gain(
-    model: &ReducedModel,
-    phase: usize,
-    rest: &DVector<f64>,
-    input: &DVector<f64>,
-    ddz: &DVector<f64>,
-) -> Result<DMatrix<f64>, ModelError> {
-    let d = model.latent_dim();
-    let (z, u_lat) = (model.encode(rest)?, &model.tangent(rest)?.project * input);
-    let mut out = DMatrix::zeros(d, 3 * d);
-    for column in 0..3 * d {
-        let mut point = [z.clone(), DVector::zeros(d), u_lat.clone()];
-        point[column / d][column % d] += 1.0;
-        let [z, dz, u_lat] = &point;
-        out.set_column(column, &(model.ddz(phase, z, dz, u_lat)? - ddz));
-    }
-    Ok(out)
 }
 
 fn mass_kg(
@@ -242,11 +235,9 @@ fn mass_kg(
     };
     let mut u = DVector::zeros(STATE_DIM);
     u.rows_mut(0, JOINT_DIM).copy_from_slice(&newton);
-    u.rows_mut(JOINT_DIM, STATE_DIM - JOINT_DIM)
-        .copy_from(&wrench);
-    let input = mean_input(model, phase);
-    let still = DVector::zeros(STATE_DIM);
-    let at = |u: &DVector<f64>| latent_acceleration(model, phase, [rest, &still, u]);
-    let change = combination.dot(&(at(&(&input + &u))? - at(&input)?));
+    (u.rows_mut(JOINT_DIM, STATE_DIM - JOINT_DIM)).copy_from(&wrench);
+    let probe = Probe::new(model, phase, rest);
+    let pushed = probe.ddz_at_rest(&(&probe.input + &u))?;
+    let change = combination.dot(&(pushed - probe.ddz_at_rest(&probe.input)?));
     Ok(Some(1.0 / change).filter(|mass| mass.is_finite()))
 }

@@ -14,22 +14,35 @@ mod control_metrics;
 mod coordinates;
 mod invariance;
 mod prediction;
-mod recovery;
 mod round_trip;
-mod torque;
 mod verdict;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipSums, Baseline};
 pub use assessment::{Assessment, EvaluateError, SegmentRun, remarks};
 pub use control_metrics::{ControlMetrics, Summary, control_metrics, usual_settings};
-pub use coordinates::{CoordinateSums, Fit, FitSums, PointwiseSums};
+pub use coordinates::{
+    ByContact, Comparison, CoordinateSums, Fit, FitSums, LAMBDA, PointwiseSums, combined_loss,
+    is_plausible,
+};
 pub use invariance::Invariance;
 pub(crate) use prediction::state_matrix;
 pub use prediction::{LinearisedPhase, PredictionError, eigenvalues, linearise_phases};
 pub use round_trip::RoundTrip;
-pub use torque::{ByContact, Comparison, LAMBDA, combined_loss, is_plausible};
 pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use serde::Serialize;
+
+use crate::lower::CompiledModel;
+use crate::model::{LibraryOrder, ModelError, ReducedModel};
+use crate::mpc::{Command, Controller, Measurement, MpcError, STEP_SLACK};
+use crate::recording::{Recording, RecordingError, Segment};
+use crate::robot::{BODY_X, BODY_Z, ContactFlags, JOINT_DIM, Leg, Robot, STATE_DIM};
+use crate::sim::{LatentSegment, Restart, Rollout, SimError};
+use coordinates::Mean;
+
+type Result<T, E = EvaluateError> = std::result::Result<T, E>;
 
 /// A recording below `examples/recordings`, such as `go1/test_01`.
 #[cfg(test)]

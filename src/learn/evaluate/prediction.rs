@@ -1,17 +1,9 @@
-//! Predictions one stage ahead: the recorded state and input in, where the robot is one control step later out; and the
-//! no-dynamics baseline: the same maps, and latent inputs that accelerate their own coordinate.
-//!
-//! The phases' linearisations at their mean point: stability and gain of the inputs.
+//! Predictions one stage ahead, their no-dynamics baseline, and the phases' linearisations at their mean point.
 
-use nalgebra::{Complex, DMatrix, DVector, Schur};
-use serde::Serialize;
+use nalgebra::{Complex, Schur};
 
-use super::assessment::EvaluateError;
-use crate::lower::CompiledModel;
-use crate::model::{Library, Phase, ReducedModel};
-use crate::recording::Recording;
-use crate::robot::{BODY_Z, JOINT_DIM};
-use crate::sim::LatentSegment;
+use super::*;
+use crate::model::{Library, Phase};
 
 /// Root mean squares of predicted minus recorded positions one stage ahead, both decoded from latent positions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,14 +20,13 @@ pub struct PredictionError {
 }
 
 impl PredictionError {
-    /// Mean over the latent positions of this error as a share of another's; coordinates without a latent one do not count.
+    /// Mean over the latent positions of this error as a share of another's.
     pub(super) fn share_of(&self, other: &Self) -> f64 {
         let shares = self.latent.iter().zip(&other.latent);
         shares.map(|(own, other)| own / other).sum::<f64>() / self.latent.len() as f64
     }
 }
 
-#[derive(Debug, Clone)]
 pub(super) struct RecordedStage {
     pub phase: usize,
     pub duration_s: f64,
@@ -49,7 +40,7 @@ pub(super) fn recorded_stages(
     model: &ReducedModel,
     recording: &Recording,
     step_s: f64,
-) -> Result<Vec<RecordedStage>, EvaluateError> {
+) -> Result<Vec<RecordedStage>> {
     let mut stages = Vec::new();
     for segment in &recording.segments {
         let latent = LatentSegment::encode(model, segment)?;
@@ -81,21 +72,19 @@ pub(super) fn prediction_error(
     maps: &ReducedModel,
     dynamics: Option<&ReducedModel>,
     stages: &[RecordedStage],
-) -> Result<Option<PredictionError>, EvaluateError> {
+) -> Result<Option<PredictionError>> {
     let mut compiled = dynamics.map(CompiledModel::new).transpose()?;
     let mut squares = DVector::zeros(maps.decoder_map()?.output_dim());
     let mut latent = DVector::zeros(maps.latent_dim());
     for stage in stages {
         let (mut z, mut dz) = stage.start.clone();
+        let (u_lat, step_s) = (stage.input.as_slice(), stage.duration_s);
         match &mut compiled {
-            None => z += &dz * stage.duration_s,
-            Some(compiled) => compiled.rk4_step(
-                stage.phase,
-                z.as_mut_slice(),
-                dz.as_mut_slice(),
-                stage.input.as_slice(),
-                stage.duration_s,
-            ),
+            None => z += &dz * step_s,
+            Some(compiled) => {
+                let (z, dz) = (z.as_mut_slice(), dz.as_mut_slice());
+                compiled.rk4_step(stage.phase, z, dz, u_lat, step_s);
+            }
         }
         let error = maps.decode(&z)? - maps.decode(&stage.end.0)?;
         squares += error.component_mul(&error);
@@ -115,11 +104,8 @@ pub(super) fn prediction_error(
     }))
 }
 
-/// A copy of a model with `ddz = g u_lat`, `g` of each phase the least-squares fit to these stages: right scale, nothing else.
-pub(super) fn uninformed(
-    model: &ReducedModel,
-    stages: &[RecordedStage],
-) -> Result<ReducedModel, EvaluateError> {
+/// A copy of a model with `ddz = g u_lat`, `g` of each phase the least-squares fit to these stages.
+pub(super) fn uninformed(model: &ReducedModel, stages: &[RecordedStage]) -> Result<ReducedModel> {
     let d = model.latent_dim();
     let terms: Vec<String> = (1..=d).map(|latent| format!("u{latent}")).collect();
     let library = Library::from_terms(d, &terms).expect("invariant: inputs are terms");
@@ -186,15 +172,13 @@ impl LinearisedPhase {
     }
 }
 
-/// Each phase, linearised at the mean `(z, dz, u_lat)` of its samples; none without samples, or with a Jacobian that is not finite.
+/// Each phase, linearised at the mean of its samples; none without samples, or if its Jacobian is not finite.
 pub fn linearise_phases(
     model: &CompiledModel,
     segments: &[&LatentSegment],
 ) -> Vec<Option<LinearisedPhase>> {
     let mut model = model.clone();
-    (0..model.n_phases())
-        .map(|phase| linearise_phase(&mut model, segments, phase))
-        .collect()
+    ((0..model.n_phases()).map(|phase| linearise_phase(&mut model, segments, phase))).collect()
 }
 
 fn linearise_phase(
@@ -244,7 +228,7 @@ pub(crate) fn state_matrix(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
     state
 }
 
-/// Eigenvalues of a square matrix; none if an entry is not finite. Small entries count as 0 where the iteration does not converge.
+/// None if an entry is not finite. Small entries count as 0 where the iteration does not converge otherwise.
 pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     if matrix.iter().any(|value| !value.is_finite()) {
         return None;

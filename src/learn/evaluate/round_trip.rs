@@ -1,15 +1,8 @@
-//! Whether a model made elsewhere fits recordings: what its maps and equations miss before anything is integrated, and
-//! which usual slip explains it.
+//! Whether a model made elsewhere fits recordings before anything is integrated, or which usual slip explains it.
 
-use nalgebra::DVector;
-
-use super::assessment::EvaluateError;
 use super::coefficient_trials::{CoefficientTrials, GOOD_R2, Tensors};
-use super::coordinates::{FitSums, PointwiseSums};
-use crate::model::{CoordinateOrder, LibraryOrder, ModelError, ReducedModel, StateMap};
-use crate::recording::Segment;
-use crate::robot::STATE_DIM;
-use crate::sim::LatentSegment;
+use super::*;
+use crate::model::{CoordinateOrder, StateMap};
 
 const SAMPLES: usize = 240;
 /// Relative error beyond which maps do not fit: that of an answer that never changes.
@@ -25,11 +18,9 @@ const UNEXPLAINED: f64 = 0.3;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoundTrip {
-    /// Mean square of `decode(encode(x)) - x` over the mean square of the deviation of `x` from its mean, all
-    /// coordinates in the model's scaled units.
+    /// Mean square of `decode(encode(x)) - x` over that of the deviation of `x` from its mean, scaled units.
     pub error: f64,
-    /// The slip under which `error` is smallest, if it explains the error: the option of an import that mends it, in
-    /// words.
+    /// What explains the error, in words with the option of an import that mends it, and the error then.
     pub slip: Option<(String, f64)>,
     /// Name of each phase and R^2 of its latent accelerations; none without samples of it.
     pub acceleration_r2: Vec<(String, Option<f64>)>,
@@ -50,17 +41,14 @@ enum ScalingSlip {
 }
 
 impl RoundTrip {
-    /// Looks at an imported model along the recordings that came with it; none without recordings or without both maps.
-    /// `order` is that of a standard library's terms in the file, `tensors` has the names of tensors by their parts.
-    ///
-    /// # Errors
-    /// [`EvaluateError`] for a model without robot, or inputs that cannot be computed.
+    /// None without recordings or without both maps. `order` is that of a standard library's terms in the file,
+    /// `tensors` has the names of tensors by their parts.
     pub fn of_import(
         model: &ReducedModel,
         segments: &[&Segment],
         order: Option<LibraryOrder>,
         tensors: Tensors<'_>,
-    ) -> Result<Option<Self>, EvaluateError> {
+    ) -> Result<Option<Self>> {
         let (Ok(encoder), Ok(decoder)) = (model.encoder_map(), model.decoder_map()) else {
             return Ok(None);
         };
@@ -95,12 +83,7 @@ impl RoundTrip {
         self.error <= LARGEST_ERROR && self.slip.is_none()
     }
 
-    fn equations_fit(&self) -> bool {
-        self.all_acceleration_r2.is_none_or(|r2| r2 >= 0.0)
-    }
-
-    /// Whether the model is not to be taken: its maps miss the recordings, or a slip explains why its equations do.
-    /// Equations that miss them for no known reason may be right for other motions.
+    /// Equations that miss the recordings for no known reason may be right for other motions.
     pub fn is_refused(&self) -> bool {
         !self.maps_fit() || self.acceleration_slip.is_some()
     }
@@ -120,7 +103,9 @@ impl RoundTrip {
                 ),
             });
         }
-        if self.equations_fit() && self.acceleration_slip.is_none() {
+        // Equations that say no more of the accelerations than a constant do not fit.
+        let equations_fit = self.all_acceleration_r2.is_none_or(|r2| r2 >= 0.0);
+        if equations_fit && self.acceleration_slip.is_none() {
             return None;
         }
         let r2 = self.all_acceleration_r2.unwrap_or(f64::NAN);
@@ -206,8 +191,7 @@ impl<'m> Samples<'m> {
         }
     }
 
-    /// Mean square of the round trip's residual over that of the deviation, where file coordinates follow from recorded
-    /// ones by a slip: `y_k = factor_k (x_order(k) - mean_order(k))`.
+    /// [`RoundTrip::error`] where `y_k = factor_k (x_order(k) - mean_order(k))`.
     fn error(&self, (order, scaling): &Slip) -> Result<f64, ModelError> {
         let same = std::array::from_fn(|k| k);
         let order = order.as_ref().map_or(same, |order| *order.places());
@@ -279,7 +263,7 @@ fn accelerations(
     segments: &[&Segment],
     input_factor: f64,
     mean: &DVector<f64>,
-) -> Result<Accelerations, EvaluateError> {
+) -> Result<Accelerations> {
     let mut sums = PointwiseSums::new(model);
     for segment in segments {
         let mut latent = LatentSegment::encode(model, segment)?;
@@ -299,7 +283,7 @@ fn acceleration_slip(
     model: &ReducedModel,
     segments: &[&Segment],
     mean: &DVector<f64>,
-) -> Result<Option<(String, f64)>, EvaluateError> {
+) -> Result<Option<(String, f64)>> {
     let still = &DVector::zeros(STATE_DIM);
     let factors = [0.001, 0.01, 0.1, 10.0, 100.0, 1000.0];
     let slips = factors.map(|factor| {

@@ -1,21 +1,9 @@
-//! What a model is fit for: figures that depend on its dynamics, each compared with a baseline and a threshold.
-//!
-//! An [`Assessment`] and the controller's figures along recordings enter, a [`Verdict`] leaves. Each row has a use; a
-//! model is fit for a use if no counted row of it fails.
+//! What a model is fit for: rows that compare a figure with a baseline and a threshold, for a use each.
 
-use serde::Serialize;
-
-use super::assessment::{Assessment, EvaluateError};
-use super::control_metrics::{ControlMetrics, control_metrics, usual_settings};
-use super::coordinates::CoordinateSums;
-use super::prediction::LinearisedPhase;
-use crate::model::ReducedModel;
-use crate::recording::Recording;
-use crate::robot::{JOINT_DIM, Robot};
+use super::*;
 
 const NO_BETTER: f64 = 0.98;
-/// Largest error of a body coordinate over a short time, as a share of that of a constant velocity in x and z together:
-/// on its own, a coordinate that hardly accelerates would ask for more than recordings show.
+/// As a share of that of a constant velocity in x and z together: a coordinate alone may hardly accelerate.
 const SHORT_SHARE: f64 = 0.25;
 const WHOLE_SHARE: f64 = 1.0 / 3.0;
 /// Error of a constant velocity in body x and z below which recordings hardly move the body, m.
@@ -121,21 +109,15 @@ impl VerdictRow {
             Some(value) if value.is_infinite() => "diverges".to_owned(),
             Some(value) => shown(value),
         };
-        let baseline = (self.baseline)
-            .map(|baseline| format!(" ({}: {})", self.baseline_name, shown(baseline)));
-        format!(
-            "{} {value}, {} {}{}",
-            self.name,
-            self.bound.words(),
-            shown(self.threshold),
-            baseline.unwrap_or_default()
-        )
+        let against = |baseline| format!(" ({}: {})", self.baseline_name, shown(baseline));
+        let baseline = self.baseline.map(against).unwrap_or_default();
+        let (name, bound, threshold) = (&self.name, self.bound.words(), shown(self.threshold));
+        format!("{name} {value}, {bound} {threshold}{baseline}")
     }
 }
 
-/// What a model is fit for on some recordings, and why. Uses are `0.1 s` (predictions of body x and z between restarts,
-/// by their time), `whole motion` (the same from the first sample on), `torques` (those that the controller finds
-/// itself) and `control`; one that recordings or model do not allow to measure is in neither list.
+/// Uses are `0.1 s` (predictions between restarts, by their time), `whole motion`, `torques` (those that the controller
+/// finds itself) and `control`; one that is not measured is in neither list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Verdict {
     pub fit_for: Vec<String>,
@@ -155,8 +137,7 @@ impl Verdict {
     }
 }
 
-/// The verdict on a model from its rollouts and the controller's figures along each recording; without these, torques
-/// and control are not judged.
+/// Without the controller's figures along each recording, torques and control are not judged.
 pub fn verdict(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
@@ -328,10 +309,7 @@ fn rank_row(model: &ReducedModel, assessment: &Assessment<'_>) -> Option<Verdict
     let least = ranks.map(LinearisedPhase::input_effective_rank).min()?;
     let d = model.latent_dim();
     let name = "latent directions in which inputs act on the ground";
-    Some(VerdictRow::new(
-        (CONTROL, name, ""),
-        Some(least as f64),
-        (NO_DYNAMICS, Some(d as f64)),
-        (Bound::AtLeast, LEAST_RANK.min(d) as f64),
-    ))
+    let (row, against) = ((CONTROL, name, ""), (NO_DYNAMICS, Some(d as f64)));
+    let bound = (Bound::AtLeast, LEAST_RANK.min(d) as f64);
+    Some(VerdictRow::new(row, Some(least as f64), against, bound))
 }

@@ -1,15 +1,11 @@
-//! The cost of a plan, weighted squares of deviations, and where the feet of a plan are.
-//!
-//! Affine expressions of a program's variables, and sparse matrices made of them.
+//! The cost of a plan as affine expressions of a program's variables, and where the feet of a plan are.
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Div, Mul, Sub};
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::Vector3;
 
-use super::seed::{PITCH, Seed};
-use super::transcribe::Task;
-use crate::mpc::{Cone, ConeProgram, sparse};
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Leg, STATE_DIM};
+use super::*;
+use crate::mpc::{Cone, sparse};
 
 const TIME_UNIT_S: f64 = 0.01;
 /// The first latent coordinate that counts as posture: the two before it carry the body.
@@ -70,8 +66,7 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
     out
 }
 
-/// Feet on the ground stay where they stand, as far as they do in the prior: along the floor from the start or from
-/// touch-down, above it from the start or from the prior's own height.
+/// Feet stay as far as they do in the prior: along the floor from the start or touch-down, above it from the start.
 fn add_feet(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)>) {
     let (settings, of) = (task.settings, &task.seed.parts[part]);
     let anchor_part = task.anchor_part(part);
@@ -105,7 +100,7 @@ pub(crate) fn moved_foot(
     let now = foot_place(task.seed, leg, &z);
     let before = foot_place(task.seed, leg, &task.seed.parts[part].z[node]);
     std::array::from_fn(|axis| {
-        let moved = Affine::of(now.at[axis] - before.at[axis]);
+        let moved = Affine::from(now.at[axis] - before.at[axis]);
         (0..task.seed.latent_dim).fold(moved, |moved, i| {
             let slope = now.by_z[(axis, i)];
             moved + task.latent(part, node, i) * slope + -(slope * z[i])
@@ -154,11 +149,6 @@ pub(crate) struct Affine {
 }
 
 impl Affine {
-    pub(crate) fn of(constant: f64) -> Self {
-        let terms = Vec::new();
-        Self { terms, constant }
-    }
-
     /// The expression with `factor` times a variable on top.
     pub(crate) fn plus(mut self, variable: usize, factor: f64) -> Self {
         if factor != 0.0 {
@@ -172,10 +162,18 @@ impl Affine {
     }
 }
 
-impl Add for Affine {
+impl From<f64> for Affine {
+    fn from(constant: f64) -> Self {
+        let terms = Vec::new();
+        Self { terms, constant }
+    }
+}
+
+impl<T: Into<Self>> Add<T> for Affine {
     type Output = Self;
 
-    fn add(mut self, other: Self) -> Self {
+    fn add(mut self, other: T) -> Self {
+        let other = other.into();
         self.constant += other.constant;
         self.terms.extend(other.terms);
         self
@@ -187,15 +185,6 @@ impl Sub for Affine {
 
     fn sub(self, other: Self) -> Self {
         self + other * -1.0
-    }
-}
-
-impl Add<f64> for Affine {
-    type Output = Self;
-
-    fn add(mut self, constant: f64) -> Self {
-        self.constant += constant;
-        self
     }
 }
 

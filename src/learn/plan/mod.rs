@@ -16,7 +16,6 @@
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
 mod costs;
-mod error;
 mod motion;
 mod seed;
 mod settings;
@@ -24,7 +23,20 @@ mod solve;
 mod transcribe;
 mod verdict;
 
-pub use error::PlanError;
-pub use settings::{Goal, PlanSettings};
+pub use settings::{Goal, PlanError, PlanSettings};
 pub use solve::{GoalMap, MappedGoal, Plan, PlannedPart, plan, reach};
 pub use verdict::Verdict;
+
+type Result<T, E = PlanError> = std::result::Result<T, E>;
+
+use std::ops::Add;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::model::{JumpPrior, ReducedModel};
+use crate::mpc::{ConeProgram, Outcome};
+use crate::recording::Segment;
+use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM};
+use motion::Margins;
+use seed::{PITCH, Seed};
+use transcribe::{Bound, Task};

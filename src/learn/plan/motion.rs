@@ -1,16 +1,10 @@
-//! A plan as a recording, and how close it comes to its bounds between the nodes.
-//!
-//! Velocities and inputs are linear between nodes, positions their integral, so that the motion passes through the
-//! nodes of the program. Torques are the lifted input with what the joints take of the very motion that is written, so
-//! that who reads the recording finds the planned input.
-
-use nalgebra::{DMatrix, DVector};
+//! A plan as a recording, and its margins between the nodes: velocities and inputs are linear there, positions their
+//! integral; torques are the lifted input with the losses of the very motion that is written.
 
 use super::costs::moved_foot;
-use super::error::PlanError;
-use super::transcribe::{NodeValues, Task};
-use crate::recording::Segment;
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Leg, Robot, STATE_DIM};
+use super::transcribe::NodeValues;
+use super::*;
+use crate::robot::Robot;
 
 const SOURCE: &str = "plan";
 
@@ -26,13 +20,8 @@ pub struct Margins {
     pub foot_drift_m: [f64; 2],
 }
 
-/// The motion of a point and its margins: samples at equal distances from the start to the planned end, as close to
-/// `sample_time_s` apart as a whole number of steps allows.
-pub fn motion(
-    task: &Task<'_>,
-    y: &[f64],
-    sample_time_s: f64,
-) -> Result<(Segment, Margins), PlanError> {
+/// Samples at equal distances, as close to `sample_time_s` apart as a whole number of steps allows.
+pub fn motion(task: &Task<'_>, y: &[f64], sample_time_s: f64) -> Result<(Segment, Margins)> {
     let durations = (0..task.seed.parts.len()).map(|part| task.duration_s(part, y));
     let ends = durations.scan(0.0, |end, duration| {
         *end += duration;

@@ -1,12 +1,9 @@
 //! The trajectory that a plan starts from, and the model about it.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::error::PlanError;
-use super::settings::{Goal, PlanSettings};
+use super::*;
 use crate::lower::CompiledModel;
-use crate::model::{JumpPart, JumpPrior, Landmark, ReducedModel};
-use crate::robot::{BODY_NAMES, BODY_Z, InputRule, JOINT_DIM, JOINT_NAMES, STATE_DIM};
+use crate::model::{JumpPart, Landmark};
+use crate::robot::{BODY_NAMES, InputRule, JOINT_NAMES};
 
 pub(crate) const PITCH: usize = 16;
 
@@ -61,7 +58,7 @@ impl<'a> Seed<'a> {
         model: &'a ReducedModel,
         goal: &Goal,
         settings: &PlanSettings,
-    ) -> Result<Self, PlanError> {
+    ) -> Result<Self> {
         let prior = model.jump_prior()?;
         let mean = &prior.landmarks.start;
         let at_rest = || (mean.clone(), DVector::zeros(mean.len()));
@@ -100,8 +97,7 @@ impl<'a> Seed<'a> {
     }
 }
 
-/// The three coordinates of a state that encoding and decoding moves farthest, of those that it moves farther than the
-/// limits.
+/// The three coordinates that encoding and decoding moves farthest beyond the limits.
 fn lost(x: &DVector<f64>, decoded: &DVector<f64>) -> Vec<String> {
     let mut far: Vec<(f64, String)> = Vec::new();
     for (row, (&given, &held)) in x.iter().zip(decoded).enumerate() {
@@ -131,9 +127,7 @@ fn seed_part<'a>(
     let phase = (model.phase_for(landmark.feet)).expect("invariant: checked with the model");
     let table = |rows: &DMatrix<f64>| -> Vec<DVector<f64>> {
         let nodes = 0..part.nodes();
-        nodes
-            .map(|node| JumpPart::at(rows, node, features))
-            .collect()
+        (nodes.map(|node| JumpPart::at(rows, node, features))).collect()
     };
     let (z, dz, u_lat) = (table(&part.z), table(&part.dz), table(&part.u_lat));
     let [least, most] = landmark.duration_range_s;

@@ -1,12 +1,13 @@
-//! Weights and bounds of a plan.
-//!
-//! What a jump is to reach.
+//! Weights and bounds of a plan, and the jump that it is to reach.
 
-use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
-use super::error::PlanError;
-use crate::model::{GOAL_DIM, JumpPrior};
+use super::*;
+use crate::lower::LowerError;
+use crate::model::{GOAL_DIM, ModelError};
+use crate::mpc::ControlError;
+use crate::recording::RecordingError;
 
 const ANY: f64 = f64::INFINITY;
 
@@ -119,9 +120,8 @@ pub struct Goal {
 }
 
 impl Goal {
-    /// A jump forwards by `distance_m`, during which the body rises `apex_m` above its height at the start; from the
-    /// mean start of the model's training jumps.
-    pub fn new(distance_m: f64, apex_m: f64) -> Result<Self, PlanError> {
+    /// From the mean start of the training jumps; the body rises `apex_m` above its height there.
+    pub fn new(distance_m: f64, apex_m: f64) -> Result<Self> {
         let above = " above the height at the start";
         for (what, found, above) in [("distance", distance_m, ""), ("apex", apex_m, above)] {
             if !(found.is_finite() && found > 0.0) {
@@ -154,7 +154,7 @@ impl Goal {
         prior: &JumpPrior,
         start_height_m: f64,
         reach: f64,
-    ) -> Result<(), PlanError> {
+    ) -> Result<()> {
         // Heights count from wherever the recordings have their zero.
         let names = [
             ("distance", 0.0),
@@ -181,7 +181,7 @@ impl Goal {
         Ok(())
     }
 
-    /// The goal inside the ranges less a `share` at either end: a regression over few jumps is not to be trusted at its ends.
+    /// Inside the ranges less a `share` at either end: a regression over few jumps is not to be trusted at its ends.
     pub(super) fn clipped(
         &self,
         prior: &JumpPrior,
@@ -197,4 +197,43 @@ impl Goal {
             values[i].clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
         })
     }
+}
+
+#[derive(Debug, Error)]
+pub enum PlanError {
+    #[error("{what}: found {found}, expected {expected}")]
+    Goal {
+        what: &'static str,
+        found: f64,
+        expected: String,
+    },
+    #[error(
+        "no plan for {distance_m} m with an apex of {apex_m} m: {outcome:?} in convex program {iteration}"
+    )]
+    Unsolved {
+        distance_m: f64,
+        apex_m: f64,
+        outcome: Outcome,
+        /// Number of the program, from 1.
+        iteration: usize,
+    },
+    #[error(
+        "no plan for {distance_m} m with an apex of {apex_m} m: the equations are still off by \
+         {defect:.1e} after {iterations} convex programs"
+    )]
+    NotConverged {
+        distance_m: f64,
+        apex_m: f64,
+        /// Largest violation of an equation, in standard deviations of its coordinate.
+        defect: f64,
+        iterations: usize,
+    },
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
+    Lower(#[from] LowerError),
+    #[error(transparent)]
+    Control(#[from] ControlError),
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
 }

@@ -1,21 +1,13 @@
-//! From a goal to a plan: sequential convex programs.
-//!
-//! Which distances and heights can be planned.
+//! From a goal to a plan by sequential convex programs; which goals can be planned.
 
 use std::time::Instant;
 
-use super::costs;
-use super::error::PlanError;
-use super::motion::{Margins, motion};
-use super::seed::Seed;
-use super::settings::{Goal, PlanSettings};
-use super::transcribe::{Bound, Task};
-use super::verdict::{Findings, Verdict, verdict};
-use crate::model::ReducedModel;
-use crate::mpc::{Outcome, QpSettings, QpSolver, SolverProfile};
+use super::motion::motion;
+use super::verdict::verdict;
+use super::*;
+use crate::mpc::{QpSettings, QpSolver, SolverProfile};
+use crate::recording::Recording;
 use crate::recording::mismatch::Balance;
-use crate::recording::{Recording, Segment};
-use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2};
 
 const CONVERGED_DEFECT: f64 = 1e-4;
 const CONVERGED_STEP: f64 = 2e-2;
@@ -47,12 +39,8 @@ pub struct Plan {
     pub solve_ms: f64,
 }
 
-/// Plans a jump.
-///
-/// # Errors
-/// [`PlanError`]: a model without a prior, a goal out of all proportion to the training jumps, programs without a
-/// solution. A plan that is not to be trusted is none: its [`Verdict`] says so.
-pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Result<Plan, PlanError> {
+/// Plans a jump; one that is not to be trusted is no error: its [`Verdict`] says so.
+pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Result<Plan> {
     let clock = Instant::now();
     let seed = Seed::new(model, goal, settings)?;
     let mut task = Task::new(&seed, settings);
@@ -66,32 +54,26 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
         })
         .collect();
     let goal_m = goal.goal_m();
-    let slack = Bound::ALL.map(|bound| (bound, y[task.slack(bound)]));
-    let input_deviation = input_deviation(&task, &y);
-    let findings = Findings {
-        input_deviation,
-        slack,
-        margins: &margins,
-        outside: outside(&seed, goal_m),
-        weight_share: Balance::of(&Recording::from(motion.clone()), model.robot()?).weight_share,
-        start_lost: seed.start_lost.clone(),
-    };
-    Ok(Plan {
+    let mut planned = Plan {
         goal_m,
         reached_m: reached(&motion),
         parts,
         cost: costs::value(&task, &y),
-        input_deviation,
+        input_deviation: input_deviation(&task, &y),
         error_m: expected_error(&task, &y),
-        verdict: verdict(settings, &findings),
+        verdict: Verdict::Trusted,
         margins,
         motion,
         programs,
-        solve_ms: 1e3 * clock.elapsed().as_secs_f64(),
-    })
+        solve_ms: 0.0,
+    };
+    let balance = Balance::of(&Recording::from(planned.motion.clone()), model.robot()?);
+    planned.verdict = verdict(&task, &y, &planned, balance.weight_share);
+    planned.solve_ms = 1e3 * clock.elapsed().as_secs_f64();
+    Ok(planned)
 }
 
-fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize), PlanError> {
+fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize)> {
     let [distance_m, apex_m] = task.seed.goal.goal_m();
     let settings = QpSettings {
         profile: SolverProfile::Scaled,
@@ -144,15 +126,6 @@ fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
     deviations.fold(0.0, f64::max)
 }
 
-fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
-    std::array::from_fn(|i| {
-        let range = &seed.prior.ranges()[i];
-        let width = (range.most - range.least).max(f64::MIN_POSITIVE);
-        let beyond = (range.least - goal_m[i]).max(goal_m[i] - range.most);
-        beyond.max(0.0) / width
-    })
-}
-
 fn reached(motion: &Segment) -> [f64; 2] {
     let (x, last) = (&motion.x, motion.len() - 1);
     let height = x.row(BODY_Z);
@@ -202,7 +175,7 @@ pub fn reach(
     model: &ReducedModel,
     settings: &PlanSettings,
     mut done: impl FnMut(usize, usize),
-) -> Result<GoalMap, PlanError> {
+) -> Result<GoalMap> {
     let prior = model.jump_prior()?;
     let axis = |i: usize| -> Vec<f64> {
         let range = &prior.ranges()[i];
@@ -231,11 +204,7 @@ pub fn reach(
     })
 }
 
-fn point(
-    model: &ReducedModel,
-    goal_m: [f64; 2],
-    settings: &PlanSettings,
-) -> Result<MappedGoal, PlanError> {
+fn point(model: &ReducedModel, goal_m: [f64; 2], settings: &PlanSettings) -> Result<MappedGoal> {
     let clock = std::time::Instant::now();
     let made = Goal::new(goal_m[0], goal_m[1]).and_then(|goal| plan(model, &goal, settings));
     let solve_ms = 1e3 * clock.elapsed().as_secs_f64();

@@ -17,16 +17,8 @@
 //! lets fall freely. Only products with `h`, `vz^2`, the feet and the losses are not linear: they are linearised about
 //! the iterate, or kept from it. Bounds that are far from active are left out, and looked at again with the result.
 
-use std::ops::Add;
-
-use nalgebra::DVector;
-
-use super::costs;
 use super::costs::{Affine, Builder};
-use super::seed::{PITCH, Seed};
-use super::settings::PlanSettings;
-use crate::mpc::ConeProgram;
-use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2, JOINT_DIM};
+use super::*;
 
 /// Change of a duration that the variable `tau` counts as one.
 pub(crate) const DURATION_SHARE: f64 = 0.15;
@@ -118,7 +110,7 @@ impl<'a> Task<'a> {
 
     pub(crate) fn acceleration(&self, part: usize, interval: usize, i: usize) -> Affine {
         let of = &self.seed.parts[part];
-        let mut sum = Affine::of(of.ddz[interval][i]);
+        let mut sum = Affine::from(of.ddz[interval][i]);
         for node in [interval, interval + 1] {
             for (k, slope) in of.slope[node].row(i).iter().enumerate() {
                 sum = sum.plus(self.node(part, node) + k, 0.5 * slope);
@@ -135,13 +127,13 @@ impl<'a> Task<'a> {
             Some(i) => of.dz[node][i],
         };
         let variable = self.node(part, node) + i;
-        Affine::of(prior).plus(variable, self.seed.prior.state_std[i])
+        Affine::from(prior).plus(variable, self.seed.prior.state_std[i])
     }
 
     pub(crate) fn x(&self, part: usize, node: usize, coordinate: usize) -> Affine {
         let factors = self.seed.decode.row(coordinate);
         let terms = (factors.iter().enumerate()).map(|(i, f)| self.latent(part, node, i) * *f);
-        terms.fold(Affine::of(self.seed.decode_bias[coordinate]), Add::add)
+        terms.fold(Affine::from(self.seed.decode_bias[coordinate]), Add::add)
     }
 
     pub(crate) fn dx(&self, part: usize, node: usize, coordinate: usize) -> Affine {
@@ -155,10 +147,8 @@ impl<'a> Task<'a> {
         let row = self.seed.lift.row(entry);
         let first = self.node(part, node) + 2 * self.seed.latent_dim;
         let by_mu = row * &of.root;
-        let prior = Affine::of((row * &of.u_lat[node])[0]);
-        (first..)
-            .zip(by_mu.iter())
-            .fold(prior, |sum, (mu, factor)| sum.plus(mu, *factor))
+        let prior = Affine::from((row * &of.u_lat[node])[0]);
+        ((first..).zip(by_mu.iter())).fold(prior, |sum, (mu, factor)| sum.plus(mu, *factor))
     }
 
     pub(crate) fn losses(&self, part: usize, node: usize, y: &[f64]) -> [f64; JOINT_DIM] {
@@ -173,9 +163,7 @@ impl<'a> Task<'a> {
         });
         let accelerations = &self.seed.decode * mean;
         let first = |v: &DVector<f64>| std::array::from_fn(|i| v[i]);
-        self.seed
-            .rule
-            .losses(&first(&rates), &first(&accelerations))
+        (self.seed.rule).losses(&first(&rates), &first(&accelerations))
     }
 
     pub(crate) fn program(&self, y: &[f64]) -> ConeProgram {
@@ -208,7 +196,7 @@ impl<'a> Task<'a> {
         }
         for sign in [-1.0, 1.0] {
             let bound = DURATION_BOUND.min(sign * y[tau] + DURATION_STEP);
-            builder.at_most(Affine::of(-bound).plus(tau, sign));
+            builder.at_most(Affine::from(-bound).plus(tau, sign));
         }
     }
 
@@ -217,7 +205,7 @@ impl<'a> Task<'a> {
         let [here, next] = [interval, interval + 1];
         let rate = match i.checked_sub(d) {
             None => {
-                Affine::of(self.seed.parts[part].drift[interval][i])
+                Affine::from(self.seed.parts[part].drift[interval][i])
                     + self.latent(part, here, d + i) * 0.5
                     + self.latent(part, next, d + i) * 0.5
             }
@@ -314,7 +302,7 @@ impl<'a> Task<'a> {
             if landing {
                 let least =
                     self.seed.prior.landmarks.landing_height_m - self.settings.height_slack_m;
-                let low = (Affine::of(least) - self.x(part, node, BODY_Z)).plus(height, -1.0);
+                let low = (Affine::from(least) - self.x(part, node, BODY_Z)).plus(height, -1.0);
                 if low.at(y) > -0.04 {
                     builder.at_most(low);
                 }
@@ -325,7 +313,7 @@ impl<'a> Task<'a> {
     fn friction(&self, part: usize, node: usize, slack: usize, builder: &mut Builder) {
         let [forwards, up] = [BODY_X, BODY_Z].map(|entry| self.input(part, node, entry));
         for sign in [-1.0, 1.0] {
-            let row = Affine::of(-self.settings.friction_slack_n / FORCE_UNIT_N)
+            let row = Affine::from(-self.settings.friction_slack_n / FORCE_UNIT_N)
                 + forwards.clone() * (sign / FORCE_UNIT_N)
                 + up.clone() * (-self.settings.friction / FORCE_UNIT_N);
             builder.at_most(row.plus(slack, -1.0));
@@ -346,14 +334,12 @@ impl<'a> Task<'a> {
         flight.expect("invariant: checked with the model")
     }
 
-    /// The part at whose first node the feet of `part` stand where they are to stay: the first part, or the landing
-    /// itself.
+    /// The part at whose first node the feet of `part` stand: the first part, or the landing itself.
     pub(crate) fn anchor_part(&self, part: usize) -> usize {
         if part > self.flight() { part } else { 0 }
     }
 
-    /// Height that the body reaches by its height and speed at the node of the apex, less the height that is wanted;
-    /// linear about the iterate.
+    /// Height reached by ballistic motion from the node of the apex, less the wanted one; linear about the iterate.
     fn apex(&self, y: &[f64]) -> Affine {
         let flight = self.flight();
         let wanted = self.start_x(BODY_Z) + self.seed.goal.goal_m()[1];
@@ -376,7 +362,7 @@ fn within(builder: &mut Builder, value: &Affine, range: [f64; 2], slack: Option<
 }
 
 fn side(builder: &mut Builder, value: &Affine, (sign, bound): (f64, f64), slack: Option<usize>) {
-    let row = Affine::of(-bound) + value.clone() * sign;
+    let row = Affine::from(-bound) + value.clone() * sign;
     builder.at_most(match slack {
         Some(slack) => row.plus(slack, -1.0),
         None => row,

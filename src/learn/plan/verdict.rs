@@ -1,8 +1,6 @@
 //! Whether to trust a plan.
 
-use super::motion::Margins;
-use super::settings::PlanSettings;
-use super::transcribe::Bound;
+use super::*;
 
 const LEAST_WEIGHT_SHARE: f64 = 0.5;
 const NO_SLACK: f64 = 2e-3;
@@ -38,22 +36,18 @@ impl Verdict {
     }
 }
 
-pub(crate) struct Findings<'a> {
-    pub input_deviation: f64,
-    pub slack: [(Bound, f64); 4],
-    pub margins: &'a Margins,
-    /// Widths of the recorded ranges that distance and apex are beyond them.
-    pub outside: [f64; 2],
-    pub weight_share: Option<f64>,
-    pub start_lost: Vec<String>,
-}
-
-pub fn verdict(settings: &PlanSettings, found: &Findings<'_>) -> Verdict {
-    let refused = refusals(settings, found);
+/// The verdict on what a point of a task plans; `weight_share` of the weight is carried by its torques.
+pub(crate) fn verdict(
+    task: &Task<'_>,
+    y: &[f64],
+    plan: &Plan,
+    weight_share: Option<f64>,
+) -> Verdict {
+    let refused = refusals(task, y, plan, weight_share);
     if !refused.is_empty() {
         return Verdict::Refused(refused);
     }
-    match doubts(settings, found) {
+    match doubts(task.seed, task.settings, plan) {
         reasons if reasons.is_empty() => Verdict::Trusted,
         reasons => Verdict::Extrapolates(reasons),
     }
@@ -63,8 +57,9 @@ fn reasons(rules: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
     rules.into_iter().flatten().collect()
 }
 
-fn refusals(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
-    let slack = |(bound, slack): (Bound, f64)| {
+fn refusals(task: &Task<'_>, y: &[f64], plan: &Plan, weight_share: Option<f64>) -> Vec<String> {
+    let slack = |bound: Bound| {
+        let slack = y[task.slack(bound)];
         let percent = 100.0 * slack;
         (slack > NO_SLACK).then(|| match bound {
             Bound::Torque => format!(
@@ -79,14 +74,13 @@ fn refusals(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
             }
         })
     };
-    let percent = 100.0 * found.margins.torque_share;
-    let joint = found.margins.beyond_joint_limit_rad;
-    let force = found.margins.beyond_friction_n;
-    let carried = found
-        .weight_share
-        .filter(|share| *share < LEAST_WEIGHT_SHARE);
-    let (deviation, most) = (found.input_deviation, settings.refuse_deviation);
-    reasons(found.slack.map(slack).into_iter().chain([
+    let percent = 100.0 * plan.margins.torque_share;
+    let joint = plan.margins.beyond_joint_limit_rad;
+    let force = plan.margins.beyond_friction_n;
+    let carried = weight_share.filter(|share| *share < LEAST_WEIGHT_SHARE);
+    let settings = task.settings;
+    let (deviation, most) = (plan.input_deviation, settings.refuse_deviation);
+    reasons(Bound::ALL.map(slack).into_iter().chain([
         (percent > 100.0)
             .then(|| format!("torques reach {percent:.0} % of their limits between nodes")),
         (joint > NO_JOINT)
@@ -105,18 +99,19 @@ fn refusals(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
     ]))
 }
 
-fn doubts(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
+fn doubts(seed: &Seed<'_>, settings: &PlanSettings, plan: &Plan) -> Vec<String> {
+    let beyond = outside(seed, plan.goal_m);
     let outside = |(what, outside): (&str, f64)| {
         let percent = 100.0 * outside;
         (outside > 0.0).then(|| {
             format!("the {what} is beyond the recorded jumps by {percent:.0} % of their range")
         })
     };
-    let deviation = found.input_deviation;
-    let drift = found.margins.foot_drift_m;
+    let deviation = plan.input_deviation;
+    let drift = plan.margins.foot_drift_m;
     let [along, below] = drift.map(|drift| 1e3 * drift);
-    let lost = found.start_lost.join(", ");
-    reasons(["distance", "apex"].into_iter().zip(found.outside).map(outside).chain([
+    let lost = seed.start_lost.join(", ");
+    reasons(["distance", "apex"].into_iter().zip(beyond).map(outside).chain([
         (deviation > settings.warn_deviation).then(|| {
             format!("its input is {deviation:.1} standard deviations from what was recorded")
         }),
@@ -132,4 +127,14 @@ fn doubts(settings: &PlanSettings, found: &Findings<'_>) -> Vec<String> {
             )
         }),
     ]))
+}
+
+/// How far a goal is beyond the training jumps, in widths of their range; zero inside.
+fn outside(seed: &Seed<'_>, goal_m: [f64; 2]) -> [f64; 2] {
+    std::array::from_fn(|i| {
+        let range = &seed.prior.ranges()[i];
+        let width = (range.most - range.least).max(f64::MIN_POSITIVE);
+        let beyond = (range.least - goal_m[i]).max(goal_m[i] - range.most);
+        beyond.max(0.0) / width
+    })
 }

@@ -1,30 +1,24 @@
-//! The grammar of the model file, as serde types.
-//!
-//! Only types and spelling are settled here; shapes, ranks and names are checked when the parts become a
-//! [`ReducedModel`](crate::model::ReducedModel).
+//! The grammar of the model file as serde types; shapes, ranks and names are checked when it becomes a model.
 
-use std::fmt;
+use std::cell::Cell;
 
 use nalgebra::DVector;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{Error as _, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_json::{Map, Value};
+use serde_json::{Map, Number};
 
-use super::bounded;
-use super::read::ArtifactError;
-use crate::files::Place;
+use super::*;
 use crate::model::{
-    CoordinateNames, InputStatistics, JumpPrior, Landmarks, Library, LibraryChoice, ModelError,
-    Phase, ReducedModel, ScaleFactors, Scaling, StandardLibrary, StateMap,
+    CoordinateNames, InputStatistics, JumpPrior, Landmarks, Library, LibraryChoice, Phase,
+    ScaleFactors, Scaling, StandardLibrary, StateMap,
 };
 use crate::robot::{Actuators, Robot, WrenchFrame};
 use crate::robot_file::{self, RobotEntry};
 
 pub(crate) const SCHEMA: &str = "romc-model/1";
 
-/// The format with `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a `robot` that is
-/// described.
+/// With `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a `robot` that is described.
 pub(crate) const SCHEMA_2: &str = "romc-model/2";
 
 #[derive(Serialize, Deserialize)]
@@ -65,7 +59,7 @@ pub(super) struct Manifest {
     #[serde(default, deserialize_with = "present")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<JumpPrior>,
-    #[serde(default, deserialize_with = "bounded::object")]
+    #[serde(default, deserialize_with = "object")]
     #[serde(skip_serializing_if = "Map::is_empty")]
     pub provenance: Map<String, Value>,
 }
@@ -161,7 +155,7 @@ impl<'de> Deserialize<'de> for RobotValue {
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("the name of a robot, or an object that describes one")
             }
-            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<RobotValue, E> {
+            fn visit_str<E: Error>(self, name: &str) -> Result<RobotValue, E> {
                 Ok(RobotValue::Name(name.to_owned()))
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RobotValue, A::Error> {
@@ -194,7 +188,7 @@ impl RobotValue {
 
 #[derive(Deserialize)]
 pub(super) struct SchemaProbe {
-    #[serde(default, deserialize_with = "bounded::value")]
+    #[serde(default, deserialize_with = "bounded_value")]
     pub schema: Option<Value>,
 }
 
@@ -289,5 +283,89 @@ mod by_phase {
             }
         }
         from.deserialize_map(Object)
+    }
+}
+
+/// Most values; the provenance of a training with a thousand recordings has some ten thousand.
+const MOST: usize = 100_000;
+
+fn bounded_value<'de, D: Deserializer<'de>>(source: D) -> Result<Option<Value>, D::Error> {
+    let value = Bounded(&Cell::new(MOST)).deserialize(source)?;
+    Ok(Some(value).filter(|value| !value.is_null()))
+}
+
+fn object<'de, D: Deserializer<'de>>(source: D) -> Result<Map<String, Value>, D::Error> {
+    match Bounded(&Cell::new(MOST)).deserialize(source)? {
+        Value::Object(object) => Ok(object),
+        other => {
+            let found: String = other.to_string().chars().take(80).collect();
+            Err(D::Error::custom(format!(
+                "found {found}, expected an object"
+            )))
+        }
+    }
+}
+
+struct Bounded<'a>(&'a Cell<usize>);
+
+impl<'de> DeserializeSeed<'de> for Bounded<'_> {
+    type Value = Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, source: D) -> Result<Value, D::Error> {
+        let left = self.0.get().checked_sub(1).ok_or_else(|| {
+            let text = format!("found more than {MOST} values, expected at most so many");
+            D::Error::custom(text)
+        })?;
+        self.0.set(left);
+        source.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Bounded<'_> {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E: Error>(self, value: bool) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
+        Ok(Number::from_f64(value).map_or(Value::Null, Value::Number))
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<Value, A::Error> {
+        let mut array = Vec::new();
+        while let Some(value) = values.next_element_seed(Bounded(self.0))? {
+            array.push(value);
+        }
+        Ok(array.into())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut object = Map::new();
+        while let Some(key) = entries.next_key::<String>()? {
+            let value = entries.next_value_seed(Bounded(self.0))?;
+            object.insert(key, value);
+        }
+        Ok(object.into())
     }
 }

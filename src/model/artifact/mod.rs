@@ -33,10 +33,18 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
-mod bounded;
 mod manifest;
 mod read;
 mod write;
 
 pub use read::{ArtifactError, MAX_FILE_BYTES, describe, is_standard_input, read, read_from_bytes};
 pub use write::{Digest, check_place, digest, to_text, write};
+
+use std::fmt;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::files::Place;
+use crate::model::{ModelError, ReducedModel};
+use manifest::Manifest;

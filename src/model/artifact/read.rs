@@ -3,14 +3,11 @@
 use std::error::Error;
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
 
-use serde_json::Value;
-
-use super::manifest::{Manifest, SCHEMA, SCHEMA_2, SchemaProbe};
+use super::manifest::{SCHEMA, SCHEMA_2, SchemaProbe};
+use super::*;
 use crate::files::size::Format;
-use crate::files::{Fault, Located, Place, magic};
-use crate::model::{ModelError, ReducedModel};
+use crate::files::{Fault, Located, magic};
 
 pub type ArtifactError = Located<Fault<ModelError>>;
 
@@ -34,15 +31,10 @@ pub fn is_standard_input(path: &Path) -> bool {
 /// Reads and checks a model file, or standard input for the path `-`.
 pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
     let mut bytes = Vec::new();
-    let (name, source): (String, io::Result<Box<dyn Read>>) = match is_standard_input(path) {
-        true => (
-            "standard input".to_owned(),
-            Ok(Box::new(io::stdin().lock())),
-        ),
-        false => (
-            path.display().to_string(),
-            File::open(path).map(|file| Box::new(file) as _),
-        ),
+    let file = || File::open(path).map(|file| Box::new(file) as Box<dyn Read>);
+    let (name, source) = match is_standard_input(path) {
+        true => ("standard input".to_owned(), Ok(Box::new(io::stdin()) as _)),
+        false => (path.display().to_string(), file()),
     };
     // One byte more than allowed distinguishes a file that is too large from one that just fits.
     source
@@ -51,10 +43,7 @@ pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
     read_from_bytes(&name, &bytes)
 }
 
-/// Reads and checks a model file that is in memory; `file` names it in errors.
-///
-/// # Errors
-/// As [`read`]. Never panics, whatever the bytes are.
+/// The same of a file in memory; `file` names it in errors. Never panics, whatever the bytes are.
 pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, ArtifactError> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let text = format!("found more than {MAX_FILE_BYTES} bytes, which no model file needs");
@@ -80,9 +69,7 @@ fn parse<'de, T: serde::Deserialize<'de>>(
     let syntax = |place: String, error: &serde_json::Error| {
         // serde_json ends its messages with line and column, which the fault has anyway.
         let text = error.to_string();
-        let message = text
-            .rsplit_once(" at line ")
-            .map_or(&*text, |(message, _)| message);
+        let message = (text.rsplit_once(" at line ")).map_or(&*text, |(message, _)| message);
         let place = Place::Key(place.into(), error.line(), error.column());
         ArtifactError::text(file, place, message)
     };

@@ -1,18 +1,11 @@
-//! From a model to a file that appears whole or not at all, and to the digest by which generated files name the model
-//! that they come from.
-//!
-//! JSON as people like to read and compare it: one key, or one row of a matrix, a line; lists of words fill lines.
+//! From a model to a file and its digest. JSON as people like to compare it: one key, or one row of a matrix, per line.
 
-use std::path::Path;
-use std::{fmt, fs, io};
+use std::{fs, io};
 
-use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
-use super::manifest::Manifest;
-use super::read::ArtifactError;
-use crate::files::{Overwrite, Place, hex, write_whole};
-use crate::model::ReducedModel;
+use super::*;
+use crate::files::{Overwrite, hex, write_whole};
 
 /// The model file as text: equal for equal models, numbers in the shortest form that reads back to the same bits.
 pub fn to_text(model: &ReducedModel) -> String {

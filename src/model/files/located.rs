@@ -2,7 +2,9 @@
 
 use std::convert::Infallible;
 use std::error::Error;
-use std::{fmt, io};
+use std::fmt;
+
+use super::*;
 
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]

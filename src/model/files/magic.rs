@@ -1,14 +1,10 @@
-//! Formats of other programs, recognised by content or file name extension, with the commands that convert them.
-//!
-//! `magic.toml` is the one table. Readers of recordings ask for a text table or a log ([`recognised`]), readers of
-//! models for arrays.
+//! Formats of other programs, recognised by content or extension, with the commands that convert them: `magic.toml`.
 
-use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use serde::Deserialize;
 
-use super::shell_path;
+use super::*;
 
 /// Bytes that [`recognised`] needs of a file.
 pub const MAGIC_BYTES: usize = 512;
@@ -106,8 +102,7 @@ pub fn arrays_by_ending(path: &Path) -> Option<OtherFormat> {
     row.of_arrays(path)
 }
 
-/// The same of a path that is no file: the common stem of a TensorFlow checkpoint's files, or the folder of a
-/// SavedModel.
+/// The same of a path that is no file: a TensorFlow checkpoint's stem, or the folder of a SavedModel.
 pub fn arrays_by_neighbours(path: &Path) -> Option<OtherFormat> {
     let index = PathBuf::from(format!("{}.index", path.display()));
     let parts = [index, path.join("saved_model.pb")];
@@ -181,9 +176,7 @@ fn has(bytes: &[u8], text: &[u8]) -> bool {
 }
 
 fn filled(lines: &str, path: &Path, spelled: impl Fn(&Path) -> String) -> String {
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
+    let folder = (path.parent()).filter(|folder| !folder.as_os_str().is_empty());
     lines
         .replace("{folder}", &spelled(folder.unwrap_or(Path::new("."))))
         .replace("{file}", &spelled(path))
@@ -195,12 +188,8 @@ fn in_shell(line: &str, path: &Path) -> String {
 }
 
 fn in_python(lines: &str, path: &Path) -> String {
-    let escaped = |path: &Path| {
-        path.display()
-            .to_string()
-            .replace('\\', "\\\\")
-            .replace('"', "\\\"")
-    };
+    let escaped =
+        |path: &Path| (path.display().to_string().replace('\\', "\\\\")).replace('"', "\\\"");
     filled(lines, path, escaped)
 }
 
@@ -210,10 +199,7 @@ fn to_table(code: &str, path: &Path) -> String {
         true => "",
         false => TO_COLUMNS,
     };
-    let stem = path
-        .file_stem()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy();
+    let stem = (path.file_stem().unwrap_or(path.as_os_str())).to_string_lossy();
     let with_ending = |end: &str| path.with_file_name(format!("{stem}{end}"));
     let table = match with_ending(".csv") {
         same if same == path => with_ending("-table.csv"),

@@ -22,3 +22,7 @@ pub use located::{Fault, Located, Place};
 pub use size::read_toml;
 pub use text::{is_invisible, shell_path, shell_paths, shell_word};
 pub use whole::{EmittedFile, Overwrite, write_whole};
+
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};

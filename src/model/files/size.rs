@@ -1,12 +1,9 @@
-//! How many bytes are read of a file, and how many those may unpack to: one table for all formats.
-//!
-//! Sizes that a file states of itself are not trusted: readers stop where the table says, whatever was announced.
+//! How many bytes are read of a file, and how many those may unpack to, whatever sizes it states of itself.
 
-use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
 
 use super::magic::{OtherFormat, recognised};
+use super::*;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
@@ -38,8 +35,7 @@ impl Format {
         self.facts().0
     }
 
-    /// Most bytes that this many packed ones may unpack to: logs of real sensors shrink to a tenth, not to a
-    /// two-hundredth.
+    /// Logs of real sensors shrink to a tenth, not to a two-hundredth.
     pub fn most_unpacked(self, packed: u64) -> u64 {
         const RATIO: u64 = 200;
         const ALWAYS: u64 = 32 * MB;

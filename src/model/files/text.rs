@@ -1,6 +1,6 @@
 //! Text of files and arguments on its way out: characters that act instead of being shown, words of a shell.
 
-use std::path::{Path, PathBuf};
+use super::*;
 
 /// Unicode's categories Zl, Zp and what is invisible of Cf.
 const INVISIBLE: [(char, char); 10] = [

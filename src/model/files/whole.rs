@@ -1,13 +1,12 @@
 //! One file, written beside its place and then moved there.
-//!
-//! Files that are being written, beside their places.
 
 use std::collections::hash_map::RandomState;
 use std::ffi::OsString;
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, TryLockError};
 use std::hash::{BuildHasher as _, Hasher as _};
 use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+
+use super::*;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EmittedFile {
@@ -84,7 +83,6 @@ const DIGITS: usize = 16;
 const MAX_TRIED: usize = 16;
 
 /// A new hidden file, removed unless it is moved to its place; its lock shows that the process lives.
-#[derive(Debug)]
 pub(super) struct Part {
     pub file: File,
     path: PathBuf,

@@ -1,7 +1,4 @@
-//! Ranges of the numbers that users set, one table for flags, files of settings and programs.
-//!
-//! Imports nothing. [`table`] has a [`Range`] per setting; the command line parses with it, the rooms that take the
-//! number check it, and a program that calls the library may ask it first.
+//! Ranges of the numbers that users set, one [`table`] for flags, files of settings and programs.
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 

@@ -32,8 +32,7 @@ ranges! {
     MASK_STD = Range::real("mask-std", 0.0, 1e3);
     /// Share of the input's energy from which a coordinate counts as actuated.
     MASK_INPUT_SHARE = Range::real("mask-input-share", 0.0, 1.0);
-    /// Scaled units of the state in one rad or m. Squares of far smaller ones underflow, and rollouts with far larger
-    /// ones would count as diverged.
+    /// Squares of far smaller ones underflow, and rollouts with far larger ones would count as diverged.
     STATE_SCALING = Range::real("state-scaling", 1e-6, 1e4);
     TORQUE_SCALING = Range::real("torque-scaling", 1e-6, 1e4);
     FORCE_SCALING = Range::real("force-scaling", 1e-6, 1e4);

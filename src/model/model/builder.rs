@@ -1,19 +1,9 @@
 //! The checked constructor of [`ReducedModel`].
 
-use std::collections::HashMap;
-
-use serde_json::{Map, Value};
-
-use super::coordinates::{CoordinateNames, Scaling};
-use super::error::{ModelError, check, check_count, check_tensor};
-use super::identifier::{Identifier, identifier_of};
-use super::jump_prior::JumpPrior;
-use super::library::Library;
+use super::identifier::identifier_of;
 use super::maps::pinv_of_transpose;
-use super::rom::{Phase, ReducedModel, selected};
-use super::state_map::{AffineMap, StateMap};
-use super::statistics::InputStatistics;
-use crate::robot::{Actuators, FeetRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
+use super::*;
+use crate::robot::FeetRule;
 
 const MAX_PHASES: usize = 16;
 const MAX_STATE_DIM: usize = 256;
@@ -118,7 +108,7 @@ impl ModelBuilder {
         self
     }
 
-    pub fn build(mut self) -> Result<ReducedModel, ModelError> {
+    pub fn build(mut self) -> Result<ReducedModel> {
         let identifier = identifier_of("model name", &self.name)?;
         let phase_identifiers = self.check_phase_names()?;
         self.check_phases()?;
@@ -145,7 +135,7 @@ impl ModelBuilder {
         })
     }
 
-    fn check_phase_names(&self) -> Result<Vec<Identifier>, ModelError> {
+    fn check_phase_names(&self) -> Result<Vec<Identifier>> {
         check_count("`phases`", self.phases.len(), "phases", 1..=MAX_PHASES)?;
         let mut first_use = HashMap::new();
         let mut identifiers = Vec::new();
@@ -163,7 +153,7 @@ impl ModelBuilder {
         Ok(identifiers)
     }
 
-    fn check_phases(&self) -> Result<(), ModelError> {
+    fn check_phases(&self) -> Result<()> {
         let expected = (self.library.len(), self.library.latent_dim());
         for (index, phase) in self.phases.iter().enumerate() {
             check_tensor(&format!("phases[{index}].xi"), &phase.xi, expected)?;
@@ -187,7 +177,7 @@ impl ModelBuilder {
         Ok(())
     }
 
-    fn check_texts(&self) -> Result<(), ModelError> {
+    fn check_texts(&self) -> Result<()> {
         let text = &self.description;
         let printable = |c: char| !c.is_control() || c == '\n';
         let fits = text.len() <= MAX_DESCRIPTION_LEN && text.chars().all(printable);
@@ -209,7 +199,7 @@ impl ModelBuilder {
     }
 
     /// Checks shapes of encoder and decoder; returns the number of robot coordinates if known.
-    fn check_maps(&self) -> Result<Option<usize>, ModelError> {
+    fn check_maps(&self) -> Result<Option<usize>> {
         let (latent_dim, needs) = (self.library.latent_dim(), "scaling");
         for (part, map) in [("encoder", &self.encoder), ("decoder", &self.decoder)] {
             map.as_ref().map_or(Ok(()), |map| map.check_chain(part))?;
@@ -235,7 +225,7 @@ impl ModelBuilder {
         Ok(Some(dim))
     }
 
-    fn check_signals(&self, state_dim: Option<usize>) -> Result<(), ModelError> {
+    fn check_signals(&self, state_dim: Option<usize>) -> Result<()> {
         for (signals, names, of_robot) in [
             ("state", &self.state, Robot::state_names()),
             ("input", &self.input, Robot::input_names()),
@@ -248,7 +238,7 @@ impl ModelBuilder {
         Ok(())
     }
 
-    fn check_input_rule(&self) -> Result<(), ModelError> {
+    fn check_input_rule(&self) -> Result<()> {
         let part = match (&self.actuators, self.wrench_frame) {
             (Some(_), _) => "actuators",
             (None, WrenchFrame::World) => "wrench_frame",
@@ -267,7 +257,7 @@ impl ModelBuilder {
         }
     }
 
-    fn check_prior(&self, prior: &JumpPrior) -> Result<(), ModelError> {
+    fn check_prior(&self, prior: &JumpPrior) -> Result<()> {
         let linear = |map: &Option<StateMap>| map.as_ref().is_some_and(|m| m.as_affine().is_some());
         let needs = match () {
             () if self.robot.is_none() => "robot",
@@ -279,7 +269,7 @@ impl ModelBuilder {
         Err(ModelError::Incomplete { part, needs })
     }
 
-    fn check_statistics(&mut self, state_dim: Option<usize>) -> Result<(), ModelError> {
+    fn check_statistics(&mut self, state_dim: Option<usize>) -> Result<()> {
         let place_of = |name: &str| self.phases.iter().position(|phase| phase.name == name);
         for (index, (name, statistics)) in self.statistics.iter().enumerate() {
             let mut earlier = self.statistics[..index].iter();

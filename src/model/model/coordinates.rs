@@ -1,10 +1,6 @@
 //! Names and units of the coordinates of state and input, and scale factors between SI units and those of the training.
 
-use nalgebra::DVector;
-use serde::{Deserialize, Serialize};
-
-use super::error::{ModelError, check, check_shape};
-use crate::robot::Robot;
+use super::*;
 
 const MAX_TEXT_LEN: usize = 64;
 
@@ -38,7 +34,7 @@ impl CoordinateNames {
         signals: &str,
         dim: Option<usize>,
         robot: Option<(&[String], &Robot)>,
-    ) -> Result<(), ModelError> {
+    ) -> Result<()> {
         let (names, units) = (format!("{signals}.names"), format!("{signals}.units"));
         let dim = dim.unwrap_or(self.names.len());
         check_shape(&names, (self.names.len(), 1), (dim, 1))?;
@@ -63,12 +59,7 @@ impl CoordinateNames {
     }
 }
 
-fn check_texts(
-    list: &str,
-    texts: &[String],
-    allowed: &str,
-    punctuation: &str,
-) -> Result<(), ModelError> {
+fn check_texts(list: &str, texts: &[String], allowed: &str, punctuation: &str) -> Result<()> {
     let is_allowed = |c: char| c.is_ascii_alphanumeric() || punctuation.contains(c);
     let expected = format!("1 to {MAX_TEXT_LEN} characters out of {allowed}");
     for (index, text) in texts.iter().enumerate() {
@@ -96,7 +87,7 @@ impl ScaleFactors {
         }
     }
 
-    pub(super) fn check(&self, tensor: &'static str, dim: Option<usize>) -> Result<(), ModelError> {
+    pub(super) fn check(&self, tensor: &'static str, dim: Option<usize>) -> Result<()> {
         if let ScaleFactors::PerCoordinate(factors) = self {
             let expected = dim.unwrap_or(factors.len());
             check_shape(&format!("scaling.{tensor}"), factors.shape(), (expected, 1))?;

@@ -2,12 +2,13 @@
 
 use std::ops::RangeInclusive;
 
-use nalgebra::{Dim, Matrix, RawStorage};
-use thiserror::Error;
+use nalgebra::{Matrix, RawStorage};
 
-use super::identifier::IdentifierError;
+use super::*;
 use crate::robot::RobotError;
 use crate::symbolic::ParseError;
+
+pub(super) type Result<T, E = ModelError> = std::result::Result<T, E>;
 
 /// Why a model was refused, or could not answer.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -87,7 +88,7 @@ impl ModelError {
         ModelError::invalid(format!("`{tensor}`"), found, "numbers of similar size")
     }
 
-    pub(super) fn check_dimension(what: &str, found: usize, dim: usize) -> Result<(), ModelError> {
+    pub(super) fn check_dimension(what: &str, found: usize, dim: usize) -> Result<()> {
         check(found == dim, what, || format!("{found} entries"), dim)
     }
 }
@@ -97,7 +98,7 @@ pub(super) fn check<F: ToString>(
     place: &str,
     found: impl FnOnce() -> F,
     expected: impl ToString,
-) -> Result<(), ModelError> {
+) -> Result<()> {
     match is_expected {
         true => Ok(()),
         false => Err(ModelError::invalid(place, found(), expected.to_string())),
@@ -109,7 +110,7 @@ pub(super) fn check_count(
     found: usize,
     things: &str,
     range: RangeInclusive<usize>,
-) -> Result<(), ModelError> {
+) -> Result<()> {
     let expected = format!("{} to {}", range.start(), range.end());
     let text = || format!("{found} {things}").trim_end().to_owned();
     check(range.contains(&found), place, text, expected)
@@ -119,7 +120,7 @@ pub(super) fn check_shape(
     tensor: &str,
     found: (usize, usize),
     expected: (usize, usize),
-) -> Result<(), ModelError> {
+) -> Result<()> {
     let text = |(rows, columns)| format!("{rows} x {columns}");
     let (place, wanted) = (format!("`{tensor}`"), text(expected) + " (rows x columns)");
     check(found == expected, &place, || text(found), wanted)
@@ -129,7 +130,7 @@ pub(super) fn check_tensor<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     tensor: &str,
     found: &Matrix<f64, R, C, S>,
     expected: (usize, usize),
-) -> Result<(), ModelError> {
+) -> Result<()> {
     check_shape(tensor, found.shape(), expected)?;
     check_finite(tensor, found)
 }
@@ -137,7 +138,7 @@ pub(super) fn check_tensor<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
 pub(super) fn check_finite<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     tensor: &str,
     values: &Matrix<f64, R, C, S>,
-) -> Result<(), ModelError> {
+) -> Result<()> {
     let columns = values.ncols();
     let mut places = (0..values.len()).map(|k| (k / columns, k % columns));
     match places.find(|&place| !values[place].is_finite()) {

@@ -1,10 +1,6 @@
 //! Names that are safe in generated C, C++ and Rust.
 
-use std::fmt;
-
-use thiserror::Error;
-
-use super::error::ModelError;
+use super::*;
 
 /// Longest identifier in bytes, so that names made of model, phase and function stay readable.
 pub(crate) const MAX_IDENTIFIER_LEN: usize = 40;
@@ -65,11 +61,11 @@ impl fmt::Display for Identifier {
     }
 }
 
-pub fn check_name(name: &str) -> Result<(), ModelError> {
+pub fn check_name(name: &str) -> Result<()> {
     identifier_of("model name", name).map(|_| ())
 }
 
-pub(super) fn identifier_of(what: &str, name: &str) -> Result<Identifier, ModelError> {
+pub(super) fn identifier_of(what: &str, name: &str) -> Result<Identifier> {
     Identifier::from_name(name).map_err(|source| ModelError::Name {
         what: what.to_owned(),
         name: name.chars().take(80).collect(),

@@ -1,18 +1,9 @@
-//! What a model keeps of the jumps that it was learned from, so that others can be planned.
-//!
-//! A jump is cut at its landmarks into parts (crouch, thrust, flight, landing), each with nodes at equal shares of its
-//! duration. The prior is a regression over the [`GOAL_DIM`] numbers of a goal: with the features `phi = (1, g_1, g_2,
-//! g_3)`, `g = (goal - mean) / std`, the value of a coordinate at a node is `c . phi`. Per part, `Xi` of deviations
-//! says how accelerations change with what is changed about such a trajectory: `delta ddz = Xi^T (delta z, delta dz,
-//! delta u_lat)`.
+//! What a model keeps of its training jumps, so that others can be planned: a jump is cut at landmarks into parts with
+//! nodes at equal shares of the duration. With the features `phi = (1, g_1, g_2, g_3)` of a goal, `g = (goal - mean) /
+//! std`, a coordinate at a node is `c . phi`; per part `delta ddz = Xi^T (delta z, delta dz, delta u_lat)`.
 
-use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
-
-use super::error::{ModelError, check, check_count, check_tensor};
 use super::listed::{self, Listed};
-use super::rom::{Phase, selected};
-use crate::robot::{ContactFlags, FOOT_DIM, STATE_DIM};
+use super::*;
 
 pub const GOAL_DIM: usize = 3;
 pub const FEATURE_DIM: usize = 1 + GOAL_DIM;
@@ -147,7 +138,7 @@ impl JumpPart {
         terms.map(|(c, f)| c * f).sum()
     }
 
-    fn check(&self, name: &str, d: usize, range_s: &[f64; 2]) -> Result<(), ModelError> {
+    fn check(&self, name: &str, d: usize, range_s: &[f64; 2]) -> Result<()> {
         let place = |key: &str| format!("`{name}{key}`");
         let nodes = self.nodes();
         check_count(&place(".z"), nodes, "nodes", 3..=MAX_NODES)?;
@@ -198,7 +189,7 @@ impl JumpPrior {
         GoalRange::features(&self.ranges(), &goal)
     }
 
-    pub(super) fn check(&self, d: usize, phases: &[Phase]) -> Result<(), ModelError> {
+    pub(super) fn check(&self, d: usize, phases: &[Phase]) -> Result<()> {
         self.landmarks.check(phases)?;
         let (n_parts, n_landmarks) = (self.parts.len(), self.landmarks.parts.len());
         let (found, fits) = (|| format!("{n_parts} parts"), n_parts == n_landmarks);
@@ -216,7 +207,7 @@ impl JumpPrior {
 }
 
 impl Landmarks {
-    fn check(&self, phases: &[Phase]) -> Result<(), ModelError> {
+    fn check(&self, phases: &[Phase]) -> Result<()> {
         let (n_jumps, n_parts) = (self.jumps.len(), self.parts.len());
         let mut numbers = self.jumps.iter().flatten();
         let fits = n_jumps >= 2 && numbers.all(|v| v.is_finite() && v.abs() < 1e3);

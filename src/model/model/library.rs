@@ -1,15 +1,8 @@
-//! The library Theta: ordered candidate terms over `z`, `dz` and `u`.
-//!
-//! Evaluation of Theta by one pass over the distinct subexpressions of all terms.
+//! The library Theta: ordered candidate terms over `z`, `dz` and `u`, evaluated in one pass over their subexpressions.
 
-use std::collections::{BTreeMap, HashMap};
-use std::fmt;
+use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector};
-use serde::{Serialize, Serializer};
-
-use super::error::{ModelError, check, check_count, check_shape};
-use super::standard_library::StandardLibrary;
+use super::*;
 use crate::symbolic::{
     ExprId, ExprPool, Function, Node, Number, ParseLimits, SymbolId, integer_power,
 };
@@ -117,20 +110,16 @@ pub struct Library {
 }
 
 impl Library {
-    pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self, ModelError> {
+    pub fn from_terms(latent_dim: usize, texts: &[String]) -> Result<Self> {
         Self::of(latent_dim, LibraryChoice::Terms(texts.to_vec()))
     }
 
-    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self, ModelError> {
+    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self> {
         Self::of(latent_dim, LibraryChoice::Standard(standard))
     }
 
-    /// The library with the terms that were chosen.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] for a number of coordinates, a degree or a number of terms beyond its bound, and for a
-    /// term that is zero everywhere or has a constant part beyond the range of floats; [`ModelError::Term`].
-    pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self, ModelError> {
+    /// Refuses terms that are zero everywhere or have a constant part beyond the range of floats.
+    pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self> {
         check_count("`latent_dim`", latent_dim, "", 1..=MAX_LATENT_DIM)?;
         let (texts, standard) = match choice {
             LibraryChoice::Terms(texts) => (texts, None),
@@ -160,7 +149,7 @@ impl Library {
     }
 
     /// Refuses terms that are equal: their coefficients cannot be learned.
-    pub fn check_distinct(&self) -> Result<(), ModelError> {
+    pub fn check_distinct(&self) -> Result<()> {
         let mut first_use = HashMap::new();
         for (second, term) in self.terms.iter().enumerate() {
             if let Some(first) = first_use.insert(term.expr, second) {
@@ -222,9 +211,6 @@ impl Library {
         &self.pool
     }
 
-    /// The symbol of a variable in the library's pool, and in clones of it.
-    ///
-    /// `None` if its index is not below `latent_dim`.
     pub fn symbol(&self, variable: LatentVariable) -> Option<SymbolId> {
         Some(self.symbols[variable.place(self.latent_dim)?])
     }
@@ -235,7 +221,7 @@ impl Library {
         z: &DVector<f64>,
         dz: &DVector<f64>,
         u_lat: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
+    ) -> Result<DVector<f64>> {
         let d = self.latent_dim;
         ModelError::check_dimension("latent state z", z.len(), d)?;
         ModelError::check_dimension("latent velocity dz", dz.len(), d)?;
@@ -245,10 +231,8 @@ impl Library {
         Ok(theta.transpose().column(0).into_owned())
     }
 
-    /// Theta at many points: one row a point, one column a term.
-    ///
-    /// `variables` holds one point a column (`3 latent_dim x n`): `z`, then `dz`, then `u_lat`.
-    pub fn evaluate_points(&self, variables: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
+    /// Theta at many points, one per row, of one point per column: `z`, then `dz`, then `u_lat`.
+    pub fn evaluate_points(&self, variables: &DMatrix<f64>) -> Result<DMatrix<f64>> {
         let expected = (3 * self.latent_dim, variables.ncols());
         check_shape("z, dz, u_lat", variables.shape(), expected)?;
         let mut values = vec![0.0; self.tape.steps.len()];
@@ -271,7 +255,7 @@ impl PartialEq for Library {
     }
 }
 
-pub(super) fn check_term_count(found: usize) -> Result<(), ModelError> {
+pub(super) fn check_term_count(found: usize) -> Result<()> {
     let expected = format!("at most {MAX_LIBRARY_DIM}");
     let fits = found <= MAX_LIBRARY_DIM;
     check(fits, "`library`", || format!("{found} terms"), expected)
@@ -281,12 +265,7 @@ fn place(index: usize) -> String {
     format!("`library`[{index}]")
 }
 
-fn parse_term(
-    pool: &mut ExprPool,
-    latent_dim: usize,
-    index: usize,
-    text: &str,
-) -> Result<ExprId, ModelError> {
+fn parse_term(pool: &mut ExprPool, latent_dim: usize, index: usize, text: &str) -> Result<ExprId> {
     if text.len() > MAX_TERM_LEN || text.chars().any(char::is_control) {
         let found = format!("{} bytes or a control character", text.len());
         let expected = format!("one line of at most {MAX_TERM_LEN} bytes");
@@ -356,9 +335,7 @@ impl Tape {
         }
     }
 
-    /// Computes all terms; `values` is scratch space, one entry per step.
-    ///
-    /// Integer powers are multiplication chains, as everywhere in romc.
+    /// `values` is scratch space, one entry per step. Integer powers are multiplication chains, as everywhere in romc.
     pub(crate) fn run(&self, variables: &[f64], values: &mut [f64], theta: &mut [f64]) {
         for (index, step) in self.steps.iter().enumerate() {
             values[index] = match step {

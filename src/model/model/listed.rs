@@ -1,8 +1,9 @@
 //! Matrices as lists of rows and vectors as lists of numbers, for `#[serde(with = "listed")]`.
 
-use nalgebra::{DMatrix, DVector};
 use serde::de::{DeserializeOwned, Error as _};
-use serde::{Deserialize as _, Deserializer, Serialize, Serializer};
+use serde::{Deserialize as _, Deserializer};
+
+use super::*;
 
 /// A value with a form as lists.
 pub(super) trait Listed: Sized {

@@ -10,14 +10,7 @@
 //!
 //! Activations of layers, with their exact derivatives.
 
-use std::fmt;
-
-use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
-
-use super::error::{ModelError, check_finite};
-use super::rom::ReducedModel;
-use super::state_map::{AffineMap, StateMap};
+use super::*;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tangent {
@@ -25,8 +18,7 @@ pub struct Tangent {
     pub encode: DMatrix<f64>,
     /// `u_lat = project u`: `pinv(J_E^T) s_u`, `latent_dim x state_dim`.
     pub project: DMatrix<f64>,
-    /// `u = lift u_lat`: `J_E^T / s_u`, `state_dim x latent_dim`. From the power balance under `dz = encode dx`; joint
-    /// torques (N m) are the leading entries.
+    /// `u = lift u_lat`: `J_E^T / s_u`, `state_dim x latent_dim`, from the power balance under `dz = encode dx`.
     pub lift: DMatrix<f64>,
 }
 
@@ -36,34 +28,34 @@ impl ReducedModel {
         maps.all(|map| map.as_affine().is_some())
     }
 
-    pub fn encoder_map(&self) -> Result<&StateMap, ModelError> {
+    pub fn encoder_map(&self) -> Result<&StateMap> {
         let purpose = "going from robot to latent coordinates";
         self.require(self.parts.encoder.as_ref(), "encoder", purpose)
     }
 
-    pub fn decoder_map(&self) -> Result<&StateMap, ModelError> {
+    pub fn decoder_map(&self) -> Result<&StateMap> {
         let purpose = "going from latent to robot coordinates";
         self.require(self.parts.decoder.as_ref(), "decoder", purpose)
     }
 
     /// The encoder of a linear model, in scaled units: `W_e` is `latent_dim x state_dim`.
-    pub fn encoder(&self) -> Result<&AffineMap, ModelError> {
+    pub fn encoder(&self) -> Result<&AffineMap> {
         self.affine("encoder", self.encoder_map()?)
     }
 
     /// The decoder of a linear model, in scaled units: `W_d` is `state_dim x latent_dim`.
-    pub fn decoder(&self) -> Result<&AffineMap, ModelError> {
+    pub fn decoder(&self) -> Result<&AffineMap> {
         self.affine("decoder", self.decoder_map()?)
     }
 
-    pub fn input_projection(&self) -> Result<&DMatrix<f64>, ModelError> {
+    pub fn input_projection(&self) -> Result<&DMatrix<f64>> {
         self.encoder()?;
         let projection = self.input_projection.as_ref();
         self.require(projection, "encoder", "projecting inputs")
     }
 
     /// Encoder linearised about the state `x`, decoder about its latent state; the dynamics stay.
-    pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel, ModelError> {
+    pub fn linearised_at(&self, x: &DVector<f64>) -> Result<ReducedModel> {
         let scaled = self.scaled_state(x)?;
         let encoder = self.encoder_map()?;
         let z = encoder.apply(&scaled)?;
@@ -80,12 +72,12 @@ impl ReducedModel {
     }
 
     /// `z = E(s_x x)`, for a linear model `W_e (s_x x) + b_e`.
-    pub fn encode(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    pub fn encode(&self, x: &DVector<f64>) -> Result<DVector<f64>> {
         self.encoder_map()?.apply(&self.scaled_state(x)?)
     }
 
     /// `x = D(z) / s_x`, for a linear model `(W_d z + b_d) / s_x`.
-    pub fn decode(&self, z: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    pub fn decode(&self, z: &DVector<f64>) -> Result<DVector<f64>> {
         let scaled = self.decoder_map()?.apply(z)?;
         Ok(scaled.component_div(&self.state_factors()?))
     }
@@ -96,18 +88,15 @@ impl ReducedModel {
         x: &DVector<f64>,
         dx: &DVector<f64>,
         ddx: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
+    ) -> Result<DVector<f64>> {
         let (x, dx) = (self.scaled_state(x)?, self.scaled_state(dx)?);
         let ddx = self.scaled_state(ddx)?;
         let [_, _, ddz] = self.encoder_map()?.apply_rates(&x, &dx, &ddx)?;
         Ok(ddz)
     }
 
-    /// The maps that the encoder's Jacobian at the state `x` gives.
-    ///
-    /// # Errors
-    /// [`ModelError::Invalid`] where the Jacobian does not have full row rank.
-    pub fn tangent(&self, x: &DVector<f64>) -> Result<Tangent, ModelError> {
+    /// Refuses a state where the encoder's Jacobian does not have full row rank.
+    pub fn tangent(&self, x: &DVector<f64>) -> Result<Tangent> {
         let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
         let (s_x, s_u) = (self.state_factors()?, self.input_factors()?);
         let projection = match &self.input_projection {
@@ -123,30 +112,26 @@ impl ReducedModel {
     }
 
     /// `d z / d x = J_E s_x` at the state `x`, `latent_dim x state_dim`; of any rank.
-    pub fn encoder_jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
+    pub fn encoder_jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>> {
         let jacobian = self.encoder_map()?.jacobian(&self.scaled_state(x)?)?;
         let s_x = self.state_factors()?;
         Ok(jacobian.map_with_location(|_, column, value| value * s_x[column]))
     }
 
     /// `d x / d z = J_D / s_x` at the latent state `z`, `state_dim x latent_dim`.
-    pub fn decoder_jacobian(&self, z: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
+    pub fn decoder_jacobian(&self, z: &DVector<f64>) -> Result<DMatrix<f64>> {
         let jacobian = self.decoder_map()?.jacobian(z)?;
         let s_x = self.state_factors()?;
         Ok(jacobian.map_with_location(|row, _, value| value / s_x[row]))
     }
 
-    fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    fn scaled_state(&self, x: &DVector<f64>) -> Result<DVector<f64>> {
         let factors = self.state_factors()?;
         ModelError::check_dimension("robot state", x.len(), factors.len())?;
         Ok(x.component_mul(&factors))
     }
 
-    fn affine<'m>(
-        &self,
-        part: &'static str,
-        map: &'m StateMap,
-    ) -> Result<&'m AffineMap, ModelError> {
+    fn affine<'m>(&self, part: &'static str, map: &'m StateMap) -> Result<&'m AffineMap> {
         map.as_affine().ok_or_else(|| ModelError::Nonlinear {
             model: self.parts.name.clone(),
             part,
@@ -156,7 +141,7 @@ impl ReducedModel {
 }
 
 /// `y -> J(at) y + (map(at) - J(at) at)`.
-fn tangent(tensor: &str, map: &StateMap, at: &DVector<f64>) -> Result<AffineMap, ModelError> {
+fn tangent(tensor: &str, map: &StateMap, at: &DVector<f64>) -> Result<AffineMap> {
     let jacobian = map.jacobian(at)?;
     let bias = map.apply(at)? - &jacobian * at;
     AffineMap::new(tensor, jacobian, bias)
@@ -166,10 +151,7 @@ fn tangent(tensor: &str, map: &StateMap, at: &DVector<f64>) -> Result<AffineMap,
 pub(crate) const RANK_TOLERANCE: f64 = 1e-10;
 
 /// `pinv(W_e^T)`, `latent_dim x state_dim`, from the singular values of `W_e = U S V^T`: `pinv(W_e^T) = U S^-1 V^T`.
-pub(super) fn pinv_of_transpose(
-    weights: &DMatrix<f64>,
-    matrix: &str,
-) -> Result<DMatrix<f64>, ModelError> {
+pub(super) fn pinv_of_transpose(weights: &DMatrix<f64>, matrix: &str) -> Result<DMatrix<f64>> {
     let dim = weights.nrows();
     let deficient = |smallest: f64, largest: f64| {
         let found = format!("singular values from {smallest:e} to {largest:e}");
@@ -201,8 +183,7 @@ pub(super) fn pinv_of_transpose(
     Ok(projection)
 }
 
-/// Reduces the error of the iterative SVD, which can be 1e-10 even for well-conditioned matrices, by one Newton step on
-/// `P W_e^T = I`, which squares the residual.
+/// One Newton step on `P W_e^T = I` squares the residual of the iterative SVD, which can be 1e-10.
 fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
     const NEGLIGIBLE: f64 = 1e-13;
     let dim = projection.nrows();
@@ -305,8 +286,7 @@ impl Activation {
         }
     }
 
-    /// `phi(a)` with its first three derivatives; of elu at zero, where those from the second on jump, the ones of the
-    /// negative side.
+    /// `phi(a)` with its first three derivatives; of elu at zero those of the negative side.
     pub fn jet(self, a: f64) -> [f64; 4] {
         match self {
             Self::Linear => [a, 1.0, 0.0, 0.0],
@@ -330,7 +310,8 @@ impl Activation {
             Self::Relu if a.is_nan() => [a; 4],
             Self::Relu => [positive_part(a), f64::from(u8::from(a > 0.0)), 0.0, 0.0],
             Self::Gelu => {
-                let (cumulative, density) = (normal_cumulative(a), normal_density(a));
+                let density = DENSITY_AT_ZERO * (-0.5 * a * a).exp();
+                let cumulative = normal_cumulative(a);
                 // Far out the density is zero, and the powers of a before it need not be finite.
                 let far = |factor: f64| {
                     if density == 0.0 {
@@ -439,11 +420,8 @@ pub const TAIL: [f64; 22] = [
 
 pub const DENSITY_AT_ZERO: f64 = 0.398_942_280_401_432_7;
 
-/// Probability that a normal number is below `a`.
-///
-/// With `x = |a|/sqrt(2)` and `t = 2/(2 + x)` the tail is `exp(-x^2) t q(2 t - 1) / 2`, where `q` is the Chebyshev
-/// interpolation of `exp(x^2) erfc(x) / t`. Its error is below 1e-15 of the tail, and it needs no branch, so that
-/// generated code computes the same.
+/// With `x = |a|/sqrt(2)` and `t = 2/(2 + x)` the tail is `exp(-x^2) t q(2 t - 1) / 2`, where `q` interpolates
+/// `exp(x^2) erfc(x) / t` to 1e-15 without a branch, so that generated code computes the same.
 fn normal_cumulative(a: f64) -> f64 {
     let t = 2.0 / (2.0 + a.abs() * std::f64::consts::FRAC_1_SQRT_2);
     let w = 2.0 * t - 1.0;
@@ -454,12 +432,5 @@ fn normal_cumulative(a: f64) -> f64 {
     }
     let q = w * next - last + TAIL[0];
     let tail = 0.5 * t * q * (-0.5 * a * a).exp();
-    match a > 0.0 {
-        true => 1.0 - tail,
-        false => tail,
-    }
-}
-
-fn normal_density(a: f64) -> f64 {
-    DENSITY_AT_ZERO * (-0.5 * a * a).exp()
+    if a > 0.0 { 1.0 - tail } else { tail }
 }

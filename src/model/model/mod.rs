@@ -18,13 +18,8 @@
 //!         xi: DMatrix::from_column_slice(3, 1, &[-4.0, -0.1, 2.0]),
 //!     })
 //!     .build()?;
-//! let ddz = model.ddz(
-//!     0,
-//!     &DVector::from_element(1, 0.5),
-//!     &DVector::from_element(1, 1.0),
-//!     &DVector::from_element(1, 0.25),
-//! )?;
-//! assert_eq!(ddz[0], -4.0 * 0.5 - 0.1 * 1.0 + 2.0 * 0.25);
+//! let [z, dz, u_lat] = [0.5, 1.0, 0.25].map(|value| DVector::from_element(1, value));
+//! assert_eq!(model.ddz(0, &z, &dz, &u_lat)?[0], -4.0 * 0.5 - 0.1 * 1.0 + 2.0 * 0.25);
 //!
 //! // What a latent-only model cannot do, it says.
 //! assert!(model.encode(&DVector::zeros(18)).is_err());
@@ -65,3 +60,15 @@ pub use rom::{Phase, ReducedModel};
 pub use standard_library::{LibraryOrder, StandardLibrary};
 pub use state_map::{AffineMap, Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
 pub use statistics::{InputGivenState, InputStatistics};
+
+use std::collections::HashMap;
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector, Dim};
+use serde::{Deserialize, Serialize, Serializer};
+use serde_json::{Map, Value};
+use thiserror::Error;
+
+use crate::robot::{Actuators, ContactFlags, FOOT_DIM, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
+use error::{Result, check, check_count, check_finite, check_shape, check_tensor};
+use rom::selected;

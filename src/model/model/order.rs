@@ -1,22 +1,18 @@
 //! Orders in which other programs keep the coordinates of a robot.
 
-use std::fmt;
 use std::str::FromStr;
 
 use nalgebra::allocator::Allocator;
-use nalgebra::{DefaultAllocator, Dim, Dyn, OMatrix};
+use nalgebra::{DefaultAllocator, Dyn, OMatrix};
 
-use super::error::ModelError;
+use super::*;
 use crate::robot::joints::LEG_JOINT_DIM;
-use crate::robot::{BODY_DIM, BODY_NAMES, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, STATE_DIM};
+use crate::robot::{BODY_DIM, BODY_NAMES, JOINT_DIM, Leg};
 
 const KINDS: [&str; LEG_JOINT_DIM] = ["hx", "hy", "kn"];
 
-/// An order of the 18 coordinates of a robot and, alike, of its inputs.
-///
-/// Written as names separated by commas: coordinates (`fr.hx`, `body.z`), or groups of them in romc's order: a leg
-/// (`fr`), a kind of joint over the legs fr fl rr rl (`kn`), `joints`, `body`. Forces and moments stand where their
-/// coordinates of the body do.
+/// An order of the 18 coordinates of a robot, and of its inputs alike: names separated by commas, coordinates (`fr.hx`,
+/// `body.z`) or groups in romc's order: a leg (`fr`), a kind of joint over the legs (`kn`), `joints`, `body`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoordinateOrder {
     text: String,
@@ -41,8 +37,7 @@ impl CoordinateOrder {
         sorted
     }
 
-    /// The orders that are common: body first or last, legs in any order, joints by leg or by kind; first those in
-    /// which legs go in pairs from the front.
+    /// Body first or last, legs in any order, joints by leg or by kind; pairs of legs from the front first.
     pub fn common() -> Vec<Self> {
         let mut orders = Vec::new();
         for legs in leg_orders() {
@@ -105,7 +100,7 @@ fn group(name: &str) -> Option<Vec<usize>> {
 impl FromStr for CoordinateOrder {
     type Err = ModelError;
 
-    fn from_str(text: &str) -> Result<Self, ModelError> {
+    fn from_str(text: &str) -> Result<Self> {
         let refused = |found: String| {
             let expected = "each of the 18 coordinates once, as names (fr.hx, body.z) or groups \
                             (fr, hx, joints, body), separated by commas";

@@ -16,26 +16,14 @@
 //! A function that needs a part which the model lacks returns [`ModelError::Missing`]; one that gets a vector of the
 //! wrong length, [`ModelError::Invalid`].
 
-use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
-
-use super::builder::ModelBuilder;
-use super::coordinates::{CoordinateNames, Scaling};
-use super::error::{ModelError, check};
-use super::identifier::Identifier;
-use super::jump_prior::JumpPrior;
-use super::library::{CandidateTerm, Library};
-use super::listed;
-use super::statistics::InputStatistics;
-use crate::robot::{Actuators, ContactFlags, FeetRule, InputRule, Robot, WrenchFrame};
+use super::*;
+use crate::robot::{FeetRule, InputRule};
 
 /// One dynamics regime: `ddz = Xi^T Theta(z, dz, u_lat)`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Phase {
     pub name: String,
-    /// Foot patterns that select it; the first phase that matches wins.
     pub feet: FeetRule,
     /// Coefficients, `library_dim x latent_dim`, in scaled units.
     #[serde(with = "listed")]
@@ -71,7 +59,6 @@ pub struct ReducedModel {
 }
 
 impl ReducedModel {
-    /// Starts a model; the builder's `build` checks it.
     pub fn builder(name: impl Into<String>, library: Library) -> ModelBuilder {
         ModelBuilder::new(name.into(), library)
     }
@@ -85,7 +72,6 @@ impl ReducedModel {
         &self.parts.name
     }
 
-    /// The name as it appears in generated code.
     pub fn identifier(&self) -> &Identifier {
         &self.identifier
     }
@@ -117,7 +103,6 @@ impl ReducedModel {
         &self.parts.phases
     }
 
-    /// A phase's name as it appears in generated code.
     pub fn phase_identifier(&self, phase: usize) -> &Identifier {
         &self.phase_identifiers[phase]
     }
@@ -139,23 +124,20 @@ impl ReducedModel {
         self.parts.input.as_ref()
     }
 
-    pub fn scaling(&self) -> Result<&Scaling, ModelError> {
+    pub fn scaling(&self) -> Result<&Scaling> {
         let purpose = "going between SI and scaled units";
         self.require(self.parts.scaling.as_ref(), "scaling", purpose)
     }
 
-    /// `s_x`, one factor per robot coordinate.
-    pub fn state_factors(&self) -> Result<DVector<f64>, ModelError> {
+    pub fn state_factors(&self) -> Result<DVector<f64>> {
         Ok(self.scaling()?.state.expand(self.require_state_dim()?))
     }
 
-    /// `s_u`, one factor per input coordinate.
-    pub fn input_factors(&self) -> Result<DVector<f64>, ModelError> {
+    pub fn input_factors(&self) -> Result<DVector<f64>> {
         Ok(self.scaling()?.input.expand(self.require_state_dim()?))
     }
 
-    /// The robot whose coordinates are the model's state.
-    pub fn robot(&self) -> Result<&'static Robot, ModelError> {
+    pub fn robot(&self) -> Result<&'static Robot> {
         self.require(self.parts.robot, "robot", "kinematics and limits")
     }
 
@@ -164,30 +146,27 @@ impl ReducedModel {
         self.parts.actuators.as_ref()
     }
 
-    /// Axes of the force and moment in the model's inputs.
     pub fn wrench_frame(&self) -> WrenchFrame {
         self.parts.wrench_frame
     }
 
     /// How samples of the robot become the model's inputs, and its inputs commands.
-    pub fn input_rule(&self) -> Result<InputRule, ModelError> {
+    pub fn input_rule(&self) -> Result<InputRule> {
         let (robot, actuators) = (self.robot()?, self.parts.actuators.clone());
         Ok(InputRule::new(robot, actuators, self.parts.wrench_frame))
     }
 
-    /// Sampling period of the recordings behind the model, s.
-    pub fn sample_time_s(&self) -> Result<f64, ModelError> {
+    pub fn sample_time_s(&self) -> Result<f64> {
         self.require(self.parts.sample_time_s, "sample_time_s", "sampling")
     }
 
-    /// Landmarks and prior of the training jumps.
-    pub fn jump_prior(&self) -> Result<&JumpPrior, ModelError> {
+    pub fn jump_prior(&self) -> Result<&JumpPrior> {
         let purpose = "planning; `romc train` on jumps of one kind with a linear encoder makes it";
         self.require(self.parts.jump_prior.as_ref(), "prior", purpose)
     }
 
     /// Mean and covariance of the training inputs of one phase, SI units.
-    pub fn input_statistics(&self, phase: usize) -> Result<&InputStatistics, ModelError> {
+    pub fn input_statistics(&self, phase: usize) -> Result<&InputStatistics> {
         let phase = &self.phase(phase)?.name;
         let mut statistics = self.parts.statistics.iter();
         let found = statistics.find_map(|(name, found)| (name == phase).then_some(found));
@@ -196,15 +175,14 @@ impl ReducedModel {
         self.require(found, "input_statistics", purpose)
     }
 
-    /// Latent acceleration `ddz = Xi^T Theta(z, dz, u_lat)` of one phase, term by term in library order: the slow and
-    /// plain evaluation which compiled programs are tested against.
+    /// `Xi^T Theta(z, dz, u_lat)`, term by term: the slow evaluation that compiled programs are tested against.
     pub fn ddz(
         &self,
         phase: usize,
         z: &DVector<f64>,
         dz: &DVector<f64>,
         u_lat: &DVector<f64>,
-    ) -> Result<DVector<f64>, ModelError> {
+    ) -> Result<DVector<f64>> {
         let phase = self.phase(phase)?;
         let theta = self.parts.library.evaluate(z, dz, u_lat)?;
         Ok(DVector::from_fn(self.latent_dim(), |output, _| {
@@ -215,13 +193,8 @@ impl ReducedModel {
         }))
     }
 
-    /// Active terms of one output of a phase with their coefficients, in library order (the order in which the paper
-    /// prints them).
-    pub fn active_terms(
-        &self,
-        phase: usize,
-        output: usize,
-    ) -> Result<Vec<(f64, &CandidateTerm)>, ModelError> {
+    /// In library order, in which the paper prints them.
+    pub fn active_terms(&self, phase: usize, output: usize) -> Result<Vec<(f64, &CandidateTerm)>> {
         let (phase, dim) = (self.phase(phase)?, self.latent_dim());
         let place = "index of a latent coordinate";
         check(output < dim, place, || output, format!("below {dim}"))?;
@@ -231,14 +204,14 @@ impl ReducedModel {
             .collect())
     }
 
-    pub(crate) fn phase(&self, phase: usize) -> Result<&Phase, ModelError> {
+    pub(crate) fn phase(&self, phase: usize) -> Result<&Phase> {
         self.phases().get(phase).ok_or(ModelError::PhaseIndex {
             found: phase,
             count: self.phases().len(),
         })
     }
 
-    fn require_state_dim(&self) -> Result<usize, ModelError> {
+    fn require_state_dim(&self) -> Result<usize> {
         let purpose = "a vector in robot coordinates";
         self.require(self.state_dim(), "encoder", purpose)
     }
@@ -248,7 +221,7 @@ impl ReducedModel {
         part: Option<T>,
         name: &'static str,
         purpose: &'static str,
-    ) -> Result<T, ModelError> {
+    ) -> Result<T> {
         part.ok_or_else(|| ModelError::Missing {
             model: self.parts.name.clone(),
             part: name,

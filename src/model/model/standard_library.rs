@@ -1,20 +1,15 @@
 //! The standard library of candidate terms, in the order of the published arrays.
 
-use std::collections::HashMap;
-
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
-use serde::{Deserialize, Serialize};
 
-use super::error::{ModelError, check};
 use super::library::check_term_count;
+use super::*;
 
 pub(crate) const MAX_DEGREE: u32 = 8;
 
-/// The shorthand of the model file: which groups of terms a library has.
-///
-/// Order: constant; z; dz; monomials of degree 2 to `degree` over `(z, dz)`, graded, each with indices `i <= j <= k`;
-/// sin z; sin dz; cos z; cos dz; u.
+/// Groups of terms in this order: constant; z; dz; monomials of degree 2 to `degree` over `(z, dz)`, graded, each with
+/// indices `i <= j <= k`; sin z; sin dz; cos z; cos dz; u.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandardLibrary {
@@ -62,7 +57,6 @@ impl Run {
     }
 }
 
-/// The order in which a trainer keeps the terms of a standard library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LibraryOrder {
     groups: [Group; 5],
@@ -119,8 +113,7 @@ impl LibraryOrder {
         self.named().map(|(name, _)| name)
     }
 
-    /// Orders that trainers may have: those with names first, then others in which the constant or the inputs stand
-    /// elsewhere, cosines come first, or each z is followed by its dz.
+    /// Those with names, then those with groups elsewhere, cosines first, or each z followed by its dz.
     pub fn common() -> Vec<Self> {
         use Group::{Constant, Higher, Inputs, Linear, Trigonometric};
         let middle = [
@@ -197,15 +190,11 @@ impl StandardLibrary {
         })
     }
 
-    pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>, ModelError> {
+    pub(super) fn texts(&self, latent_dim: usize) -> Result<Vec<String>> {
         self.texts_in(LibraryOrder::ROMC, latent_dim)
     }
 
-    pub fn texts_in(
-        &self,
-        order: LibraryOrder,
-        latent_dim: usize,
-    ) -> Result<Vec<String>, ModelError> {
+    pub fn texts_in(&self, order: LibraryOrder, latent_dim: usize) -> Result<Vec<String>> {
         let expected = format!("at most {MAX_DEGREE}");
         let fits = self.degree <= MAX_DEGREE;
         check(fits, "`library.degree`", || self.degree, expected)?;
@@ -237,11 +226,7 @@ impl StandardLibrary {
         Ok(texts)
     }
 
-    pub fn rows_in(
-        &self,
-        order: LibraryOrder,
-        latent_dim: usize,
-    ) -> Result<Vec<usize>, ModelError> {
+    pub fn rows_in(&self, order: LibraryOrder, latent_dim: usize) -> Result<Vec<usize>> {
         let own = self.texts(latent_dim)?;
         let rows: HashMap<&str, usize> = (own.iter().map(String::as_str)).zip(0..).collect();
         let texts = self.texts_in(order, latent_dim)?;
@@ -276,8 +261,7 @@ fn monomials(
 }
 
 fn monomial_text(names: &[String], factors: &[usize]) -> String {
-    let powers: Vec<String> = factors
-        .chunk_by(|a, b| a == b)
+    let powers: Vec<String> = (factors.chunk_by(|a, b| a == b))
         .map(|run| match run.len() {
             1 => names[run[0]].clone(),
             exponent => format!("{}^{exponent}", names[run[0]]),

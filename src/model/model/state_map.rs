@@ -3,20 +3,12 @@
 //! With `a_k = W_k y_(k-1) + b_k` and `y_k = phi_k(a_k)`, the map takes `y_0` to `y_L`; its Jacobian is `J = D_L W_L
 //! ... D_1 W_1` with `D_k = diag(phi_k'(a_k))`. An affine map is the chain of one linear layer.
 
-use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
-
-use super::error::{ModelError, check, check_count, check_finite, check_shape};
-use super::listed;
-use super::maps::Activation;
+use super::*;
 
 pub const MAX_LAYERS: usize = 16;
 pub const MAX_LAYER_WIDTH: usize = 1024;
 
-/// The map `x -> W x + b`, in scaled units.
-///
-/// As an encoder `W_e` is `latent_dim x state_dim`, as a decoder `W_d` is `state_dim x latent_dim`. Positions take the
-/// bias, velocities and accelerations do not.
+/// `x -> W x + b` in scaled units; velocities and accelerations do not take the bias.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AffineMap {
     weights: DMatrix<f64>,
@@ -24,17 +16,13 @@ pub struct AffineMap {
 }
 
 impl AffineMap {
-    pub fn new(
-        tensor: &str,
-        weights: DMatrix<f64>,
-        bias: DVector<f64>,
-    ) -> Result<Self, ModelError> {
+    pub fn new(tensor: &str, weights: DMatrix<f64>, bias: DVector<f64>) -> Result<Self> {
         let map = Self { weights, bias };
         map.check(tensor)?;
         Ok(map)
     }
 
-    fn check(&self, tensor: &str) -> Result<(), ModelError> {
+    fn check(&self, tensor: &str) -> Result<()> {
         let bias_name = format!("{tensor}.bias");
         check_shape(&bias_name, self.bias.shape(), (self.weights.nrows(), 1))?;
         check_finite(&format!("{tensor}.weights"), &self.weights)?;
@@ -57,11 +45,11 @@ impl AffineMap {
         self.weights.nrows()
     }
 
-    fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>> {
         Ok(self.apply_linear(x)? + &self.bias)
     }
 
-    fn apply_linear(&self, dx: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    fn apply_linear(&self, dx: &DVector<f64>) -> Result<DVector<f64>> {
         ModelError::check_dimension("argument of an affine map", dx.len(), self.input_dim())?;
         Ok(&self.weights * dx)
     }
@@ -76,9 +64,6 @@ pub struct Layer {
 }
 
 /// A smooth map between scaled coordinates: an encoder or a decoder.
-///
-/// Positions go through [`StateMap::apply`]; velocities and accelerations through its first and second time derivative
-/// ([`StateMap::apply_rates`]), which for a linear map are `W dx` and `W ddx`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "MapKeys", into = "MapKeys")]
 pub struct StateMap {
@@ -170,20 +155,15 @@ impl From<AffineMap> for StateMap {
 }
 
 impl StateMap {
-    pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self, ModelError> {
+    pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self> {
         let map = Self { layers };
         map.check_chain(tensor)?;
         Ok(map)
     }
 
-    pub(super) fn check_chain(&self, tensor: &str) -> Result<(), ModelError> {
-        let n_layers = self.layers.len();
-        check_count(
-            &format!("`{tensor}.layers`"),
-            n_layers,
-            "layers",
-            1..=MAX_LAYERS,
-        )?;
+    pub(super) fn check_chain(&self, tensor: &str) -> Result<()> {
+        let (place, n_layers) = (format!("`{tensor}.layers`"), self.layers.len());
+        check_count(&place, n_layers, "layers", 1..=MAX_LAYERS)?;
         if let Some(affine) = self.as_affine() {
             return affine.check(tensor);
         }
@@ -225,22 +205,20 @@ impl StateMap {
         (self.output_dim(), self.input_dim())
     }
 
-    pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
+    pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>> {
         let mut layers = self.layers.iter();
         layers.try_fold(x.clone(), |y, layer| {
             Ok((layer.map.apply(&y)?).map(|a| layer.activation.value(a)))
         })
     }
 
-    /// How positions, velocities and accelerations map: `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`.
-    ///
-    /// Each layer takes `dy -> phi'(a) W dy` and `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
+    /// `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`: each layer takes `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
     pub fn apply_rates(
         &self,
         x: &DVector<f64>,
         dx: &DVector<f64>,
         ddx: &DVector<f64>,
-    ) -> Result<[DVector<f64>; 3], ModelError> {
+    ) -> Result<[DVector<f64>; 3]> {
         let (mut y, mut dy, mut ddy) = (x.clone(), dx.clone(), ddx.clone());
         for layer in &self.layers {
             let a = layer.map.apply(&y)?;
@@ -256,7 +234,7 @@ impl StateMap {
         Ok([y, dy, ddy])
     }
 
-    pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
+    pub fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>> {
         let mut y = x.clone();
         let mut jacobian = None;
         for layer in &self.layers {
@@ -275,7 +253,7 @@ impl StateMap {
     }
 
     /// Checks what enters the first layer and what leaves the last; `expected` is the Jacobian's shape.
-    pub(super) fn check(&self, name: &str, expected: (usize, usize)) -> Result<(), ModelError> {
+    pub(super) fn check(&self, name: &str, expected: (usize, usize)) -> Result<()> {
         if let Some(affine) = self.as_affine() {
             let (tensor, found) = (format!("{name}.weights"), affine.weights().shape());
             return check_shape(&tensor, found, expected);
@@ -291,7 +269,7 @@ impl StateMap {
     }
 
     /// No layer of an encoder may be narrower than the latent space, or its Jacobian never has full rank.
-    pub(super) fn check_widths(&self, latent_dim: usize) -> Result<(), ModelError> {
+    pub(super) fn check_widths(&self, latent_dim: usize) -> Result<()> {
         let widths = self.layers.iter().map(|layer| layer.map.output_dim());
         for (layer, width) in widths.enumerate() {
             let (place, found) = (format!("`encoder.layers[{layer}]`"), || {

@@ -1,13 +1,6 @@
-//! Statistics of the inputs of the training recordings.
-//!
-//! What the latent state says of the latent input.
+//! Statistics of the training inputs, and what the latent state says of the latent input.
 
-use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
-
-use super::error::{ModelError, check, check_tensor};
-use super::listed;
-use super::maps::complement;
+use super::*;
 
 /// Largest relative asymmetry and most negative eigenvalue that count as rounding.
 const ROUNDING: f64 = 1e-9;
@@ -44,14 +37,7 @@ impl InputStatistics {
         (projection * &self.mean, covariance)
     }
 
-    /// Complains unless mean and covariance are those of some distribution over `dim` inputs, and over `latent_dim`
-    /// latent ones.
-    pub(super) fn check(
-        &self,
-        phase: &str,
-        dim: usize,
-        latent_dim: usize,
-    ) -> Result<(), ModelError> {
+    pub(super) fn check(&self, phase: &str, dim: usize, latent_dim: usize) -> Result<()> {
         let place = format!("input_statistics.{phase}");
         check_tensor(&format!("{place}.mean"), &self.mean, (dim, 1))?;
         check_covariance(&format!("{place}.covariance"), &self.covariance, dim)?;
@@ -66,17 +52,13 @@ pub(super) fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
     (&matrix + matrix.transpose()) * 0.5
 }
 
-pub(super) fn check_covariance(
-    tensor: &str,
-    found: &DMatrix<f64>,
-    dim: usize,
-) -> Result<(), ModelError> {
+pub(super) fn check_covariance(tensor: &str, found: &DMatrix<f64>, dim: usize) -> Result<()> {
     check_tensor(tensor, found, (dim, dim))?;
     check_symmetric(tensor, found)?;
     check_positive(tensor, found)
 }
 
-fn check_symmetric(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelError> {
+fn check_symmetric(tensor: &str, covariance: &DMatrix<f64>) -> Result<()> {
     let bound = ROUNDING * covariance.amax();
     for (row, column) in (0..covariance.nrows()).flat_map(|i| (0..i).map(move |j| (i, j))) {
         let [found, mirror] = [(row, column), (column, row)].map(|at| covariance[at]);
@@ -87,7 +69,7 @@ fn check_symmetric(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelE
     Ok(())
 }
 
-fn check_positive(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelError> {
+fn check_positive(tensor: &str, covariance: &DMatrix<f64>) -> Result<()> {
     let largest_entry = covariance.amax();
     if largest_entry == 0.0 {
         return Ok(());
@@ -112,8 +94,7 @@ fn check_positive(tensor: &str, covariance: &DMatrix<f64>) -> Result<(), ModelEr
 const LEAST_SAMPLES: usize = 4;
 const RIDGE: f64 = 1e-2;
 
-/// The latent input of one phase given the latent state, `u_lat | z, dz ~ (mean [1; z; dz], covariance)`, and how far
-/// the model's accelerations are off. Scaled units.
+/// `u_lat | z, dz ~ (mean [1; z; dz], covariance)` of one phase, and how far the model's accelerations are off. Scaled.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputGivenState {
@@ -128,9 +109,8 @@ pub struct InputGivenState {
 }
 
 impl InputGivenState {
-    /// Ridge regression of the inputs on the states of samples in rows: `[z, dz, u_lat]`, and what the model leaves of
-    /// `ddz`. Shifts of `z` along the columns of `shifts` change no input, as where a robot is does not. None for fewer
-    /// samples than say something.
+    /// Ridge regression on samples in rows, `[z, dz, u_lat]`; `left` is the rest of `ddz`. Shifts of `z` along the
+    /// columns of `shifts` change no input. None for fewer samples than say something.
     pub fn of_samples(
         shifts: &DMatrix<f64>,
         mut variables: DMatrix<f64>,
@@ -150,9 +130,7 @@ impl InputGivenState {
         error.gemm_tr(share, left, left, 1.0);
         // States without their shifts.
         let mut still = DMatrix::identity(2 * d, 2 * d);
-        still
-            .view_mut((0, 0), (d, d))
-            .copy_from(&complement(shifts));
+        (still.view_mut((0, 0), (d, d))).copy_from(&complement(shifts));
         let state = &still * covariance.view((0, 0), (2 * d, 2 * d)) * &still;
         let input = covariance.view((2 * d, 2 * d), (d, d));
         let both = covariance.view((2 * d, 0), (d, 2 * d)) * &still;
@@ -170,7 +148,7 @@ impl InputGivenState {
         })
     }
 
-    pub(super) fn check(&self, place: &str, latent_dim: usize) -> Result<(), ModelError> {
+    pub(super) fn check(&self, place: &str, latent_dim: usize) -> Result<()> {
         let (mean, shape) = (format!("{place}.mean"), (latent_dim, 1 + 2 * latent_dim));
         check_tensor(&mean, &self.mean, shape)?;
         for (key, matrix) in [

@@ -1,6 +1,6 @@
 //! From a panel to marks on a plane; y grows downwards, lengths are points. Round numbers along an axis.
 
-use super::figure::{Drawing, Figure, HeatMap, Panel, Role, Series, StickPlot};
+use super::*;
 
 const LEFT: f64 = 38.0;
 const TOP: f64 = 17.0;
@@ -24,7 +24,6 @@ pub(crate) enum Paint {
     Heat(f64),
 }
 
-#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Mark {
     /// A filled rectangle: corner, width, height.
     Rectangle([f64; 4], Paint),
@@ -231,12 +230,8 @@ fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec
         let x = left + (column as f64 + 0.5) * cell.0;
         marks.push(Mark::text(x, bottom + 11.0, Anchor::Middle, name));
     }
-    marks.push(Mark::text(
-        size.0 - RIGHT,
-        bottom + 22.0,
-        Anchor::End,
-        x_label,
-    ));
+    let right = size.0 - RIGHT;
+    marks.push(Mark::text(right, bottom + 22.0, Anchor::End, x_label));
     marks
 }
 
@@ -257,7 +252,7 @@ fn heat_scale(title: &str, left: f64, largest: f64) -> Vec<Mark> {
 }
 
 fn draw_sticks(title: &str, plot: &StickPlot, size: (f64, f64)) -> Vec<Mark> {
-    let (x, z) = (plot.extent.forward_m, plot.extent.up_m);
+    let [x, z] = plot.extent_m;
     let (width, height) = (size.0 - 2.0 * RIGHT, size.1 - TOP - RIGHT);
     let scale = (width / (x.1 - x.0)).min(height / (z.1 - z.0));
     let left = RIGHT + 0.5 * (width - scale * (x.1 - x.0));
@@ -283,12 +278,8 @@ fn ticks((low, high): (f64, f64)) -> Vec<(f64, String)> {
         return vec![(low, number(low, 2))];
     }
     let power = 10f64.powf(rough.log10().floor());
-    let mut steps = [1.0, 2.0, 5.0, 10.0]
-        .map(|factor| factor * power)
-        .into_iter();
-    let step = steps
-        .find(|step| *step >= rough * 0.999)
-        .unwrap_or(10.0 * power);
+    let mut steps = ([1.0, 2.0, 5.0, 10.0].map(|factor| factor * power)).into_iter();
+    let step = (steps.find(|step| *step >= rough * 0.999)).unwrap_or(10.0 * power);
     let places = (-step.log10().floor()).max(0.0) as usize;
     let first = (low / step - 1e-9).ceil() as i64;
     let last = (high / step + 1e-9).floor() as i64;
@@ -324,31 +315,4 @@ fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
         _ => 0.05 * low.abs() + 1e-6,
     };
     (low - margin, high + margin)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_mark_of_a_runaway_prediction_stays_inside_the_frame() {
-        let line =
-            |role, values: [f64; 3]| Series::over(role, &[0.0, 1.0, 2.0], |k| Some(values[k]));
-        let lines = vec![
-            line(Role::Recorded, [0.2, 0.3, 0.25]),
-            line(Role::Full, [0.2, 0.21, -1e9]),
-            line(Role::Limit, [3.0; 3]),
-        ];
-        let panel = Panel::shaded("body.z, m", lines, vec![(1.0, 9.0)]);
-        let marks = draw_panel(&panel, (240.0, 150.0), "time, s");
-        let lines = marks.iter().filter_map(|mark| match mark {
-            Mark::Line(points, _) => Some(points),
-            Mark::Rectangle(..) | Mark::Rule(..) | Mark::Text(..) => None,
-        });
-        let points: Vec<_> = lines.flatten().collect();
-        // three recorded, two before the prediction leaves, three of the limit
-        assert_eq!(points.len(), 8);
-        let inside = |p: &&(f64, f64)| (0.0..=240.0).contains(&p.0) && (0.0..=150.0).contains(&p.1);
-        assert!(points.iter().all(inside));
-    }
 }

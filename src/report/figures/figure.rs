@@ -1,6 +1,6 @@
 //! The content of a figure: panels, lines, shades, captions.
 
-use super::sticks::{Extent, Sticks};
+use super::Sticks;
 
 /// The meaning of a line, which selects its colour and dashes in every figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -74,7 +74,8 @@ pub(crate) struct HeatMap {
 
 pub(crate) struct StickPlot {
     pub sticks: Vec<(Role, Sticks)>,
-    pub extent: Extent,
+    /// Ranges forwards and upwards.
+    pub extent_m: [(f64, f64); 2],
     pub floor_m: f64,
 }
 

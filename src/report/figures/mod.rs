@@ -1,29 +1,30 @@
 //! Figures: data that draws itself as SVG and PDF and lists itself as CSV.
 //!
-//! A [`Figure`] holds numbers and words. `draw.rs` turns its panels into a list of marks, once; `svg.rs` and `pdf.rs`
-//! spell the same marks; `sticks.rs` turns states of a robot into lines. Start with `figure.rs`.
+//! A [`Figure`] holds numbers and words. `draw.rs` turns its panels into a list of marks, once; `spelling.rs`
+//! spells them; `sticks.rs` turns states of a robot into lines. Start with `figure.rs`.
 
 mod draw;
 mod figure;
-mod pdf;
+mod spelling;
 mod sticks;
-mod svg;
 
 pub(crate) use draw::{range, subscript};
 pub use figure::Role;
 pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Series};
+pub(crate) use spelling::panel_svg;
 pub(crate) use sticks::{Film, Motion, film, film_strip, floor_m};
-pub(crate) use svg::panel_svg;
 
 use crate::files::EmittedFile;
 use crate::typeset::Table;
+use crate::typeset::mathml::HtmlText;
+use figure::StickPlot;
 use sticks::Sticks;
 
 pub(crate) fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
     let file = |ending, contents| EmittedFile::new(format!("{}.{ending}", figure.id), contents);
     [
-        file("svg", svg::standalone_svg(figure)),
-        file("pdf", pdf::pdf(figure)),
+        file("svg", spelling::standalone_svg(figure)),
+        file("pdf", spelling::pdf(figure)),
         file("csv", csv(figure)),
     ]
 }

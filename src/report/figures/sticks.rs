@@ -1,16 +1,13 @@
-//! Stick figures: a robot at a state, seen from its right; strips of them over time, and in motion: one drawing for a
-//! page, and the lines of each instant for the page's script.
+//! Stick figures: a robot at a state, seen from its right; strips of them over time, and animations.
 
 use std::fmt::Write as _;
 
 use nalgebra::{DVector, Vector3};
 
-use super::draw::range;
-use super::figure::{Drawing, Figure, Panel, Role, StickPlot};
+use super::*;
 use crate::recording::Segment;
 use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
-use crate::typeset::mathml::HtmlText;
 
 const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
 
@@ -24,11 +21,7 @@ pub(crate) struct Sticks {
 impl Sticks {
     pub(crate) const NAMES: [&str; 1 + FOOT_DIM] = ["trunk", "fr", "fl", "rr", "rl"];
 
-    /// `robot` at the state `x` (18: joint angles in rad, body position in m, roll, pitch and yaw in rad), projected on
-    /// the vertical plane that contains the direction `heading_rad`.
-    ///
-    /// # Panics
-    /// If `x` does not have 18 entries.
+    /// `robot` at the state `x` (18), projected on the vertical plane that contains the direction `heading_rad`.
     pub(crate) fn of(robot: &Robot, x: &[f64], heading_rad: f64) -> Self {
         assert_eq!(x.len(), STATE_DIM, "a state of the robot");
         let joints: [f64; JOINT_DIM] = std::array::from_fn(|joint| x[joint]);
@@ -57,26 +50,15 @@ impl Sticks {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Extent {
-    pub forward_m: (f64, f64),
-    pub up_m: (f64, f64),
-}
-
-impl Extent {
-    pub(crate) fn around<'a>(sticks: impl IntoIterator<Item = &'a Sticks>, floor_m: f64) -> Self {
-        let lines = sticks.into_iter().flat_map(|sticks| &sticks.lines);
-        let (forward, mut up): (Vec<f64>, Vec<f64>) = lines.flatten().copied().unzip();
-        up.push(floor_m);
-        let margin = |(low, high): (f64, f64)| match low <= high {
-            true => (low - MARGIN_M, high + MARGIN_M),
-            false => (0.0, 1.0),
-        };
-        Self {
-            forward_m: margin(range(forward)),
-            up_m: margin(range(up)),
-        }
-    }
+/// Ranges forwards and upwards that hold sticks and floor.
+fn extent_m<'a>(sticks: impl Iterator<Item = &'a Sticks>, floor_m: f64) -> [(f64, f64); 2] {
+    let lines = sticks.flat_map(|sticks| &sticks.lines);
+    let (forward, mut up): (Vec<f64>, Vec<f64>) = lines.flatten().copied().unzip();
+    up.push(floor_m);
+    [forward, up].map(|values| match range(values) {
+        (low, high) if low <= high => (low - MARGIN_M, high + MARGIN_M),
+        _ => (0.0, 1.0),
+    })
 }
 
 pub(crate) struct Motion {
@@ -167,18 +149,19 @@ pub(crate) fn film_strip(
         motions.iter().filter_map(sticks).collect::<Vec<_>>()
     };
     let frames: Vec<_> = chosen.iter().map(|&sample| sticks_at(sample)).collect();
-    let extent = Extent::around(frames.iter().flatten().map(|(_, sticks)| sticks), floor_m);
+    let extent_m = extent_m(frames.iter().flatten().map(|(_, sticks)| sticks), floor_m);
+    let [forward, up] = extent_m;
     let start_s = time_s.first().copied().unwrap_or(0.0);
     let panels = chosen.iter().zip(frames).map(|(&sample, sticks)| Panel {
         title: format!("{:.2} s", time_s[sample] - start_s),
         drawing: Drawing::Sticks(StickPlot {
             sticks,
-            extent,
+            extent_m,
             floor_m,
         }),
     });
     let width = 156.0;
-    let slope = (extent.up_m.1 - extent.up_m.0) / (extent.forward_m.1 - extent.forward_m.0);
+    let slope = (up.1 - up.0) / (forward.1 - forward.0);
     Figure {
         id,
         caption,
@@ -195,8 +178,7 @@ const MOST_FRAMES: usize = 72;
 pub(crate) struct Film {
     /// An `svg` element with a `g` for each motion, which holds a polyline for each of [`Sticks::NAMES`].
     pub svg: String,
-    /// JSON: `{"time": [s], "lines": [[motion][instant]]}` with the points of all lines of a motion at an instant,
-    /// joined by semicolons as `polyline` takes them; empty where there is no prediction.
+    /// JSON `{"time": [s], "lines": [[motion][instant]]}`: the lines as `polyline` takes them, or an empty text.
     pub frames: String,
     pub shown: usize,
     pub count: usize,
@@ -245,8 +227,7 @@ pub(crate) fn film(
         .map(|motion| motion.iter().map(joined).collect())
         .collect();
 
-    let extent = Extent::around(sticks.iter().flatten().flatten(), floor_m);
-    let (x, z) = (extent.forward_m, extent.up_m);
+    let [x, z] = extent_m(sticks.iter().flatten().flatten(), floor_m);
     let millimetres = |value: f64| (1e3 * value).round();
     let (left, top) = (millimetres(x.0), -millimetres(z.1));
     let (width, height) = (millimetres(x.1 - x.0), millimetres(z.1 - z.0));
