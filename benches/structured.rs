@@ -1,7 +1,7 @@
 //! The structured solver on problems from a file, against clarabel at 1e-9.
 //!
 //! ```text
-//! cargo bench --bench structured -- FILE.bin... [--times FILE.txt] [--slack PRICE]
+//! cargo bench --bench structured -- FILE.bin... [--times FILE.txt]
 //! ```
 //!
 //! A file holds one closed loop of an MPC in latent coordinates, little-endian: int32 `d, N, T, 0`;
@@ -19,9 +19,9 @@
 use std::io::Write as _;
 
 use romc::mpc::problem::Row;
-use romc::mpc::widest::{prepare, solve};
+use romc::mpc::widest::{has_avx2, prepare, solve};
 use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, needed_rows, sparse};
-use romc::solver::{Cost, Links, Outcome, Pairs, Program, RowMatrices, Settings, Shape, Stage};
+use romc::solver::{Cost, Links, Outcome, Program, RowMatrices, Settings, Shape, Stage};
 
 #[path = "shared/clock.rs"]
 mod clock;
@@ -31,6 +31,9 @@ const WEIGHT_N: f64 = 118.0;
 
 /// How often a loop is run.
 const REPEATS: usize = 3;
+
+/// Price of leaving a joint limit, above the multipliers of the problems: the limits are then kept.
+const PRICE: f64 = 1e4;
 
 /// Reads numbers of a file one after the other.
 struct Reader {
@@ -187,14 +190,11 @@ fn run<const NX: usize, const NU: usize>(
 ) -> (Vec<f64>, String) {
     let shared: Loop<NU> = read_loop(&mut reader, horizon);
     let rows = |rows: &[([f64; NU], f64)]| rows.iter().map(|(row, _)| *row).collect::<Vec<_>>();
-    let (input, hard) = (rows(&shared.input_rows), rows(&shared.joint_rows));
+    let (input, soft) = (rows(&shared.input_rows), rows(&shared.joint_rows));
     let shape = Shape {
         input: input.len(),
-        hard: hard.len(),
-        pairs: Pairs {
-            input: pairs(&input),
-            hard: pairs(&hard),
-        },
+        soft: soft.len(),
+        pairs: pairs(&input),
         ..Shape::default()
     };
     let state: [f64; NX] = std::array::from_fn(|i| 2.0 * shared.state_weight[i]);
@@ -202,7 +202,7 @@ fn run<const NX: usize, const NU: usize>(
         state,
         terminal: state.map(|weight| shared.terminal * weight),
         input: std::array::from_fn(|j| 2.0 * shared.input_weight[j]),
-        slack: 0.0,
+        slack: PRICE,
     };
     let settings = Settings {
         max_iterations: 60,
@@ -228,8 +228,7 @@ fn run<const NX: usize, const NU: usize>(
                 shape,
                 matrices: RowMatrices {
                     input: &input,
-                    soft: &[],
-                    hard: &hard,
+                    soft: &soft,
                 },
                 links: Links::none(),
                 cost,
@@ -241,8 +240,16 @@ fn run<const NX: usize, const NU: usize>(
                 }
                 write(&mut program, &shared, step);
                 let x0 = std::array::from_fn(|i| step.x0[i] - step.reference[i]);
-                prepare(&mut program);
-                report = Some(solve(&mut program, &x0, is_warm, &settings));
+                report = Some(match has_avx2() {
+                    true => {
+                        prepare::<true, NX, NU>(&mut program);
+                        solve::<true, NX, NU>(&mut program, &x0, is_warm, &settings)
+                    }
+                    false => {
+                        prepare::<false, NX, NU>(&mut program);
+                        solve::<false, NX, NU>(&mut program, &x0, is_warm, &settings)
+                    }
+                });
             });
             times[tick] = time.min(times[tick]);
             first = program.first;
@@ -283,7 +290,7 @@ fn run<const NX: usize, const NU: usize>(
         "d {NU}, N {horizon}, {} + {} rows a stage: median {:.1} us, 99 % {:.1} us; iterations {} / {} / {}; \
          inputs within {off:.1e}, cost within {cost_off:.1e} of clarabel's at 1e-9; {unsolved} of {ticks} unsolved",
         shape.input,
-        shape.hard,
+        shape.soft,
         clock::percentile(&times, 0.5),
         clock::percentile(&times, 0.99),
         clock::percentile(&iterations, 0.5),
@@ -294,7 +301,7 @@ fn run<const NX: usize, const NU: usize>(
 }
 
 fn write<const NX: usize, const NU: usize>(
-    program: &mut Program<'_, f64, NX, NU, false>,
+    program: &mut Program<'_, f64, NX, NU>,
     shared: &Loop<NU>,
     step: &Step,
 ) {

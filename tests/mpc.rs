@@ -2,6 +2,8 @@
 
 #[path = "mpc/control.rs"]
 mod control;
+#[path = "mpc/estimates.rs"]
+mod estimates;
 #[path = "mpc/failures.rs"]
 mod failures;
 #[path = "mpc/interface.rs"]

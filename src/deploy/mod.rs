@@ -4,27 +4,30 @@
 //! [`write_files`](crate::files::write_files) puts into a folder. Equations come from `typeset`, code from `codegen`;
 //! `controller` adds the sources of `romc-control` and `romc-robot` and the model's numbers. Read `emit` first.
 
-/// Templates of whole files, each a struct of its first line and the `Facts` of its module. The caller writes the
-/// derive: askama looks for files from where it stands.
+/// Templates of whole files and their paths, in which `NAME` stands for the model's name, and `texts` of them. The
+/// caller writes the derive: askama looks for files from where it stands.
 macro_rules! templates {
-    (#[$derive:meta] $($template:ident: $path:tt),* $(,)?) => {
-        templates! { @each [#[$derive]] $($template: $path),* }
+    (#[$derive:meta] $($path:literal: $template:ident $source:literal),* $(,)?) => {
+        templates! { @each [#[$derive]] $($template $source),* }
+
+        /// Path and text of each file.
+        fn texts(facts: &Facts<'_>, provenance: &str) -> askama::Result<Vec<(String, String)>> {
+            Ok(vec![$({
+                let banner = &crate::deploy::banner($path, provenance);
+                let text = askama::Template::render(&$template { banner, facts })?;
+                ($path.replace("NAME", facts.name), crate::codegen::tidy(&text))
+            }),*])
+        }
     };
-    (@each $derive:tt $($template:ident: $path:tt),*) => {$(
-        templates! { @one $derive $template: $path }
+    (@each $derive:tt $($template:ident $source:literal),*) => {$(
+        templates! { @one $derive $template $source }
     )*};
-    (@one [$($derive:tt)*] $template:ident: $path:tt) => {
+    (@one [$($derive:tt)*] $template:ident $source:literal) => {
         $($derive)*
-        #[template(path = $path, config = "templates/askama.toml")]
+        #[template(path = $source, config = "templates/askama.toml")]
         struct $template<'a> {
             banner: &'a str,
             facts: &'a Facts<'a>,
-        }
-
-        impl<'a> $template<'a> {
-            fn text(banner: &'a str, facts: &'a Facts<'a>) -> askama::Result<String> {
-                askama::Template::render(&Self { banner, facts })
-            }
         }
 
         impl<'a> std::ops::Deref for $template<'a> {
@@ -46,3 +49,13 @@ mod planned;
 pub use emit::{EmitOptions, Target, emit};
 pub use error::EmitError;
 pub(crate) use planned::PlannedJump;
+
+/// The first line of a generated file: a comment in its language, or the text for a template to make one of.
+fn banner(path: &str, provenance: &str) -> String {
+    match path.rsplit_once('.').map(|(_, ending)| ending) {
+        Some("c" | "h") => format!("/* {provenance} */"),
+        Some("rs" | "cpp" | "hpp") => format!("// {provenance}"),
+        Some("md" | "xml") => provenance.to_owned(),
+        _ => format!("# {provenance}"),
+    }
+}

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::EmitError;
 use super::controller_c::source::{Numbers, integers, list, nested};
-use crate::codegen::Precision;
+use crate::codegen::{Precision, tidy};
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
 use crate::recording;
@@ -83,87 +83,78 @@ impl PlannedJump {
         }
     }
 
-    /// `NAME_jump.h`, with `what` it is in words.
+    /// Path and text of `NAME_jump.h`, with `what` it is in words.
     pub(super) fn constants(
         &self,
         what: &str,
-        (banner, upper): (&str, &str),
+        name: &str,
+        provenance: &str,
         precision: Precision,
-    ) -> String {
+    ) -> (String, String) {
+        let upper = name.to_ascii_uppercase();
         let count = self.time_s.len();
         let real = match precision {
             Precision::Double => "double",
             Precision::Single => "float",
         };
-        let times = Numbers(Precision::Double).vector(self.time_s.iter().copied());
+        let times = Numbers(Precision::Double).vector(&self.time_s);
         let columns = |name: &str, rows: usize, matrix: &DMatrix<f64>| {
             let columns = (0..count).map(|k| matrix.column(k).iter().copied().collect::<Vec<_>>());
             let values = Numbers(precision).matrix(columns);
             format!("static const {real} JUMP_{name}[{count}][{rows}] = {values};\n")
         };
-        let feet = self.feet.iter().map(|feet| integers(feet.map(i64::from)));
-        format!(
-            "{banner}\n/* {what}: times, states, velocities, motor torques and feet of {count} samples. */\n\
+        let text = format!(
+            "/* {provenance} */\n\
+             /* {what}: times, states, velocities, motor torques and feet of {count} samples. */\n\
              #ifndef {upper}_JUMP_H\n#define {upper}_JUMP_H\n\n#include <stdint.h>\n\n\
              static const double JUMP_TIME_S[{count}] = {times};\n{}{}{}\
              static const uint8_t JUMP_FEET[{count}][{FOOT_DIM}] = {};\n\n#endif\n",
             columns("X", STATE_DIM, &self.x),
             columns("DX", STATE_DIM, &self.dx),
             columns("TORQUE", JOINT_DIM, &self.torque_nm),
-            nested(feet),
-        )
+            self.feet_in_c(),
+        );
+        (format!("{name}_jump.h"), tidy(&text))
+    }
+
+    fn feet_in_c(&self) -> String {
+        nested(self.feet.iter().map(|feet| integers(feet.map(i64::from))))
     }
 
     /// `NAME_plan.h` and `NAME_plan.c` below `folder`, C99; `provenance` is their first line.
     pub fn files(&self, folder: &str, name: &str, provenance: &str) -> [EmittedFile; 2] {
-        let path = |ending: &str| format!("{folder}/{name}_plan.{ending}");
-        [
-            EmittedFile::new(path("h"), self.header(name, provenance)),
-            EmittedFile::new(path("c"), self.source(name, provenance)),
-        ]
-    }
-
-    fn header(&self, name: &str, provenance: &str) -> String {
-        let upper = name.to_ascii_uppercase();
-        let count = self.time_s.len();
-        format!(
-            "/* {provenance} */\n\
-             /* A planned jump: states, velocities and inputs in SI units, one row per sample. */\n\
-             #ifndef {upper}_PLAN_H\n#define {upper}_PLAN_H\n\n\
-             #include <stdint.h>\n\n\
-             #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
-             enum {{ {upper}_PLAN_COUNT = {count} }};\n\n\
-             extern const double {name}_plan_time_s[{upper}_PLAN_COUNT];\n\
-             extern const double {name}_plan_x[{upper}_PLAN_COUNT][{STATE_DIM}];\n\
-             extern const double {name}_plan_dx[{upper}_PLAN_COUNT][{STATE_DIM}];\n\
-             extern const double {name}_plan_u[{upper}_PLAN_COUNT][{STATE_DIM}];\n\
-             extern const uint8_t {name}_plan_feet[{upper}_PLAN_COUNT][4];\n\n\
-             #ifdef __cplusplus\n}}\n#endif\n\n#endif\n"
-        )
-    }
-
-    fn source(&self, name: &str, provenance: &str) -> String {
         let upper = name.to_ascii_uppercase();
         let one = |value: &f64| format!("{value:.*e}", DIGITS - 1);
         let columns = |rows: &DMatrix<f64>| {
             let columns = rows.column_iter();
             nested(columns.map(|column| list(column.iter().map(one))))
         };
-        let feet = self.feet.iter().map(|feet| integers(feet.map(i64::from)));
         let states = format!("[{STATE_DIM}]");
         let arrays = [
             ("double", "time_s", "", list(self.time_s.iter().map(one))),
             ("double", "x", &states, columns(&self.x)),
             ("double", "dx", &states, columns(&self.dx)),
             ("double", "u", &states, columns(&self.u)),
-            ("uint8_t", "feet", "[4]", nested(feet)),
+            ("uint8_t", "feet", "[4]", self.feet_in_c()),
         ];
-        let arrays = arrays.map(|(kind, of, width, values)| {
-            format!("\nconst {kind} {name}_plan_{of}[{upper}_PLAN_COUNT]{width} = {values};\n")
-        });
-        format!(
-            "/* {provenance} */\n#include \"{name}_plan.h\"\n{}",
-            arrays.concat()
-        )
+        let (mut declared, mut defined) = (String::new(), String::new());
+        for (kind, of, width, values) in arrays {
+            let array = format!("const {kind} {name}_plan_{of}[{upper}_PLAN_COUNT]{width}");
+            declared += &format!("extern {array};\n");
+            defined += &format!("\n{array} = {values};\n");
+        }
+        let header = format!(
+            "/* {provenance} */\n\
+             /* A planned jump: states, velocities and inputs in SI units, one row per sample. */\n\
+             #ifndef {upper}_PLAN_H\n#define {upper}_PLAN_H\n\n\
+             #include <stdint.h>\n\n\
+             #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
+             enum {{ {upper}_PLAN_COUNT = {} }};\n\n{declared}\n\
+             #ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
+            self.time_s.len(),
+        );
+        let source = format!("/* {provenance} */\n#include \"{name}_plan.h\"\n{defined}");
+        [("h", header), ("c", source)]
+            .map(|(ending, text)| EmittedFile::new(format!("{folder}/{name}_plan.{ending}"), text))
     }
 }

@@ -22,7 +22,6 @@
 /* Smallest and largest estimate. */
 #define ONLINE_LEAST (real)0.7
 
-/* Cap on the interior-point iterations of a lift. */
 #define ONLINE_LIFT_ITERATIONS 60
 
 /* Most that legs are turned, rad. */
@@ -641,7 +640,6 @@ static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, 
     return position >= lower ? (position > upper ? upper : position) : lower;
 }
 
-/* As known before a motion. */
 static inline MAYBE_UNUSED online_share online_share_unknown(void)
 {
     return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};

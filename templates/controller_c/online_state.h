@@ -1,7 +1,6 @@
 /* @generated from src/control by `cargo run -p romc-translate`: state of the controller's own steps. Names that are defined
  * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
-/* The estimate and the sums behind it. */
 typedef struct {
     /* gamma. */
     real estimate;

@@ -37,15 +37,12 @@ typedef struct {
     real by_state[NU][NX];
     /* N, of which the lower triangle is written. */
     real square[NU][NU];
-    /* Gradient. */
     real linear[NU];
 } solver_before;
 
 /* Where slacks and multipliers are centred. */
 typedef struct {
-    /* Smallest slack. */
     double slack;
-    /* Smallest product of slack and multiplier. */
     double product;
 } solver_centring;
 
@@ -80,15 +77,6 @@ typedef struct {
 /* How a solve ended. */
 typedef enum { SOLVER_SOLVED, SOLVER_INACCURATE, SOLVER_ITERATION_CAP, SOLVER_NUMERICAL_FAILURE, SOLVER_INFEASIBLE, SOLVER_UNBOUNDED } solver_outcome;
 
-/* Pairs of opposite rows. */
-typedef struct {
-    /* Among the rows on the input. */
-    int input;
-    /* Among the hard rows. */
-    int hard;
-} solver_pairs;
-
-/* How far a point is from the optimum. */
 typedef struct {
     /* Share of the gradient that the steps since the last centring have left. */
     real left;
@@ -122,15 +110,11 @@ typedef struct {
     int input;
     /* Rows on the first NU states at the stage's end, which share one slack. */
     int soft;
-    /* Rows on NU states at the stage's end from hard_offset on. */
-    int hard;
-    /* First state of the hard rows. */
-    int hard_offset;
-    /* Rows that link the input to that of the stage before; none unless the program has Links. */
+    /* Rows that link the input to that of the stage before; their coefficients are in Links. */
     int link;
-    /* How many pairs of opposite rows come first, the two sides of a limit: row, -row. Each takes the products and
-     * squares of one row. */
-    solver_pairs pairs;
+    /* How many pairs of opposite rows on the input come first, the two sides of a limit: row, -row. Each takes the
+     * products and squares of one row. */
+    int pairs;
 } solver_shape;
 
 /* Coefficients of the rows; stages may share them. */
@@ -139,11 +123,9 @@ typedef struct {
     real (*input)[NU];
     /* E of E x - t <= bound. */
     real (*soft)[NU];
-    /* E of E x <= bound. */
-    real (*hard)[NU];
 } solver_row_matrices;
 
-/* A program with the memory to solve it, all lent by the caller; LINKED if it has Links. */
+/* A program with the memory to solve it, all lent by the caller. */
 typedef struct {
     /* Stages of the horizon. */
     solver_stage *stages;
@@ -204,7 +186,6 @@ typedef struct {
     real *residual;
     real *dslack;
     real *dmultiplier;
-    /* Inverse of the slack. */
     real *inverse;
 } solver_rows;
 
@@ -240,14 +221,9 @@ static inline int solver_program_at(solver_program *self, int stage)
     return place < self->stages_len ? place : place - self->stages_len;
 }
 
-static inline int solver_shape_first_hard(solver_shape *self)
-{
-    return self->input + self->soft + (self->soft > 0 ? 1 : 0);
-}
-
 static inline int solver_shape_first_link(solver_shape *self)
 {
-    return solver_shape_first_hard(self) + self->hard;
+    return self->input + self->soft + (self->soft > 0 ? 1 : 0);
 }
 
 /* Rows of a stage; a slack's own t >= 0 follows its soft rows. */
@@ -262,7 +238,7 @@ static inline int solver_shape_memory(solver_shape *self)
     return SOLVER_ROW_NUMBERS * solver_shape_rows(self);
 }
 
-/* Right-hand sides of a stage's rows: input, soft, hard, link; the one of t >= 0 in between is zero. */
+/* Right-hand sides of a stage's rows: input, soft, link; the one of t >= 0 in between is zero. */
 static inline real *solver_program_bounds_mut(solver_program *self, int stage)
 {
     const int first = solver_program_at(self, stage) * solver_shape_memory(&self->shape);
@@ -842,7 +818,6 @@ static inline void solver_times(real (*rows)[NU], int pairs, int count, const re
     }
 }
 
-/* The row of the slack, if there are soft rows. */
 static inline int solver_shape_slack_row(solver_shape *self)
 {
     return self->input + self->soft;
@@ -853,13 +828,14 @@ static inline solver_rows solver_program_rows_times(solver_program *restrict sel
         const real *v, const real *x, real t)
 {
     solver_shape shape = self->shape;
+    const bool linked = LINKED;
     const int memory = solver_shape_memory(&shape);
     const int place = solver_program_at(self, k);
     const int before_place = k > 0 ? solver_program_at(self, k - 1) : 0;
     solver_rows rows = solver_rows_of(self->rows + place * memory, solver_shape_rows(&shape));
     solver_stage *stage = &self->stages[place];
     real (*input)[NU] = self->matrices.input + stage->input_rows;
-    solver_times(input, shape.pairs.input, shape.input, v, rows.target);
+    solver_times(input, shape.pairs, shape.input, v, rows.target);
     if (NU <= NX && shape.soft > 0) {
         const real *z = x + 0;
         real (*soft)[NU] = self->matrices.soft + stage->soft_rows;
@@ -869,13 +845,7 @@ static inline solver_rows solver_program_rows_times(solver_program *restrict sel
         }
         rows.target[solver_shape_slack_row(&shape)] = -t;
     }
-    if (NU <= NX && shape.hard > 0) {
-        const real *z = x + shape.hard_offset;
-        real (*hard)[NU] = self->matrices.hard + stage->hard_rows;
-        real *products = rows.target + solver_shape_first_hard(&shape);
-        solver_times(hard, shape.pairs.hard, shape.hard, z, products);
-    }
-    if (LINKED) {
+    if (linked) {
         real *products = rows.target + solver_shape_first_link(&shape);
         const int first = place * shape.link;
         solver_times(self->links.rows + first, 0, shape.link, v, products);
@@ -923,7 +893,6 @@ static inline real solver_program_follow_gains(solver_program *restrict self, co
     return worst;
 }
 
-/* The end of a solve that met a number that is not finite. */
 static inline solver_report solver_failure(int iterations)
 {
     const real zero = 0;
@@ -1004,7 +973,6 @@ static inline real solver_or_larger(real self, real other)
     return self > other ? self : other;
 }
 
-/* L of a stage, of a program with links. */
 static inline real (*solver_program_link_rows(solver_program *self, int k))[NU]
 {
     return self->links.rows + solver_program_at(self, k) * self->shape.link;
@@ -1013,6 +981,7 @@ static inline real (*solver_program_link_rows(solver_program *self, int k))[NU]
 /* How far the optimum without rows moved since the last program, in units of the input's rows. */
 static inline real solver_program_change_of_gains(solver_program *self)
 {
+    const bool linked = LINKED;
     real largest = 0;
     for (int k = 0; k < self->stages_len; ++k) {
         const int at = solver_program_at(self, k);
@@ -1027,7 +996,7 @@ static inline real solver_program_change_of_gains(solver_program *self)
         for (int i = 0; i < self->shape.input; ++i) {
             largest = solver_or_larger(solver_magnitude(solver_dot(input[i], change)), largest);
         }
-        if (LINKED) {
+        if (linked) {
             real (*links)[NU] = solver_program_link_rows(self, k);
             for (int i = 0; i < self->shape.link; ++i) {
                 largest = solver_or_larger(solver_magnitude(solver_dot(links[i], change)), largest);
@@ -1114,7 +1083,6 @@ static inline solver_point solver_program_centre(solver_program *self, solver_ce
     return (solver_point){.left = 1, .kept = 1, .residual = residual, .sum = sum, .largest = largest, .value = 1};
 }
 
-/* Largest residual of a row. */
 static inline real solver_point_infeasibility(solver_point *self)
 {
     return self->kept * self->residual;
@@ -1129,14 +1097,19 @@ static inline bool solver_point_is_optimal(solver_point *self, solver_settings *
             || self->sum <= settings->gap * solver_or_larger(1, self->value));
 }
 
-/* No cost, as after the last stage. */
+/* How soft the rows are: not at all without links. */
+static inline real solver_program_softness(solver_program *self)
+{
+    return LINKED ? self->links.softness : 0;
+}
+
 static inline solver_before solver_before_zeros(void)
 {
     return (solver_before){.by_state = {{0}}, .square = {{0}}, .linear = {0}};
 }
 
-/* The same of rows that are softened. */
-static inline void solver_rows_weigh_softened(solver_rows *self, real softness)
+/* Weights of the rows, and multipliers aimed at by a step that does not centre, in dmultiplier. */
+static inline void solver_rows_weigh(solver_rows *self, real left, real softness)
 {
     for (int i = 0; i < self->count; ++i) {
         const real yield_of_row = softness * self->multiplier[i];
@@ -1144,30 +1117,15 @@ static inline void solver_rows_weigh_softened(solver_rows *self, real softness)
         const real weight = self->multiplier[i] * inverse;
         self->inverse[i] = inverse;
         self->weight[i] = weight;
-        self->dmultiplier[i] = weight * (self->residual[i] + yield_of_row);
+        self->dmultiplier[i] = weight * (left * self->residual[i] + yield_of_row);
     }
 }
 
-/* Weights of the rows, and multipliers aimed at by a step that does not centre, in dmultiplier. */
-static inline void solver_rows_weigh(solver_rows *self, real left)
-{
-    for (int i = 0; i < self->count; ++i) {
-        const real inverse = 1 / self->slack[i];
-        const real weight = self->multiplier[i] * inverse;
-        self->inverse[i] = inverse;
-        self->weight[i] = weight;
-        self->dmultiplier[i] = weight * (left * self->residual[i]);
-    }
-}
-
-/* A matrix of zeros. */
 static inline solver_lower solver_lower_zeros(void)
 {
-    (void)sizeof(char[(NU <= SOLVER_WIDE) ? 1 : -1]);
     return (solver_lower){.blocks = {{{0}}}};
 }
 
-/* A diagonal matrix. */
 static inline solver_lower solver_lower_diagonal(const real *entries)
 {
     solver_lower out = solver_lower_zeros();
@@ -1193,11 +1151,12 @@ static inline void solver_lower_add_square(solver_lower *restrict self, real w, 
     }
 }
 
-/* square += sum of w row row^T and sum += sum of y row of count rows, of which so many pairs of opposite ones come first. */
-static inline void solver_add_weighted(const real *w, const real *y, real (*rows)[NU], int pairs, int count,
-        solver_lower *restrict square, real sum[restrict NU])
+/* Adds sum of w row row^T, and to sum sum of y row, of count rows, of which so many pairs of opposite ones come first. */
+static inline void solver_lower_add_rows(solver_lower *restrict self, const real *w, const real *y, real (*rows)[NU],
+        int pairs, int count, real sum[restrict NU])
 {
-    solver_lower local = *square;
+    /* Local sums stay in registers. */
+    solver_lower local = *self;
     real local_sum[NU];
     memcpy(local_sum, sum, sizeof local_sum);
     for (int pair = 0; pair < pairs; ++pair) {
@@ -1209,23 +1168,22 @@ static inline void solver_add_weighted(const real *w, const real *y, real (*rows
         solver_lower_add_square(&local, w[i], rows[i]);
         solver_add_multiple_nu(y[i], rows[i], local_sum);
     }
-    *square = local;
+    *self = local;
     memcpy(sum, local_sum, sizeof(real[NU]));
 }
 
-/* An entry on or below the diagonal. */
 static inline real solver_lower_entry(solver_lower *self, int i, int j)
 {
     return self->blocks[j / 4][i][j % 4];
 }
 
-/* Adds the symmetric matrix to a block on the diagonal of another, from this row on. */
-static inline void solver_lower_add_to(solver_lower *self, int first, real matrix[restrict NX][NX])
+/* Adds the symmetric matrix to the first block on the diagonal of another. */
+static inline void solver_lower_add_to(solver_lower *self, real matrix[restrict NX][NX])
 {
     for (int i = 0; i < NU; ++i) {
         for (int j = 0; j < NU; ++j) {
             const real entry = i < j ? solver_lower_entry(self, j, i) : solver_lower_entry(self, i, j);
-            matrix[first + i][first + j] += entry;
+            matrix[i][j] += entry;
         }
     }
 }
@@ -1244,7 +1202,7 @@ static inline void solver_stage_add_soft_rows(solver_stage *restrict self, const
         by_t -= y[i];
         solver_add_multiple_nu(w[i], rows[i], pull);
     }
-    solver_add_weighted(w, y, rows, 0, count, &square, by_z);
+    solver_lower_add_rows(&square, w, y, rows, 0, count, by_z);
     memcpy(self->soft_pull, pull, sizeof(real[NU]));
     self->soft_inverse = 1 / (curvature + w[count]);
     self->dt = -(by_t - y[count]) * self->soft_inverse;
@@ -1252,7 +1210,7 @@ static inline void solver_stage_add_soft_rows(solver_stage *restrict self, const
         by_z[j] = by_z[j] - pull[j] * self->dt;
     }
     solver_lower_add_square(&square, -self->soft_inverse, pull);
-    solver_lower_add_to(&square, 0, p);
+    solver_lower_add_to(&square, p);
 }
 
 /* Writes the rows, of which only the entries up to the diagonal are those of the matrix. */
@@ -1389,6 +1347,8 @@ static inline bool solver_program_predict(solver_program *self, real left)
     solver_shape shape = self->shape;
     const int memory = solver_shape_memory(&shape);
     const int horizon = self->stages_len;
+    const bool linked = LINKED;
+    const real softness = solver_program_softness(self);
     solver_before after = solver_before_zeros();
     solver_products products = solver_products_zeros();
     real p[NX][NX] = {{0}};
@@ -1398,11 +1358,7 @@ static inline bool solver_program_predict(solver_program *self, real left)
         const int at = solver_program_at(self, k);
         const int before = k > 0 ? solver_program_at(self, k - 1) : 0;
         solver_rows rows = solver_rows_of(self->rows + at * memory, solver_shape_rows(&shape));
-        if (LINKED) {
-            solver_rows_weigh_softened(&rows, self->links.softness);
-        } else {
-            solver_rows_weigh(&rows, left);
-        }
+        solver_rows_weigh(&rows, left, softness);
         const real *w = rows.weight;
         const real *y = rows.dmultiplier;
         solver_stage *stage = &self->stages[at];
@@ -1416,47 +1372,37 @@ static inline bool solver_program_predict(solver_program *self, real left)
         }
         solver_lower hessian = solver_lower_diagonal(self->cost.input);
         real (*input)[NU] = self->matrices.input + stage->input_rows;
-        solver_add_weighted(w, y, input, shape.pairs.input, shape.input, &hessian, by_v);
+        solver_lower_add_rows(&hessian, w, y, input, shape.pairs, shape.input, by_v);
         if (NU <= NX && shape.soft > 0) {
             real (*soft)[NU] = self->matrices.soft + stage->soft_rows;
             real *by_z = by_x + 0;
             const real *w_soft = w + shape.input;
             const real *y_soft = y + shape.input;
-            solver_stage_add_soft_rows(stage, w_soft, y_soft, soft, shape.soft, self->cost.slack, by_z, p);
-        }
-        if (NU <= NX && shape.hard > 0) {
-            real (*hard)[NU] = self->matrices.hard + stage->hard_rows;
-            real *by_z = by_x + shape.hard_offset;
-            const real *w_hard = w + solver_shape_first_hard(&shape);
-            const real *y_hard = y + solver_shape_first_hard(&shape);
-            solver_lower square = solver_lower_zeros();
-            solver_add_weighted(w_hard, y_hard, hard, shape.pairs.hard, shape.hard, &square, by_z);
-            solver_lower_add_to(&square, shape.hard_offset, p);
+            const real price = self->cost.slack;
+            solver_stage_add_soft_rows(stage, w_soft, y_soft, soft, shape.soft, price, by_z, p);
         }
         solver_products_clear_hessian(&products);
-        if (LINKED) {
-            const int link = shape.link;
+        if (linked) {
             const real *w_link = w + solver_shape_first_link(&shape);
             const real *y_link = y + solver_shape_first_link(&shape);
-            real (*own)[NU] = self->links.rows + at * link;
-            real (*earlier)[NU] = self->links.rows + before * link;
-            solver_add_weighted(w_link, y_link, own, 0, link, &hessian, by_v);
+            real (*own)[NU] = self->links.rows + at * shape.link;
+            solver_lower_add_rows(&hessian, w_link, y_link, own, 0, shape.link, by_v);
             solver_lower_write_rows(&hessian, products.hvv);
             solver_before_add_to(&after, stage, by_v, &products);
-            if (!solver_eliminate(stage, p, &products)) {
-                return false;
-            }
-            solver_stage_pull(stage, by_x, by_v);
-            if (k > 0) {
-                real (*gain)[NU] = self->links.gains[at];
-                solver_before_write(&after, stage, gain, w_link, y_link, own, earlier, link, by_v);
-            }
         } else {
             solver_lower_write_rows(&hessian, products.hvv);
-            if (!solver_eliminate(stage, p, &products)) {
-                return false;
-            }
-            solver_stage_pull(stage, by_x, by_v);
+        }
+        if (!solver_eliminate(stage, p, &products)) {
+            return false;
+        }
+        solver_stage_pull(stage, by_x, by_v);
+        if (linked && k > 0) {
+            real (*gain)[NU] = self->links.gains[at];
+            real (*own)[NU] = self->links.rows + at * shape.link;
+            real (*earlier)[NU] = self->links.rows + before * shape.link;
+            const real *w_link = w + solver_shape_first_link(&shape);
+            const real *y_link = y + solver_shape_first_link(&shape);
+            solver_before_write(&after, stage, gain, w_link, y_link, own, earlier, shape.link, by_v);
         }
     }
     return true;
@@ -1470,23 +1416,13 @@ static inline real solver_boundary_share(real complementarity)
             ? 1 - solver_or_larger((real)SOLVER_LEAST_MARGIN, margin) : 1 - (real)SOLVER_MOST_MARGIN;
 }
 
-/* The same of rows that are softened. */
-static inline void solver_rows_aim_softened(solver_rows *self, real softness, real aim)
-{
-    for (int i = 0; i < self->count; ++i) {
-        const real second = self->dslack[i] * self->dmultiplier[i];
-        const real residual = self->residual[i] + softness * self->multiplier[i];
-        self->dmultiplier[i] = self->weight[i] * residual + (aim - second) * self->inverse[i];
-    }
-}
-
 /* Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of the step
  * that does not centre. */
-static inline void solver_rows_aim_at(solver_rows *self, real left, real aim)
+static inline void solver_rows_aim_at(solver_rows *self, real left, real softness, real aim)
 {
     for (int i = 0; i < self->count; ++i) {
         const real second = self->dslack[i] * self->dmultiplier[i];
-        const real residual = left * self->residual[i];
+        const real residual = left * self->residual[i] + softness * self->multiplier[i];
         self->dmultiplier[i] = self->weight[i] * residual + (aim - second) * self->inverse[i];
     }
 }
@@ -1512,9 +1448,10 @@ static inline real solver_program_add_rows_pull(solver_program *self, int k, con
         real by_x[restrict NX])
 {
     solver_shape shape = self->shape;
+    const bool linked = LINKED;
     solver_stage *stage = &self->stages[solver_program_at(self, k)];
     real (*input)[NU] = self->matrices.input + stage->input_rows;
-    solver_add_rows(y, input, shape.pairs.input, shape.input, by_v);
+    solver_add_rows(y, input, shape.pairs, shape.input, by_v);
     real by_t = 0;
     if (NU <= NX && shape.soft > 0) {
         const real *y_soft = y + shape.input;
@@ -1527,13 +1464,7 @@ static inline real solver_program_add_rows_pull(solver_program *self, int k, con
         solver_add_rows(y_soft, soft, 0, shape.soft, by_z);
         by_t -= y_soft[shape.soft];
     }
-    if (NU <= NX && shape.hard > 0) {
-        real (*hard)[NU] = self->matrices.hard + stage->hard_rows;
-        real *by_z = by_x + shape.hard_offset;
-        const real *y_hard = y + solver_shape_first_hard(&shape);
-        solver_add_rows(y_hard, hard, shape.pairs.hard, shape.hard, by_z);
-    }
-    if (LINKED) {
+    if (linked) {
         const real *y_link = y + solver_shape_first_link(&shape);
         solver_add_rows(y_link, solver_program_link_rows(self, k), 0, shape.link, by_v);
     }
@@ -1546,17 +1477,14 @@ static inline void solver_program_pull_all(solver_program *self, real left, real
 {
     solver_shape shape = self->shape;
     const int horizon = self->stages_len;
-    const real softness = self->links.softness;
+    const bool linked = LINKED;
+    const real softness = solver_program_softness(self);
     real p[NX] = {0};
     real by_after[NU] = {0};
     for (int k = horizon - 1; k >= 0; --k) {
         const int at = solver_program_at(self, k);
         solver_rows rows = solver_program_rows_of(self, k);
-        if (LINKED) {
-            solver_rows_aim_softened(&rows, softness, aim);
-        } else {
-            solver_rows_aim_at(&rows, left, aim);
-        }
+        solver_rows_aim_at(&rows, left, softness, aim);
         solver_stage *stage = &self->stages[at];
         const real *weight = solver_cost_state_at(&self->cost, k, horizon);
         real by_v[NU] = {0};
@@ -1568,7 +1496,7 @@ static inline void solver_program_pull_all(solver_program *self, real left, real
         }
         const real *aims = self->rows + (at * solver_shape_memory(&shape) + 7 * solver_shape_rows(&shape));
         const real by_t = solver_program_add_rows_pull(self, k, aims, by_v, p);
-        if (LINKED) {
+        if (linked) {
             for (int i = 0; i < NU; ++i) {
                 by_v[i] += by_after[i];
             }
@@ -1586,7 +1514,7 @@ static inline void solver_program_pull_all(solver_program *self, real left, real
             }
         }
         solver_stage_pull(stage, p, by_v);
-        if (LINKED && k > 0) {
+        if (linked && k > 0) {
             solver_take_answer(self->links.gains[at], by_v, by_after);
         }
     }
@@ -1650,7 +1578,8 @@ static inline void solver_rows_change(solver_rows *self, real left)
 static inline solver_reach solver_program_advance(solver_program *self, real left, bool is_corrected)
 {
     const int soft = self->shape.soft;
-    const real softness = self->links.softness;
+    const bool linked = LINKED;
+    const real softness = solver_program_softness(self);
     real times = 0;
     real second_sum = 0;
     real second_largest = 0;
@@ -1661,7 +1590,7 @@ static inline solver_reach solver_program_advance(solver_program *self, real lef
         solver_stage *stage = &self->stages[at];
         real dv[NU] = {0};
         solver_stage_answer(stage, dx, dv);
-        if (LINKED && k > 0) {
+        if (linked && k > 0) {
             solver_answer_before(self->links.gains[at], before, dv);
         }
         real end[NX] = {0};
@@ -1678,7 +1607,7 @@ static inline solver_reach solver_program_advance(solver_program *self, real lef
         const real dt = stage->dt;
         solver_rows rows = solver_program_rows_times(self, k, before, dv, dx, dt);
         memcpy(before, dv, sizeof(real[NU]));
-        if (LINKED) {
+        if (linked) {
             solver_rows_change_softened(&rows, softness);
         } else if (is_corrected) {
             solver_rows_change_corrected(&rows, left);
@@ -1697,11 +1626,11 @@ static inline solver_reach solver_program_advance(solver_program *self, real lef
     return (solver_reach){.times = times, .second_sum = second_sum, .second_largest = second_largest};
 }
 
-/* Moves all unknowns along their changes. */
 static inline void solver_program_move_by(solver_program *restrict self, real length, solver_point *restrict point)
 {
     const int horizon = self->stages_len;
-    const real softness = self->links.softness;
+    const bool linked = LINKED;
+    const real softness = solver_program_softness(self);
     /* The rows are linear: each step takes its share of all residuals. */
     const real rest = 1 - length;
     real sum = 0;
@@ -1729,7 +1658,7 @@ static inline void solver_program_move_by(solver_program *restrict self, real le
         }
         sum += solver_sum_of(rows.target, rows.count);
         largest = solver_largest_of(rows.target, rows.count, largest);
-        if (LINKED) {
+        if (linked) {
             for (int i = 0; i < rows.count; ++i) {
                 rows.residual[i] = rest * rows.residual[i] + length * (softness * rows.dmultiplier[i]);
                 residual = solver_or_larger(solver_magnitude(rows.residual[i]), residual);
@@ -1737,7 +1666,7 @@ static inline void solver_program_move_by(solver_program *restrict self, real le
         }
     }
     point->left = rest * point->left;
-    if (LINKED) {
+    if (linked) {
         point->residual = residual;
     } else {
         point->kept = rest * point->kept;
@@ -1798,6 +1727,7 @@ static inline real solver_or_kept_larger(real self, real other)
 static inline solver_residuals solver_program_residuals(solver_program *restrict self, const real *x0)
 {
     const int horizon = self->stages_len;
+    const bool linked = LINKED;
     solver_shape shape = self->shape;
     real primal = 0;
     real dual = 0;
@@ -1852,7 +1782,7 @@ static inline solver_residuals solver_program_residuals(solver_program *restrict
         }
         const real *y = self->rows + (at * solver_shape_memory(&shape) + 2 * solver_shape_rows(&shape));
         const real by_t = solver_program_add_rows_pull(self, k, y, by_v, p);
-        if (LINKED) {
+        if (linked) {
             for (int i = 0; i < NU; ++i) {
                 by_v[i] += by_before[i];
             }

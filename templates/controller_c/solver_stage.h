@@ -15,8 +15,6 @@ typedef struct {
     int input_rows;
     /* First of this stage's rows in RowMatrices::soft. */
     int soft_rows;
-    /* First of this stage's rows in RowMatrices::hard. */
-    int hard_rows;
     /* Input of the last solution. */
     real v[NU];
     /* State at the stage's end in the last solution. */

@@ -1,7 +1,7 @@
 /* Solves programs of the structured solver in C that is made from its Rust, from standard input to standard output, in
- * doubles of native byte order. Sizes are macros: NX, NU, REAL, LINKED. Each program has seven counts (rows on inputs,
- * soft, hard, first state of the hard ones, links, pairs on inputs, hard pairs), the diagonals of the cost, price and
- * softness, x0, for each of ten places a, b, c, rows on inputs, hard ones, links and bounds, and the soft rows. It is
+ * doubles of native byte order. Sizes are macros: NX, NU, REAL, LINKED. Each program has four counts (rows on inputs,
+ * soft, links, pairs on inputs), the diagonals of the cost, price and
+ * softness, x0, for each of ten places a, b, c, rows on inputs, links and bounds, and the soft rows. It is
  * solved three times: from x0, then by the last solution from shares of it. */
 #include <stdbool.h>
 #include <stddef.h>
@@ -48,7 +48,7 @@ static void put_all(const real *values, int count)
 
 static solver_stage stages[HORIZON];
 static real memory[HORIZON * MOST_ROWS * SOLVER_ROW_NUMBERS];
-static real input[HORIZON * MOST_ROWS][NU], soft[MOST_ROWS][NU], hard[HORIZON * MOST_ROWS][NU];
+static real input[HORIZON * MOST_ROWS][NU], soft[MOST_ROWS][NU];
 static real links[HORIZON * MOST_ROWS][NU], gains[HORIZON][NU][NU];
 
 static solver_program read_program(real x0[NX])
@@ -63,14 +63,10 @@ static solver_program read_program(real x0[NX])
     p.first = 3;
     p.shape.input = (int)number();
     p.shape.soft = (int)number();
-    p.shape.hard = (int)number();
-    p.shape.hard_offset = (int)number();
     p.shape.link = (int)number();
-    p.shape.pairs.input = (int)number();
-    p.shape.pairs.hard = (int)number();
+    p.shape.pairs = (int)number();
     p.matrices.input = input;
     p.matrices.soft = soft;
-    p.matrices.hard = hard;
     p.links.rows = links;
     p.links.gains = gains;
     read_all(p.cost.state, NX);
@@ -82,12 +78,10 @@ static solver_program read_program(real x0[NX])
     for (int place = 0; place < HORIZON; ++place) {
         solver_stage *stage = &stages[place];
         stage->input_rows = place * p.shape.input;
-        stage->hard_rows = place * p.shape.hard;
         read_all(stage->a[0], NX * NX);
         read_all(stage->b[0], NX * NU);
         read_all(stage->c, NX);
         read_all(input[stage->input_rows], p.shape.input * NU);
-        read_all(hard[stage->hard_rows], p.shape.hard * NU);
         read_all(links[place * p.shape.link], p.shape.link * NU);
         read_all(memory + place * solver_shape_memory(&p.shape), solver_shape_rows(&p.shape));
     }

@@ -6,9 +6,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use romc::solver::{
-    Cost, Links, Outcome, Pairs, Program, Real, RowMatrices, Settings, Shape, Stage,
-};
+use romc::solver::{Cost, Links, Outcome, Program, Real, RowMatrices, Settings, Shape, Stage};
 use romc_translate::{Source, Unit, controller, solver_of, translate};
 
 use crate::emitted::STRICT;
@@ -26,9 +24,8 @@ fn random_program(
     links: usize,
 ) -> Vec<f64> {
     let tightness = [0.02, 1.0, 2.0, 4.0][number % 4];
-    let (soft, hard) = [(3, 2), (0, 0), (3, 0), (0, 2)][number / 4 % 4];
-    let (input, input_pairs, hard_pairs) = (6 + nu, 2, hard / 2);
-    let counts = [input, soft, hard, nx - nu, links, input_pairs, hard_pairs];
+    let (input, pairs, soft) = (6 + nu, 2, [3, 0][number / 4 % 2]);
+    let counts = [input, soft, links, pairs];
     let mut values: Vec<f64> = counts.map(|count| count as f64).into();
     // Now and then a cost is not convex, or a number not finite.
     let curvature = if number % 13 == 12 { -0.3 } else { 0.1 };
@@ -48,7 +45,7 @@ fn random_program(
         }
         values.extend((0..nx * nu).map(|_| random.signed()));
         values.extend((0..nx).map(|_| 0.1 * random.signed()));
-        for (count, pairs) in [(input, input_pairs), (hard, hard_pairs), (links, 0)] {
+        for (count, pairs) in [(input, pairs), (links, 0)] {
             for row in 0..count {
                 let is_opposite = row % 2 == 1 && row < 2 * pairs;
                 let from = values.len() - nu;
@@ -63,7 +60,7 @@ fn random_program(
             }
         }
         let slack_row = if soft > 0 { input + soft } else { usize::MAX };
-        let rows = input + soft + usize::from(soft > 0) + hard + links;
+        let rows = input + soft + usize::from(soft > 0) + links;
         values.extend((0..rows).map(|row| match row == slack_row {
             true => 0.0,
             false => (0.3 + positive(random)) / tightness,
@@ -98,31 +95,16 @@ impl Reader<'_> {
 }
 
 /// What `solve_programs.c` writes for a program, by the library.
-fn solved<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(
-    values: &[f64],
-) -> Vec<f64> {
+fn solved<T: Real, const NX: usize, const NU: usize>(values: &[f64]) -> Vec<f64> {
     let mut reader = Reader(values);
-    let mut counts = [0; 7];
+    let mut counts = [0; 4];
     counts.fill_with(|| reader.count());
-    let [
-        input,
-        soft,
-        hard,
-        hard_offset,
-        link,
-        input_pairs,
-        hard_pairs,
-    ] = counts;
+    let [input, soft, link, pairs] = counts;
     let shape = Shape {
         input,
         soft,
-        hard,
-        hard_offset,
         link,
-        pairs: Pairs {
-            input: input_pairs,
-            hard: hard_pairs,
-        },
+        pairs,
     };
     let cost = Cost {
         state: reader.array(),
@@ -134,14 +116,13 @@ fn solved<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(
     let x0: [T; NX] = reader.array();
     let mut stages = [Stage::<T, NX, NU>::zeros(); HORIZON];
     let mut memory = vec![T::ZERO; HORIZON * shape.memory()];
-    let (mut inputs, mut hards, mut links) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut inputs, mut links) = (Vec::new(), Vec::new());
     for (place, stage) in stages.iter_mut().enumerate() {
-        (stage.input_rows, stage.hard_rows) = (place * input, place * hard);
+        stage.input_rows = place * input;
         stage.a = std::array::from_fn(|_| reader.array());
         stage.b = std::array::from_fn(|_| reader.array());
         stage.c = reader.array();
         inputs.extend(reader.rows(input));
-        hards.extend(reader.rows(hard));
         links.extend(reader.rows(link));
         let bounds = reader.numbers(shape.rows());
         memory[place * shape.memory()..][..shape.rows()].copy_from_slice(&bounds);
@@ -156,9 +137,8 @@ fn solved<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(
         matrices: RowMatrices {
             input: &inputs,
             soft: &softs,
-            hard: &hards,
         },
-        links: Links::<'_, T, NU, LINKED> {
+        links: Links {
             rows: &links,
             gains: &mut gains,
             softness,
@@ -250,7 +230,7 @@ fn compare<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(real: 
     let mut rest = found.as_slice();
     let mut iterated = 0;
     for (number, program) in programs.iter().enumerate() {
-        let expected = solved::<T, NX, NU, LINKED>(program);
+        let expected = solved::<T, NX, NU>(program);
         let (own, others) = rest.split_at(expected.len());
         let is_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
         let differs = own.iter().zip(&expected).position(|pair| !is_same(pair));

@@ -3,8 +3,7 @@
 use std::ffi::CStr;
 
 use romc::mpc::interface::{
-    Handle, INTERNAL, RawCommand, RawMeasurement, RawReference, Settings, all_codes, last_error,
-    status_text,
+    Handle, INTERNAL, RawCommand, Settings, all_codes, last_error, status_text,
 };
 use romc::mpc::{Controller, LatentDynamics, Lift, Linearisation, MpcSettings, Solver, Status};
 
@@ -50,38 +49,21 @@ fn panic_inside_a_step_becomes_a_code_with_the_last_posture_and_no_torque() {
         .concat()
         .repeat(100);
     let (zeros, feet) = ([0.0; 1800], [1; 400]);
-    let reference = RawReference {
-        time_s: Some(&time_s),
-        x: Some(&x),
-        dx: Some(&zeros),
-        u: Some(Some(&zeros)),
-        feet: Some(&feet),
+    let set = |handle: &mut Handle<4>, x: &[f64], u: Option<Option<&[f64]>>| {
+        handle.set_reference(Some(&time_s), Some(x), Some(&zeros), u, Some(&feet))
     };
-    let short = RawReference {
-        x: Some(&x[1..]),
-        ..reference
-    };
-    assert_eq!(handle.set_reference(&short), -2);
-    assert_eq!(handle.set_reference(&reference), 0);
-    let measurement = RawMeasurement {
-        time_s: 0.0,
-        x: Some(&x[..18]),
-        dx: Some(&zeros[..18]),
-        feet: Some(&feet[..4]),
-    };
+    assert_eq!(set(&mut handle, &x[1..], Some(Some(&zeros))), -2);
+    assert_eq!(set(&mut handle, &x, Some(Some(&zeros))), 0);
     let mut command = RawCommand::at_rest(romc::robot_file::by_name("go1").expect("known"), 99);
     let rest = command.joint_position;
     for _ in 0..2 {
-        assert_eq!(handle.step(&measurement, &mut command), INTERNAL);
+        let (x, dx, feet) = (Some(&x[..18]), Some(&zeros[..18]), Some(&feet[..4]));
+        assert_eq!(handle.step(0.0, x, dx, feet, &mut command), INTERNAL);
         assert_eq!((command.status, command.torque), (INTERNAL, [0.0; 12]));
         assert_eq!(command.joint_position, rest);
     }
     // Without an input the reference asks the equations for one.
-    let no_input = RawReference {
-        u: None,
-        ..reference
-    };
-    assert_eq!(handle.set_reference(&no_input), INTERNAL);
+    assert_eq!(set(&mut handle, &x, None), INTERNAL);
     // SAFETY: the text lives until the next refusal on this thread.
     let message = unsafe { CStr::from_ptr(last_error()) };
     assert!(message.to_string_lossy().contains("broke down"));

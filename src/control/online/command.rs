@@ -1,9 +1,5 @@
-//! The result of a control step.
-//!
-//! Commands of a step without a trusted plan.
-//!
-//! First the last good plan, shifted, for as many stages as the settings allow; then a hold: the posture stays, the
-//! feed-forward torque fades, the joints are damped.
+//! The result of a control step, and that of one without a trusted plan: first the last good plan, shifted, for as many
+//! stages as the settings allow; then a hold, in which the posture stays, the torque fades, the joints are damped.
 
 use super::controller::Controller;
 use super::lift::StanceState;
@@ -211,7 +207,6 @@ impl Controller {
         }
     }
 
-    /// Posture held, torque fading, joints damped.
     fn hold(&mut self, now: Option<f64>, passed_s: f64, command: &mut Command) {
         let fallback = &self.settings.fallback;
         let fade = (-passed_s / fallback.torque_decay_s).exp();

@@ -1,10 +1,8 @@
-//! The stages as one program over cones, for clarabel.
+//! The stages as one program over cones, for clarabel, and the choice between it and the structured solver.
 //!
 //! Unknowns are, stage after stage, the input, the state that it leads to and the slack if there are soft rows. Rows
 //! are the dynamics of all stages (zero cone), then rows on the input, rates, soft rows and `t >= 0` stage by stage
 //! (nonnegative), then the friction cones. The pattern is laid out once; a step overwrites values.
-//!
-//! The solver of a program over stages: clarabel, or the structured solver.
 
 use std::fmt::Debug;
 
@@ -216,7 +214,6 @@ pub(super) trait StageSolver: Debug + Send {
     /// Input of a stage and state at its end in the solution, both scaled.
     fn stage(&self, stage: usize) -> (&[f64], &[f64]);
 
-    /// clarabel, if it is what solves.
     fn conic(&self) -> Option<&QpSolver> {
         None
     }
@@ -230,7 +227,6 @@ impl Solver {
         }
     }
 
-    /// A solver for the program of a controller's horizon.
     pub(super) fn of_horizon(
         self,
         horizon: usize,

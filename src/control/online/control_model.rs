@@ -13,17 +13,10 @@ use super::error::ControlError;
 use super::estimate::InputGivenState;
 use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
-/// Maps, limits and input statistics of a model on its robot.
+/// Maps, limits and input statistics of a model on its robot, with scale factors multiplied in: SI units on the robot's
+/// side.
 #[derive(Debug, Clone)]
 pub struct ControlModel {
-    parts: ControlModelParts,
-    /// The maps of which the matrices are those at one state, if they are not the same at all.
-    nonlinear: Option<Arc<dyn NonlinearMaps>>,
-}
-
-/// The numbers of a [`ControlModel`], with scale factors multiplied in: SI units on the robot's side.
-#[derive(Debug, Clone)]
-pub struct ControlModelParts {
     /// The robot, what its joints take of the motors' torques, and the axes of force and moment.
     pub input_rule: InputRule,
     /// `W_e s_x`, `latent_dim × 18`.
@@ -42,6 +35,8 @@ pub struct ControlModelParts {
     pub phases: Vec<ControlPhase>,
     /// The phase that each foot pattern selects, bit `k` of the position for foot `k`.
     pub phase_of_feet: [Option<usize>; 16],
+    /// The maps of which the matrices are those at one state, if they are not the same at all.
+    pub nonlinear: Option<Arc<dyn NonlinearMaps>>,
 }
 
 /// What the training inputs of one phase looked like.
@@ -89,28 +84,6 @@ pub trait NonlinearMaps: Debug + Send + Sync {
 }
 
 impl ControlModel {
-    /// A plant of given numbers.
-    ///
-    /// # Errors
-    /// [`ControlError::Shape`] if a map or a phase's statistics do not have the shape that the encoder's number of rows
-    /// asks for.
-    pub fn from_parts(parts: ControlModelParts) -> Result<Self, ControlError> {
-        parts.check()?;
-        Ok(Self {
-            parts,
-            nonlinear: None,
-        })
-    }
-
-    /// The plant with maps that depend on the state; its matrices are then those at one state.
-    pub fn with_nonlinear(self, maps: Arc<dyn NonlinearMaps>) -> Self {
-        Self {
-            nonlinear: Some(maps),
-            ..self
-        }
-    }
-
-    /// Whether the maps depend on the state.
     pub(crate) fn is_nonlinear(&self) -> bool {
         self.nonlinear.is_some()
     }
@@ -127,16 +100,14 @@ impl ControlModel {
         let decoder_bias = decoded - &decoder * DVector::from_column_slice(z);
         let [lift, projection] = maps.inputs(x)?;
         Some(Self {
-            parts: ControlModelParts {
-                encoder,
-                encoder_bias,
-                decoder,
-                decoder_bias,
-                lift,
-                projection,
-                ..self.parts.clone()
-            },
+            encoder,
+            encoder_bias,
+            decoder,
+            decoder_bias,
+            lift,
+            projection,
             nonlinear: None,
+            ..self.clone()
         })
     }
 
@@ -144,40 +115,35 @@ impl ControlModel {
     /// have full rank there.
     pub(super) fn take_statistics_at(&mut self, x: &[f64]) {
         if let Some(phases) = self.nonlinear.as_ref().and_then(|maps| maps.phases(x)) {
-            self.parts.phases = phases;
+            self.phases = phases;
         }
-    }
-
-    /// The numbers.
-    pub fn parts(&self) -> &ControlModelParts {
-        &self.parts
     }
 
     /// How torques become inputs of the model: commands are made by its inverse.
     pub fn input_rule(&self) -> &InputRule {
-        &self.parts.input_rule
+        &self.input_rule
     }
 
     /// The robot.
     pub fn robot(&self) -> &'static Robot {
-        self.parts.input_rule.robot()
+        self.input_rule.robot()
     }
 
     /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
-        self.parts.encoder.nrows()
+        self.encoder.nrows()
     }
 
     /// All phases, in the model's order.
     pub fn phases(&self) -> &[ControlPhase] {
-        &self.parts.phases
+        &self.phases
     }
 
     /// The phase that a foot pattern selects, or none.
     pub fn phase_for(&self, feet: ContactFlags) -> Option<usize> {
         let bits = feet.iter().enumerate();
         let bits = bits.map(|(foot, &down)| usize::from(down) << foot);
-        self.parts.phase_of_feet[bits.sum::<usize>()]
+        self.phase_of_feet[bits.sum::<usize>()]
     }
 
     /// `z = W_e s_x x + b_e`, or the nonlinear encoder's; `x` in SI units (18), `z` is overwritten.
@@ -185,34 +151,31 @@ impl ControlModel {
         if let Some(maps) = &self.nonlinear {
             return maps.encode(x, z);
         }
-        z.copy_from_slice(self.parts.encoder_bias.as_slice());
-        add_product(&self.parts.encoder, x, z);
+        z.copy_from_slice(self.encoder_bias.as_slice());
+        add_product(&self.encoder, x, z);
     }
 
     /// `dz = J_E s_x dx` with the encoder's Jacobian at `x`; SI units (18), `dz` is overwritten.
     pub(crate) fn encode_velocity(&self, x: &[f64], dx: &[f64], dz: &mut [f64]) {
         dz.fill(0.0);
         match &self.nonlinear {
-            None => add_product(&self.parts.encoder, dx, dz),
+            None => add_product(&self.encoder, dx, dz),
             Some(maps) => add_product(&maps.encoder_jacobian(x), dx, dz),
         }
     }
 
-    /// Joint positions, rad, that the decoder gives for `z`.
     pub(crate) fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
         if let Some(maps) = &self.nonlinear {
             let x = maps.decode(z);
             return std::array::from_fn(|joint| x[joint]);
         }
-        std::array::from_fn(|joint| {
-            self.parts.decoder_bias[joint] + row_product(&self.parts.decoder, joint, z)
-        })
+        std::array::from_fn(|joint| self.decoder_bias[joint] + row_product(&self.decoder, joint, z))
     }
 
     /// Joint velocities, rad/s, for `dz` with the decoder's Jacobian at `z`.
     pub fn decode_joint_velocities(&self, z: &[f64], dz: &[f64]) -> [f64; JOINT_DIM] {
         let local = self.nonlinear.as_ref().map(|maps| maps.decoder_jacobian(z));
-        let decoder = local.as_ref().unwrap_or(&self.parts.decoder);
+        let decoder = local.as_ref().unwrap_or(&self.decoder);
         std::array::from_fn(|joint| row_product(decoder, joint, dz))
     }
 
@@ -220,7 +183,7 @@ impl ControlModel {
     /// dz)`): at the mean of the decoded velocities, with their difference over the time as acceleration. Zero without
     /// actuators, and never beyond a joint's torque limit.
     pub fn planned_losses(&self, start: &[f64], end: &[f64], step_s: f64) -> [f64; JOINT_DIM] {
-        if self.parts.input_rule.actuators().is_none() {
+        if self.input_rule.actuators().is_none() {
             return [0.0; JOINT_DIM];
         }
         let [before, after] = [start, end].map(|state| {
@@ -229,23 +192,21 @@ impl ControlModel {
         });
         let dq = std::array::from_fn(|joint| 0.5 * (before[joint] + after[joint]));
         let ddq = std::array::from_fn(|joint| (after[joint] - before[joint]) / step_s);
-        self.clamp_torque(self.parts.input_rule.losses(&dq, &ddq))
+        self.clamp_torque(self.input_rule.losses(&dq, &ddq))
     }
 
     /// `u_lat = pinv(J_Eᵀ) s_u u` with the encoder's Jacobian at `x` if it is nonlinear and has full row rank there,
-    /// else with the one of the parts; SI units (18), `u_lat` is overwritten.
+    /// else with the plant's own; SI units (18), `u_lat` is overwritten.
     pub fn project(&self, x: &[f64], u: &[f64], u_lat: &mut [f64]) {
         u_lat.fill(0.0);
         let local = self.nonlinear.as_ref().and_then(|maps| maps.inputs(x));
-        let projection = local
-            .as_ref()
-            .map_or(&self.parts.projection, |[_, local]| local);
+        let projection = local.as_ref().map_or(&self.projection, |[_, local]| local);
         add_product(projection, u, u_lat);
     }
 
     /// `u = W_eᵀ u_lat / s_u` in SI units: 12 torques, force, moment.
     pub fn lift(&self, u_lat: &[f64]) -> [f64; STATE_DIM] {
-        std::array::from_fn(|input| row_product(&self.parts.lift, input, u_lat))
+        std::array::from_fn(|input| row_product(&self.lift, input, u_lat))
     }
 
     /// The torques within the robot's limits that are nearest to these; zero for what is not a number.
@@ -254,7 +215,6 @@ impl ControlModel {
         std::array::from_fn(|joint| clamped_torque(torque_nm[joint], limits[joint]))
     }
 
-    /// Lower and upper limits of the joints, rad.
     pub(super) fn joint_limits(&self) -> [[f64; JOINT_DIM]; 2] {
         let limits = self.robot().joint_limit_rad();
         [limits.map(|limit| limit.0), limits.map(|limit| limit.1)]
@@ -296,15 +256,15 @@ pub(super) fn add_product(matrix: &DMatrix<f64>, vector: &[f64], out: &mut [f64]
     }
 }
 
-/// Row `row` of `M v`.
 fn row_product(matrix: &DMatrix<f64>, row: usize, vector: &[f64]) -> f64 {
     let terms = vector.iter().enumerate();
     terms.map(|(col, factor)| matrix[(row, col)] * factor).sum()
 }
 
-impl ControlModelParts {
-    /// Checks every shape against the encoder's number of rows.
-    fn check(&self) -> Result<(), ControlError> {
+impl ControlModel {
+    /// The same, or [`ControlError::Shape`] if a map or a phase's statistics do not have the shape that the encoder's number
+    /// of rows asks for.
+    pub fn checked(self) -> Result<Self, ControlError> {
         let d = self.encoder.nrows();
         let mut shapes = vec![
             ("encoder", self.encoder.shape(), (d, STATE_DIM)),
@@ -330,7 +290,7 @@ impl ControlModelParts {
         }
         let mut shapes = shapes.into_iter();
         match shapes.find(|(_, found, expected)| found != expected) {
-            None => Ok(()),
+            None => Ok(self),
             Some((name, found, expected)) => Err(ControlError::Shape {
                 name,
                 found,

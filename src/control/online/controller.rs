@@ -8,6 +8,7 @@ use super::control_model::ControlModel;
 use super::dense::Real;
 use super::effectiveness::Effectiveness;
 use super::error::ControlError;
+use super::estimate::estimate_input;
 use super::horizon::{Horizon, StageInputs};
 use super::lift::{ConsistentLift, LiftFailure, StanceState};
 use super::linearise::LatentDynamics;
@@ -66,10 +67,6 @@ pub struct Measurement<'a> {
 
 impl Controller {
     /// Builds a controller of a plant and its latent dynamics.
-    ///
-    /// # Errors
-    /// [`ControlError::Setting`] for settings out of range and [`ControlError::Solver`] if the solver refuses the
-    /// problem.
     pub fn with_plant(
         plant: ControlModel,
         dynamics: Box<dyn LatentDynamics>,
@@ -157,24 +154,21 @@ impl Controller {
     /// Takes a new trajectory to follow; a plan for an earlier one is forgotten.
     ///
     /// This sets up the solver anew, for the rows that matter near the trajectory.
-    ///
-    /// # Errors
-    /// As `Reference::new` and [`QpSolver::new`]; the old reference stays.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), ControlError> {
         let mut reference = Reference::new(&self.plant, samples)?;
         if self.plant.is_nonlinear() {
             self.plant.take_statistics_at(&mean_state(samples.x));
         }
-        if !reference.has_input() && self.settings.missing_input == MissingInput::Estimate {
-            reference.estimate_input(&self.plant, self.dynamics.as_mut());
+        if reference.input.is_none() && self.settings.missing_input == MissingInput::Estimate {
+            let found = estimate_input(&self.plant, self.dynamics.as_mut(), &reference);
+            reference.input = Some(found);
         }
         let d = self.plant.latent_dim();
         let deviation = reference.deviation();
-        let mut state_weights = vec![1.0; 2 * d];
-        for index in d..2 * d {
-            let ratio = deviation[index] / deviation[index - d];
-            state_weights[index] = self.settings.velocity_weight * ratio.powi(2);
-        }
+        let weight = self.settings.velocity_weight;
+        let of_velocity = |i: usize| weight * (deviation[d + i] / deviation[i]).powi(2);
+        let mut state_weights = vec![1.0; d];
+        state_weights.extend((0..d).map(of_velocity));
         let rows = match row_selection(&self.plant, &self.settings) {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),
@@ -188,9 +182,6 @@ impl Controller {
 
     /// Torques of the motors, N m, that this controller's lift makes of a latent input on a stance: those at the links
     /// and the stance's losses; not clamped.
-    ///
-    /// # Errors
-    /// [`LiftFailure`] of the consistent lift; the transpose lift has none.
     pub fn lift(
         &mut self,
         u_lat: &[f64],
@@ -214,19 +205,19 @@ impl Controller {
         let reference = self.reference.as_ref();
         let deviation = reference.map_or(&[][..], |reference| &reference.deviation()[..d]);
         (0..self.settings.horizon).flat_map(move |stage| {
-            let pairs = self
+            let ends = self
                 .plan
                 .end(stage)
                 .iter()
-                .zip(&self.horizon.stage(stage).end);
-            let scaled = pairs.zip(deviation);
+                .zip(&self.horizon.stages[stage].end);
+            let scaled = ends.zip(deviation);
             scaled.map(|((planned, reference), scale)| (planned - reference) / scale)
         })
     }
 
     /// Forgets plan and past measurements, but not the reference.
     pub fn reset(&mut self) {
-        self.plan.clear();
+        self.plan.start_s = None;
         self.horizon.forget();
         self.engine.forget();
         self.memory = Memory::new(self.plant.latent_dim());
@@ -260,8 +251,13 @@ impl Controller {
         };
         let dynamics = self.dynamics.as_mut();
         let contact = self.horizon.prepare(&inputs, dynamics, time_s, phase);
-        let (stages, shift, is_new) = self.horizon.prepared();
-        self.engine.prepare(stages, shift, is_new);
+        let Horizon {
+            programs,
+            shift,
+            is_new,
+            ..
+        } = &self.horizon;
+        self.engine.prepare(programs, *shift, is_new);
         Some(contact)
     }
 
@@ -291,7 +287,7 @@ impl Controller {
             let held = [command.joint_position_rad, command.joint_velocity_rad_s];
             match status.has_plan() {
                 true => (self.effectiveness).keep(&self.plant, settings, &measurement, held),
-                false => self.effectiveness.interrupt(),
+                false => self.effectiveness.held = None,
             }
         }
         self.memory.command_s = self.time_or_one_stage_on(measurement.time_s);
@@ -313,7 +309,6 @@ fn program(
     Ok((Horizon::new(length, &shape), engine))
 }
 
-/// Mean of states, 18 values per sample.
 fn mean_state(x: &[f64]) -> [f64; STATE_DIM] {
     let count = (x.len() / STATE_DIM).max(1) as f64;
     std::array::from_fn(|i| x.iter().skip(i).step_by(STATE_DIM).sum::<f64>() / count)

@@ -1,10 +1,9 @@
 //! How much of the commanded input arrives.
 //!
-//! Weak motors deliver a share of the torques; under a payload the same forces accelerate the body less. Either way the
-//! velocities change by `γ B u` where the plan has `B u`, with `B` the change of velocities by the input over the time
-//! that has passed. The joint PD of the motors adds its own torques to the commanded ones, whose latent input `p`
-//! follows from the measurements at the beginning and the end of that time. With `e = dz − dz_plan` and `φ = B (u +
-//! p)`, each velocity in standard deviations of the reference, a step on the ground says
+//! With weak motors or a payload velocities change by `γ B u` where the plan has `B u`, with `B` the change by the input
+//! over the time that has passed. The joint PD of the motors adds torques, whose latent input `p` follows from the
+//! measurements at both ends of that time. With `e = dz − dz_plan` and `φ = B (u + p)`, each velocity in standard
+//! deviations of the reference, a step on the ground says
 //!
 //! ```text
 //! γ = γ̂ (1 + φᵀ (e − B p) / φᵀ φ),
@@ -30,7 +29,6 @@ const LARGEST_WEIGHT: Real = 2.0;
 const LEAST: Real = 0.7;
 const LARGEST: Real = 1.3;
 
-/// The estimate and the sums behind it.
 #[derive(Debug, Clone)]
 pub(super) struct Share {
     /// `γ̂`.
@@ -43,7 +41,6 @@ pub(super) struct Share {
 }
 
 impl Share {
-    /// As known before a motion.
     fn unknown() -> Self {
         Self {
             estimate: 1.0,
@@ -113,19 +110,18 @@ impl Share {
 /// The estimate with what the motors hold.
 #[derive(Debug, Clone)]
 pub(super) struct Effectiveness {
-    share: Share,
+    pub(super) share: Share,
     /// Whether the plan's first stage has feet on the ground, and the change of the velocities at its end by its input.
     is_grounded: bool,
     by_input: Vec<f64>,
     /// Posture and joint velocities that the motors' PD holds; none before a command.
-    held: Option<[[f64; JOINT_DIM]; 2]>,
+    pub(super) held: Option<[[f64; JOINT_DIM]; 2]>,
     /// Latent input of the PD at the last command, and at the present measurement.
     at_command: Vec<f64>,
     drives: Vec<f64>,
 }
 
 impl Effectiveness {
-    /// All of it, as known before a motion.
     pub(super) fn full(latent_dim: usize) -> Self {
         Self {
             share: Share::unknown(),
@@ -135,10 +131,6 @@ impl Effectiveness {
             at_command: vec![0.0; latent_dim],
             drives: vec![0.0; latent_dim],
         }
-    }
-
-    pub(super) fn estimate(&self) -> f64 {
-        self.share.estimate
     }
 
     pub(super) fn begin(&mut self, model: &StageModel, is_grounded: bool) {
@@ -160,15 +152,10 @@ impl Effectiveness {
         held: [[f64; JOINT_DIM]; 2],
     ) {
         self.held = Some(held);
-        if self.take_drives(plant, settings, measurement) {
-            self.at_command.copy_from_slice(&self.drives);
-        } else {
-            self.held = None;
+        match self.take_drives(plant, settings, measurement) {
+            true => self.at_command.copy_from_slice(&self.drives),
+            false => self.held = None,
         }
-    }
-
-    pub(super) fn interrupt(&mut self) {
-        self.held = None;
     }
 
     /// Takes a measurement with its latent velocities; `deviation` are the reference's standard deviations of them.
@@ -187,8 +174,8 @@ impl Effectiveness {
             return;
         }
         let d = self.drives.len();
-        let (start, end) = (&plan.start(0)[d..], &plan.end(0)[d..]);
-        let kept = (-share * plan.step_s() / settings.time_constant_s).exp();
+        let (start, end) = (&plan.states[0][d..], &plan.end(0)[d..]);
+        let kept = (-share * plan.step_s / settings.time_constant_s).exp();
         self.share.update(
             share,
             kept,

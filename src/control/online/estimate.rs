@@ -13,11 +13,9 @@
 //! û = m + S Bᵀ (B S Bᵀ + R)⁻¹ y.
 //! ```
 //!
-//! [`InputGivenState`] has `m = M [1; z; dz]`, `S` and `R` of the training. A phase without it has its mean training
-//! input and the covariance of these inputs, and `R` is estimated from the reference: input and residual of a
-//! least-squares model are uncorrelated, so `Cov(y) = B S Bᵀ + R`, and `R` is what `B S Bᵀ` leaves of the sample
-//! covariance (in units of the standard deviations of `y`, eigenvalues not below `RESIDUAL_FLOOR`). Latents whose
-//! acceleration the model hardly explains then hardly count.
+//! [`InputGivenState`] has `m = M [1; z; dz]`, `S` and `R` of the training. A phase without it has mean and covariance of
+//! its training inputs, and `R` is what `B S Bᵀ` leaves of the covariance of `y` over the reference, as input and residual
+//! of a least-squares model are uncorrelated. Latents whose acceleration the model hardly explains then hardly count.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -205,103 +203,4 @@ fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DM
     Some(DMatrix::from_fn(d, d, |row, col| {
         floored[(row, col)] * deviation[row] * deviation[col]
     }))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// `dz = t^2` before the edge at sample 20, 5 after it, every 2 ms.
-    struct Parabola;
-
-    impl Trajectory for Parabola {
-        fn latent_dim(&self) -> usize {
-            1
-        }
-
-        fn count(&self) -> usize {
-            40
-        }
-
-        fn time_s(&self, sample: usize) -> f64 {
-            0.002 * sample as f64
-        }
-
-        fn phase(&self, sample: usize) -> usize {
-            usize::from(sample >= 20)
-        }
-
-        fn write_position(&self, _: usize, z: &mut [f64]) {
-            z[0] = 0.0;
-        }
-
-        fn write_velocity(&self, sample: usize, dz: &mut [f64]) {
-            dz[0] = if sample < 20 {
-                self.time_s(sample).powi(2)
-            } else {
-                5.0
-            };
-        }
-
-        fn write_input(&self, _: usize, input: &mut [f64]) {
-            input[0] = 0.0;
-        }
-    }
-
-    #[test]
-    fn slope_of_a_parabola_is_its_derivative_inside_and_stops_at_the_phases_edge() {
-        let slope = |sample: usize| {
-            let mut slope = [0.0];
-            Parabola.write_acceleration(sample, &mut slope);
-            slope[0]
-        };
-        assert!((slope(10) - 0.04).abs() < 1e-12);
-        // One-sided at the edge: the slope at the middle of the eight samples before it.
-        let middle = Parabola.time_s(19) + Parabola.time_s(11);
-        assert!((slope(19) - middle).abs() < 1e-12);
-        assert!(slope(20).abs() < 1e-9);
-    }
-
-    #[test]
-    fn states_set_what_is_expected_and_accelerations_correct_it() {
-        let number = |value: f64| DMatrix::from_element(1, 1, value);
-        let phase = ControlPhase {
-            name: "contact".to_owned(),
-            is_grounded: true,
-            latent_mean: DVector::from_element(1, 7.0),
-            latent_root: number(3.0),
-            given_state: Some(InputGivenState {
-                mean: DMatrix::from_row_slice(1, 3, &[0.5, 1.0, -2.0]),
-                covariance: number(0.5),
-                acceleration_error: number(2.0),
-            }),
-            torque_mean: nalgebra::zero(),
-            torque_precision: nalgebra::one(),
-        };
-        // M [1; z; dz] = 0.5 + 3 - 2 at z = 3, dz = 1.
-        let mut input = [0.0];
-        write_expected(&[0.5, 1.0, -2.0], &[3.0, 1.0], 1, &mut input);
-        assert_eq!(input, [1.5]);
-        // y = 6 with B = 2: S B / (B S B + R) y = 0.5 * 2 / (2 + 2) * 6.
-        let evidence = vec![Evidence {
-            sample: 0,
-            unexplained: vec![6.0],
-            gain: vec![2.0],
-        }];
-        add_estimates(&phase, evidence, &mut input);
-        assert!((input[0] - 3.0).abs() < 1e-12, "{input:?}");
-    }
-
-    #[test]
-    fn residual_covariance_is_what_the_input_leaves() {
-        // y = B u + r with B = 2, Var u = 1, Var r = 0.25, sampled on a symmetric grid.
-        let evidence =
-            [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]].map(|[u, r]| Evidence {
-                sample: 0,
-                unexplained: vec![2.0 * u + 0.5 * r],
-                gain: vec![2.0],
-            });
-        let residual = residual_covariance(&evidence, &DMatrix::identity(1, 1)).expect("finite");
-        assert!((residual[(0, 0)] - 0.25).abs() < 1e-12, "{residual}");
-    }
 }

@@ -8,7 +8,7 @@ use super::plan::Plan;
 use super::problem::StageRows;
 use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
-use super::stage::{StageQp, StageScale, StageShape, unscale, write_defect};
+use super::stage::{StageQp, StageScale, StageShape, write_defect};
 use super::trajectory::{Contact, TIME_TOLERANCE_S, Trajectory};
 
 #[derive(Debug, Clone)]
@@ -20,8 +20,7 @@ pub(super) struct Stage {
     /// Reference state at the beginning and at the end, `2 latent_dim`.
     state: Vec<f64>,
     pub end: Vec<f64>,
-    /// Reference input, `latent_dim`.
-    input: Vec<f64>,
+    pub input: Vec<f64>,
     pub phase: usize,
     /// Its beginning, if its linearisation belongs to it.
     made_for: Option<f64>,
@@ -31,14 +30,14 @@ pub(super) struct Stage {
 
 #[derive(Debug, Clone)]
 pub(super) struct Horizon {
-    stages: Vec<Stage>,
+    pub stages: Vec<Stage>,
     /// The same as the solvers take them.
-    programs: Vec<StageQp>,
+    pub programs: Vec<StageQp>,
     phases: Vec<usize>,
     /// Stages by which the last preparation moved on, and those that it made.
-    shift: usize,
-    is_new: Vec<bool>,
-    start: Start,
+    pub shift: usize,
+    pub is_new: Vec<bool>,
+    pub start: Start,
     /// Rows of the friction cone `(μ F_z, F_x, F_y) / weight` of a stage.
     force: Vec<f64>,
     lineariser: Lineariser,
@@ -58,11 +57,12 @@ pub(super) struct StageInputs<'a> {
 impl Horizon {
     pub(super) fn new(length: usize, shape: &StageShape) -> Self {
         let latent_dim = shape.inputs;
+        let zeros = || vec![0.0; 2 * latent_dim];
         let stage = Stage {
             model: StageModel::zeros(latent_dim),
-            defect: vec![0.0; 2 * latent_dim],
-            state: vec![0.0; 2 * latent_dim],
-            end: vec![0.0; 2 * latent_dim],
+            defect: zeros(),
+            state: zeros(),
+            end: zeros(),
             input: vec![0.0; latent_dim],
             phase: 0,
             made_for: None,
@@ -90,23 +90,14 @@ impl Horizon {
         }
     }
 
-    pub(super) fn stage(&self, stage: usize) -> &Stage {
-        &self.stages[stage]
-    }
-
-    /// The stages as the solvers take them, by how many the last preparation moved on, and whether it made each anew.
-    pub(super) fn prepared(&self) -> (&[StageQp], usize, &[bool]) {
-        (&self.programs, self.shift, &self.is_new)
-    }
-
-    /// The stages as the solvers take them, and what a solve starts from: the measured state, and the input of the
-    /// command before. Rows are those of every stage, as far as they are the same.
-    pub(super) fn start(
+    /// Writes what a solve starts from: the measured state, and the input of the command before. Rows are those of every
+    /// stage, as far as they are the same.
+    pub(super) fn begin(
         &mut self,
         (measured, deviation): (&[f64], &[f64]),
         last_input: &[f64],
         rows: &StageRows,
-    ) -> (&[StageQp], &Start) {
+    ) {
         let first = &self.stages[0];
         for (i, out) in self.start.state.iter_mut().enumerate() {
             *out = (measured[i] - first.state[i]) / deviation[i];
@@ -118,32 +109,6 @@ impl Horizon {
                 *out += entry * input;
             }
         }
-        (&self.programs, &self.start)
-    }
-
-    /// Writes what a stage has in the solution: its latent input `u_r + C_p û` and the latent state at its end `x_r⁺ +
-    /// σ x̂⁺`.
-    pub(super) fn unscale(
-        &self,
-        index: usize,
-        (scaled_input, scaled_end): (&[f64], &[f64]),
-        plant: &ControlModel,
-        deviation: &[f64],
-        (input, end): (&mut [f64], &mut [f64]),
-    ) {
-        let stage = &self.stages[index];
-        let root = plant.phases()[stage.phase].latent_root.as_slice();
-        input.copy_from_slice(&stage.input);
-        end.copy_from_slice(&stage.end);
-        unscale(
-            root,
-            deviation,
-            plant.latent_dim(),
-            scaled_input,
-            scaled_end,
-            input,
-            end,
-        );
     }
 
     /// Prepares all stages from a time on with the feet as measured then; the status of a plan for them.
@@ -205,7 +170,7 @@ impl Horizon {
         stage.phase = self.phases[index];
         reference.state_at(start_s, &mut stage.state);
         reference.state_at(start_s + settings.step_s, &mut stage.end);
-        if reference.has_input() {
+        if reference.input.is_some() {
             reference.mean_input(start_s, settings.step_s, &mut stage.input);
         } else {
             let mean = &plant.phases()[stage.phase].latent_mean;
@@ -249,7 +214,7 @@ impl Horizon {
     ) {
         let (settings, step_s) = (inputs.settings, inputs.settings.step_s);
         let trusts_reference = match settings.drift {
-            Drift::Automatic => inputs.reference.has_input(),
+            Drift::Automatic => inputs.reference.input.is_some(),
             Drift::Reference => true,
             Drift::Model => false,
         };
@@ -273,15 +238,12 @@ impl Horizon {
         stage(x, u, model);
         let (next, by, d) = (&model.next, &model.by, input.len());
         write_defect(next, by, x, u, state, input, end, d, defect);
-        match (trusts_reference, point) {
-            (false, _) => {}
-            (true, None) => defect.fill(0.0),
-            (true, Some(_)) => {
-                let nominal = &mut self.nominal;
-                stage(state, input, nominal);
-                for (row, defect) in defect.iter_mut().enumerate() {
-                    *defect += end[row] - nominal.next[row];
-                }
+        if trusts_reference && point.is_none() {
+            defect.fill(0.0);
+        } else if trusts_reference {
+            stage(state, input, &mut self.nominal);
+            for row in 0..2 * d {
+                defect[row] += end[row] - self.nominal.next[row];
             }
         }
     }

@@ -127,28 +127,6 @@ impl<const D: usize> RawCommand<D> {
     }
 }
 
-/// [`ReferenceSamples`] as they come through the interface. Feet are four values per sample, zero in the air; of `u`
-/// the inner `None` is a bad pointer.
-#[derive(Debug, Clone, Copy)]
-#[allow(missing_docs, reason = "as in `ReferenceSamples`")]
-pub struct RawReference<'a> {
-    pub time_s: Option<&'a [f64]>,
-    pub x: Option<&'a [f64]>,
-    pub dx: Option<&'a [f64]>,
-    pub u: Option<Option<&'a [f64]>>,
-    pub feet: Option<&'a [u8]>,
-}
-
-/// A [`Measurement`] as it comes through the interface; feet are four values, zero in the air.
-#[allow(missing_docs, reason = "as in `Measurement`")]
-#[derive(Debug, Clone, Copy)]
-pub struct RawMeasurement<'a> {
-    pub time_s: f64,
-    pub x: Option<&'a [f64]>,
-    pub dx: Option<&'a [f64]>,
-    pub feet: Option<&'a [u8]>,
-}
-
 /// A controller with the memory that its interface needs; `D` latent coordinates.
 #[derive(Debug)]
 pub struct Handle<const D: usize> {
@@ -180,46 +158,51 @@ impl<const D: usize> Handle<D> {
         made.ok()
     }
 
-    /// Takes a trajectory to follow; 0, or a code with a message for [`last_error`]. A refused trajectory leaves the
-    /// old one.
-    pub fn set_reference(&mut self, raw: &RawReference<'_>) -> i32 {
-        match self.take_reference(raw) {
-            Ok(()) => {
-                self.is_broken = false;
-                Status::Solved.code()
-            }
-            Err(code) => {
-                self.is_broken |= code == INTERNAL;
-                code
-            }
-        }
-    }
-
-    fn take_reference(&mut self, raw: &RawReference<'_>) -> Result<(), i32> {
-        let (time_s, x) = (present("time_s", raw.time_s)?, present("x", raw.x)?);
-        let (dx, feet) = (present("dx", raw.dx)?, present("feet", raw.feet)?);
-        let u = raw.u.map(|u| present("u", u)).transpose()?;
-        guarded(|| {
+    /// Takes [`ReferenceSamples`] to follow, of feet four values each, zero in the air; of `u` the inner `None` is a bad
+    /// pointer. 0, or a code with a message for [`last_error`]; a refused trajectory leaves the old one.
+    pub fn set_reference(
+        &mut self,
+        time_s: Option<&[f64]>,
+        x: Option<&[f64]>,
+        dx: Option<&[f64]>,
+        u: Option<Option<&[f64]>>,
+        feet: Option<&[u8]>,
+    ) -> i32 {
+        let mut take = || {
+            let (time_s, x) = (present("time_s", time_s)?, present("x", x)?);
+            let (dx, feet) = (present("dx", dx)?, present("feet", feet)?);
+            let u = u.map(|u| present("u", u)).transpose()?;
             let feet: Vec<ContactFlags> = feet.chunks_exact(FOOT_DIM).map(contact).collect();
-            self.controller.set_reference(ReferenceSamples {
+            let samples = ReferenceSamples {
                 time_s,
                 x,
                 dx,
                 u,
                 feet: &feet,
-            })
-        })
+            };
+            guarded(|| self.controller.set_reference(samples))
+        };
+        let code = take().err().unwrap_or_default();
+        self.is_broken = code == INTERNAL || self.is_broken && code != 0;
+        code
     }
 
     /// Computes the command for a measurement; returns its status.
-    pub fn step(&mut self, raw: &RawMeasurement<'_>, out: &mut RawCommand<D>) -> i32 {
-        let has_all = raw.x.is_some() && raw.dx.is_some() && raw.feet.is_some();
+    pub fn step(
+        &mut self,
+        time_s: f64,
+        x: Option<&[f64]>,
+        dx: Option<&[f64]>,
+        feet: Option<&[u8]>,
+        out: &mut RawCommand<D>,
+    ) -> i32 {
+        let has_all = x.is_some() && dx.is_some() && feet.is_some();
         let measurement = Measurement {
-            time_s: raw.time_s,
+            time_s,
             // No values are the wrong number of them: the controller falls back.
-            x: raw.x.filter(|_| has_all).unwrap_or(&[]),
-            dx: raw.dx.filter(|_| has_all).unwrap_or(&[]),
-            feet: raw.feet.map_or([false; FOOT_DIM], contact),
+            x: x.filter(|_| has_all).unwrap_or(&[]),
+            dx: dx.filter(|_| has_all).unwrap_or(&[]),
+            feet: feet.map_or([false; FOOT_DIM], contact),
         };
         let (controller, command) = (&mut self.controller, &mut self.command);
         let step = AssertUnwindSafe(|| controller.step_into(measurement, command));
@@ -234,9 +217,10 @@ impl<const D: usize> Handle<D> {
             joint_position: command.joint_position_rad,
             joint_velocity: command.joint_velocity_rad_s,
             u_lat: std::array::from_fn(|latent| command.u_lat[latent]),
-            status: match has_all {
-                true => command.status.code(),
-                false => BAD_POINTER,
+            status: if has_all {
+                command.status.code()
+            } else {
+                BAD_POINTER
             },
             iterations: command.iterations as i32,
             solve_us: command.solve_us,
@@ -247,10 +231,8 @@ impl<const D: usize> Handle<D> {
 
     /// Forgets plan and past measurements, but not the reference.
     pub fn reset(&mut self) {
-        let controller = &mut self.controller;
-        if catch_unwind(AssertUnwindSafe(|| controller.reset())).is_err() {
-            self.is_broken = true;
-        }
+        let reset = AssertUnwindSafe(|| self.controller.reset());
+        self.is_broken |= catch_unwind(reset).is_err();
     }
 
     /// No torque, at the posture of the last command.

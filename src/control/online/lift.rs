@@ -8,11 +8,9 @@
 //! subject to |τ + ℓ| ≤ τ_max,   ‖(R F_k)_{x,y}‖ ≤ μ (R F_k)_z,   F_k = −J_k⁻ᵀ τ_k for each foot k in contact
 //! ```
 //!
-//! `τ` are the torques at the links and `τ + ℓ` the command, with the losses `ℓ` of the joints in the planned motion.
-//! `G(q, c)` maps torques to force and moment of the feet in contact, in the frame of the model's inputs; `m` and `S`
-//! are mean and covariance of the training torques in the phase, `R` turns the body frame upright. The prior decides
-//! what the latent input leaves open, twelve torques against a few latent coordinates. `τ = 0` satisfies every
-//! constraint, as `ℓ` is never beyond the limits.
+//! `τ` are the torques at the links and `τ + ℓ` the command, with the losses `ℓ`, never beyond the limits. `G(q, c)` maps
+//! torques to force and moment of the feet in contact, in the frame of the model's inputs; `m` and `S` are mean and
+//! covariance of the training torques in the phase, `R` turns the body frame upright.
 //!
 //! Torques are written by the standard deviations of the training's, `τ = m + C y` with `C Cᵀ = S`, and with `A = M C /
 //! √w` and `r = (u_lat − M m) / √w` the program becomes
@@ -24,12 +22,11 @@
 //!
 //! `y₀` takes a system of as many unknowns as latent coordinates and is the solution if it keeps all rows; otherwise `½
 //! ‖v‖²` under the rows is a program of one stage, for clarabel with the cones or for the structured solver with the
-//! pyramids inside them. Torques are the solution of one convex program for every latent input, and change continuously
-//! with it.
+//! pyramids inside them.
 
 use nalgebra::{Cholesky, Matrix3};
 
-use super::conic::{Conic, StageSolver, Start};
+use super::conic::{StageSolver, Start};
 use super::control_model::{ControlModel, ControlPhase};
 use super::dense::{
     MOST_LATENT, MOST_SQUARE, Real, add_scaled, factorise, solve_lower, solve_upper,
@@ -37,15 +34,13 @@ use super::dense::{
 use super::error::ControlError;
 use super::problem::upright;
 use super::qp::QpSettings;
-use super::settings::{MpcSettings, Solver};
+use super::settings::MpcSettings;
 use super::stage::{
     CONE_ROWS, FrictionShape, PYRAMID_ROWS, SQRT_HALF, StageCost, StageQp, StageShape,
 };
-use super::structured::{Structured, TOLERANCE};
 use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM};
-use crate::solver::{Outcome, Settings};
+use crate::solver::Outcome;
 
-/// Cap on the interior-point iterations of a lift.
 const LIFT_ITERATIONS: u32 = 60;
 /// Curvature of the cost as the solvers have it: `CURVATURE / 2 ‖v‖²`. Inputs a few deviations beyond the limits then
 /// have multipliers near those at which iterations begin.
@@ -114,9 +109,6 @@ pub struct ConsistentLift {
 
 impl ConsistentLift {
     /// Prepares the lift, for the solver that the settings name.
-    ///
-    /// # Errors
-    /// [`ControlError::Solver`] if clarabel refuses the program.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Result<Self, ControlError> {
         let d = plant.latent_dim();
         let friction = settings.solver.friction();
@@ -130,8 +122,19 @@ impl ConsistentLift {
             cones,
             ..StageShape::default()
         };
+        let cost = StageCost {
+            state: Vec::new(),
+            terminal: 1.0,
+            input: CURVATURE,
+            slack: 0.0,
+        };
+        let qp = QpSettings {
+            max_iterations: LIFT_ITERATIONS,
+            tolerance: 1e-12,
+            ..settings.qp
+        };
         let mut lift = Self {
-            solver: solver(shape, settings)?,
+            solver: settings.solver.of_horizon(1, shape, &cost, qp)?,
             friction,
             qp: StageQp::zeros(&shape),
             projection: vec![0.0; d * STATE_DIM],
@@ -149,19 +152,14 @@ impl ConsistentLift {
 
     /// Takes the projection of another plant: that at the measured state, where it depends on it.
     pub(super) fn take_projection(&mut self, plant: &ControlModel) {
-        let rows = plant.parts().projection.row_iter();
+        let rows = plant.projection.row_iter();
         for (own, row) in self.projection.chunks_exact_mut(STATE_DIM).zip(rows) {
-            own.iter_mut()
-                .zip(row.iter())
-                .for_each(|(own, entry)| *own = *entry);
+            own.copy_from_slice(row.transpose().as_slice());
         }
     }
 
     /// Torques at the links, N m, for a latent input on a stance; with the stance's losses added they are within the
     /// motors' limits.
-    ///
-    /// # Errors
-    /// [`LiftFailure`] if a leg in contact is singular or the program is not solved.
     pub fn lift(
         &mut self,
         plant: &ControlModel,
@@ -170,11 +168,9 @@ impl ConsistentLift {
     ) -> Result<[f64; JOINT_DIM], LiftFailure> {
         self.iterations = 0;
         let forces = foot_forces(plant, stance).ok_or(LiftFailure::SingularLeg)?;
-        let wrench = plant
-            .input_rule()
-            .wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet)
-            .map_err(|_| LiftFailure::SingularLeg)?
-            .transpose();
+        let rule = plant.input_rule();
+        let wrench = rule.wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet);
+        let wrench = wrench.map_err(|_| LiftFailure::SingularLeg)?.transpose();
         let deviation = self.deviation[stance.phase].ok_or(BROKEN)?;
         let deviation = deviation.as_flattened();
         let mean = plant.phases()[stance.phase].torque_mean.as_slice();
@@ -241,11 +237,7 @@ impl ConsistentLift {
             let place = CONE_ROWS * leg + number;
             let row = &mut self.qp.cones.entries[place * JOINT_DIM..][..JOINT_DIM];
             row.fill(0.0);
-            let mut room = if force.is_none() && axis == 2 {
-                1.0
-            } else {
-                0.0
-            };
+            let mut room = f64::from(force.is_none() && axis == 2);
             for k in 0..3 {
                 let entry = force.map_or(0.0, |force| factor * force[(k, axis)] / self.weight_n);
                 row[3 * leg + k] = -entry;
@@ -289,37 +281,6 @@ impl ConsistentLift {
         }
         Ok(())
     }
-}
-
-fn solver(shape: StageShape, settings: &MpcSettings) -> Result<Box<dyn StageSolver>, ControlError> {
-    let cost = StageCost {
-        state: Vec::new(),
-        terminal: 1.0,
-        input: CURVATURE,
-        slack: 0.0,
-    };
-    Ok(match settings.solver {
-        Solver::Clarabel => {
-            let settings = QpSettings {
-                max_iterations: LIFT_ITERATIONS,
-                tolerance: 1e-12,
-                ..settings.qp
-            };
-            Box::new(Conic::new(1, shape, &cost, settings)?)
-        }
-        Solver::Riccati => {
-            let settings = Settings {
-                max_iterations: LIFT_ITERATIONS,
-                tolerance: TOLERANCE,
-                // Torques are at stake: the largest product alone decides.
-                gap: 0.0,
-                accepted_residual: settings.qp.accepted_residual,
-            };
-            Box::new(Structured::<1, JOINT_DIM, false>::new(
-                1, shape, &cost, settings,
-            ))
-        }
-    })
 }
 
 /// `C` with `C Cᵀ = S`, upper triangular, of the torques of a phase; none if their precision is not positive definite.

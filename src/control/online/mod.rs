@@ -44,14 +44,14 @@ pub mod shared {
     pub use crate::online::trajectory::NO_PHASE;
 }
 
-/// The structured solver with the widest vectors that the processor has.
+/// The structured solver, with wide vectors where the processor has them.
 pub mod widest {
-    pub use crate::online::structured::{prepare, solve};
+    pub use crate::online::structured::{has_avx2, prepare, solve};
 }
 
 pub use crate::solver::{Outcome, Residuals};
 pub use command::{Command, Source, Status};
-pub use control_model::{ControlModel, ControlModelParts, ControlPhase, NonlinearMaps};
+pub use control_model::{ControlModel, ControlPhase, NonlinearMaps};
 pub use controller::{Controller, Measurement};
 pub use error::ControlError;
 pub use estimate::InputGivenState;

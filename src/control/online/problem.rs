@@ -39,14 +39,11 @@
 //! C_pᵀ = S_p`, and each row divided by its limit: then the cost is a constant diagonal and the solver needs no scaling
 //! of its own.
 //!
-//! Which of many linear constraints can be active at all.
-//!
-//! A row is superfluous if no point that satisfies the other rows violates it by more than a margin. That is a linear
-//! program for each row: maximise `row · v` subject to the others, with the row itself relaxed so that the maximum
-//! exists. The margin matters: left and right legs have nearly equal rows, of which each cuts a sliver off what the
-//! other allows.
+//! A row is superfluous if no point that satisfies the other rows violates it by more than a margin, which a linear
+//! program decides: maximise `row · v` subject to the others, with the row itself relaxed so that the maximum exists. The
+//! margin matters: left and right legs have nearly equal rows, of which each cuts a sliver off what the other allows.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::control_model::ControlModel;
 use super::dense::Real;
@@ -110,13 +107,10 @@ pub struct BodyFriction {
 impl BodyFriction {
     fn new(plant: &ControlModel, coefficient: f64) -> Self {
         let weight = plant.robot().mass_kg() * GRAVITY_M_S2;
-        let lift = &plant.parts().lift;
-        let rows = JOINT_DIM..JOINT_DIM + 3;
-        let force =
-            rows.flat_map(|row| lift.row(row).iter().map(|e| e / weight).collect::<Vec<_>>());
+        let force = plant.lift.rows(JOINT_DIM, 3).transpose() / weight;
         Self {
             coefficient,
-            force: force.collect(),
+            force: force.as_slice().to_vec(),
             frame: plant.input_rule().wrench_frame(),
         }
     }
@@ -124,14 +118,8 @@ impl BodyFriction {
     /// Writes the cone's rows `(μ F_z, F_x, F_y)` of the force turned upright into `out`.
     pub(crate) fn turned(&self, attitude_rad: [f64; 2], out: &mut [f64]) {
         let rotation = to_upright(self.frame, attitude_rad);
-        let d = self.force.len() / 3;
-        turn_force(
-            rotation.as_flattened(),
-            &self.force,
-            self.coefficient,
-            d,
-            out,
-        );
+        let (rotation, d) = (rotation.as_flattened(), self.force.len() / 3);
+        turn_force(rotation, &self.force, self.coefficient, d, out);
     }
 }
 
@@ -221,10 +209,6 @@ pub fn pairs(rows: &[Row]) -> usize {
 }
 
 impl Row {
-    fn is_not_zero(&self) -> bool {
-        self.row.iter().any(|entry| *entry != 0.0)
-    }
-
     fn is_opposite(&self, other: &Row) -> bool {
         let opposite = other.row.iter().map(|entry| -entry);
         self.joint == other.joint && self.row.iter().copied().eq(opposite)
@@ -276,48 +260,44 @@ fn is_reachable(plant: &ControlModel, row: &Row) -> bool {
 }
 
 /// Both sides of every torque limit; joints that the lift does not reach have none.
-pub(super) fn torque_rows(plant: &ControlModel) -> Vec<Row> {
+fn torque_rows(plant: &ControlModel) -> Vec<Row> {
     let limits = plant.robot().torque_limit_nm();
     both_sides(plant, |joint| limits[joint], 1.0)
 }
 
 /// Both sides of a limit (N m) on the torque of each joint, from which losses take `loss_share`.
 fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64, loss_share: f64) -> Vec<Row> {
-    let lift = &plant.parts().lift;
-    let mut rows = Vec::new();
-    for joint in 0..JOINT_DIM {
-        for sign in [1.0, -1.0] {
-            let row = lift.row(joint);
-            rows.push(Row {
-                joint,
-                row: row.iter().map(|e| sign * e / limit(joint)).collect(),
-                bound: 1.0,
-                per_loss: loss_share * sign / limit(joint),
-            });
-        }
-    }
-    rows.retain(Row::is_not_zero);
-    rows
+    rows_of(&plant.lift, |joint, sign| {
+        (limit(joint), 1.0, loss_share * sign / limit(joint))
+    })
 }
 
 /// Both sides of every joint limit, divided by half the joint's range.
-pub(super) fn joint_rows(plant: &ControlModel) -> Vec<Row> {
-    let parts = plant.parts();
-    let mut rows = Vec::new();
-    for (joint, (lower, upper)) in plant.robot().joint_limit_rad().iter().enumerate() {
+fn joint_rows(plant: &ControlModel) -> Vec<Row> {
+    let limits = plant.robot().joint_limit_rad();
+    rows_of(&plant.decoder, |joint, sign| {
+        let (lower, upper) = limits[joint];
         let half = 0.5 * (upper - lower);
-        for (sign, limit) in [(1.0, upper), (-1.0, lower)] {
-            let row = parts.decoder.row(joint);
-            rows.push(Row {
-                joint,
-                row: row.iter().map(|entry| sign * entry / half).collect(),
-                bound: sign * (limit - parts.decoder_bias[joint]) / half,
-                per_loss: 0.0,
-            });
+        let limit = if sign > 0.0 { upper } else { lower };
+        (half, sign * (limit - plant.decoder_bias[joint]) / half, 0.0)
+    })
+}
+
+/// Both signs of each joint's row of a matrix over what `of` gives first for joint and sign, with bound and share of losses,
+/// but for rows of zeros.
+fn rows_of(matrix: &DMatrix<f64>, of: impl Fn(usize, f64) -> (f64, f64, f64)) -> Vec<Row> {
+    let sides = (0..JOINT_DIM).flat_map(|joint| [1.0, -1.0].map(|sign| (joint, sign)));
+    let rows = sides.map(|(joint, sign)| {
+        let (size, bound, per_loss) = of(joint, sign);
+        Row {
+            joint,
+            row: matrix.row(joint).iter().map(|e| sign * e / size).collect(),
+            bound,
+            per_loss,
         }
-    }
-    rows.retain(Row::is_not_zero);
-    rows
+    });
+    rows.filter(|row| row.row.iter().any(|entry| *entry != 0.0))
+        .collect()
 }
 
 /// Rotation that turns a lifted force upright: none is needed for one in world axes.

@@ -140,23 +140,12 @@ impl std::fmt::Debug for QpSolver {
 
 impl QpSolver {
     /// Builds a solver for the program's pattern; its values are the first data.
-    ///
-    /// # Errors
-    /// [`ControlError::Solver`] if the sizes of the program's parts disagree or clarabel refuses it.
     pub fn new(program: ConeProgram, settings: QpSettings) -> Result<Self, ControlError> {
-        let cones: Vec<SupportedConeT<f64>> =
-            program.cones.iter().map(|&cone| supported(cone)).collect();
-        let solver = DefaultSolver::new(
-            &program.p,
-            &program.q,
-            &program.a,
-            &program.b,
-            &cones,
-            clarabel_settings(&settings),
-        )
-        .map_err(|error| ControlError::Solver {
-            reason: error.to_string(),
-        })?;
+        let ConeProgram { p, q, a, b, cones } = &program;
+        let cones: Vec<_> = cones.iter().map(|&cone| supported(cone)).collect();
+        let solver = DefaultSolver::new(p, q, a, b, &cones, clarabel_settings(&settings));
+        let refused = |reason: String| ControlError::Solver { reason };
+        let solver = solver.map_err(|error| refused(error.to_string()))?;
         Ok(Self {
             row_work: vec![0.0; program.b.len()],
             column_work: vec![0.0; program.q.len()],
@@ -184,20 +173,16 @@ impl QpSolver {
     /// Solves the program with its present values.
     pub fn solve(&mut self) -> Outcome {
         let ConeProgram { p, q, a, b, .. } = &self.program;
-        if ![q, b, &p.nzval, &a.nzval]
-            .iter()
-            .all(|values| values.is_finite())
-        {
-            return Outcome::NumericalFailure;
-        }
+        let values = [q, b, &p.nzval, &a.nzval];
         // An iterator of all positions would do without whole vectors, at the price of a division per entry inside
         // clarabel: whole-vector updates are copied as they are.
-        let (program, solver) = (&self.program, &mut self.solver);
-        let updated = solver.update_q(&program.q).is_ok()
-            && solver.update_b(&program.b).is_ok()
-            && solver.update_P(&program.p.nzval).is_ok()
-            && solver.update_A(&program.a.nzval).is_ok();
-        if !updated {
+        let solver = &mut self.solver;
+        let is_taken = values.iter().all(|values| values.is_finite())
+            && solver.update_q(q).is_ok()
+            && solver.update_b(b).is_ok()
+            && solver.update_P(&p.nzval).is_ok()
+            && solver.update_A(&a.nzval).is_ok();
+        if !is_taken {
             return Outcome::NumericalFailure;
         }
         self.solver.solve();
@@ -226,22 +211,18 @@ impl QpSolver {
     }
 
     fn outcome(&self) -> Outcome {
-        let accurate = self.residuals.worst() <= self.settings.accepted_residual;
+        use SolverStatus::*;
         match self.solver.solution.status {
-            SolverStatus::Solved
-            | SolverStatus::AlmostSolved
-            | SolverStatus::InsufficientProgress => match accurate {
-                true => Outcome::Solved,
-                false => Outcome::Inaccurate,
-            },
-            SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
-                Outcome::Infeasible
+            Solved | AlmostSolved | InsufficientProgress => {
+                match self.residuals.worst() <= self.settings.accepted_residual {
+                    true => Outcome::Solved,
+                    false => Outcome::Inaccurate,
+                }
             }
-            SolverStatus::DualInfeasible | SolverStatus::AlmostDualInfeasible => Outcome::Unbounded,
-            SolverStatus::MaxIterations | SolverStatus::MaxTime => Outcome::IterationCap,
-            SolverStatus::Unsolved
-            | SolverStatus::NumericalError
-            | SolverStatus::CallbackTerminated => Outcome::NumericalFailure,
+            PrimalInfeasible | AlmostPrimalInfeasible => Outcome::Infeasible,
+            DualInfeasible | AlmostDualInfeasible => Outcome::Unbounded,
+            MaxIterations | MaxTime => Outcome::IterationCap,
+            Unsolved | NumericalError | CallbackTerminated => Outcome::NumericalFailure,
         }
     }
 
@@ -255,7 +236,7 @@ impl QpSolver {
         entries(a).for_each(|(row, col, value)| slack[row] += value * x[col]);
         let primal_size = slack.norm_inf().max(b.norm_inf()).max(1.0);
         slack.axpby(1.0, b, -1.0);
-        let primal = cone_violation(cones, slack, Side::Primal) / primal_size;
+        let primal = cone_violation(cones, slack, false) / primal_size;
 
         gradient.fill(0.0);
         entries(p).for_each(|(row, col, value)| {
@@ -264,18 +245,12 @@ impl QpSolver {
                 gradient[col] += value * x[row];
             }
         });
-        let dual_size = gradient
-            .norm_inf()
-            .max(q.norm_inf())
-            .max(y.norm_inf())
-            .max(1.0);
+        let sizes = [gradient.norm_inf(), q.norm_inf(), y.norm_inf()];
+        let dual_size = sizes.into_iter().fold(1.0, f64::max);
         let xpx = x.dot(gradient);
         gradient.axpby(1.0, q, 1.0);
         entries(a).for_each(|(row, col, value)| gradient[col] += value * y[row]);
-        let dual = gradient
-            .norm_inf()
-            .max(cone_violation(cones, y, Side::Dual))
-            / dual_size;
+        let dual = gradient.norm_inf().max(cone_violation(cones, y, true)) / dual_size;
 
         let (qx, by) = (q.dot(x), b.dot(y));
         let (primal_cost, dual_cost) = (0.5 * xpx + qx, -0.5 * xpx - by);
@@ -284,30 +259,20 @@ impl QpSolver {
     }
 }
 
-/// Which of the two cones a vector is measured against.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Primal,
-    Dual,
-}
-
-/// Largest violation of any cone; not a number if any entry is not.
-fn cone_violation(cones: &[Cone], values: &[f64], side: Side) -> f64 {
+/// Largest violation of any cone, of the dual ones if those of the multipliers; not a number if any entry is not.
+fn cone_violation(cones: &[Cone], values: &[f64], is_dual: bool) -> f64 {
     let mut worst = 0.0_f64;
-    let mut start = 0;
+    let mut rest = values;
     for &cone in cones {
-        let part = &values[start..start + cone.dim()];
-        start += cone.dim();
-        let violation = match (cone, side) {
-            (Cone::Zero(_), Side::Primal) => part.norm_inf(),
-            (Cone::Zero(_), Side::Dual) => 0.0,
+        let part = rest.split_off(..cone.dim()).expect("rows of all cones");
+        let violation = match (cone, part) {
+            (Cone::Zero(_), _) if is_dual => 0.0,
+            (Cone::Zero(_), _) => part.norm_inf(),
             (Cone::Nonnegative(_), _) => {
-                part.iter().fold(0.0, |worst, &value| larger(worst, -value))
+                part.iter().fold(0.0, |worst, value| larger(worst, -value))
             }
-            (Cone::SecondOrder(_), _) => match part.split_first() {
-                Some((head, tail)) => tail.norm() - head,
-                None => 0.0,
-            },
+            (Cone::SecondOrder(_), [head, tail @ ..]) => tail.norm() - head,
+            (Cone::SecondOrder(_), []) => 0.0,
         };
         worst = larger(worst, violation);
     }

@@ -1,10 +1,6 @@
-//! The trajectory that the controller follows, in latent coordinates.
-//!
-//! Legs in flight, turned against the body's error of pitch.
-//!
-//! Nothing holds the pitch of a body in the air. Legs that are where the reference has them from the body put the feet
-//! elsewhere from the ground: on a body that has turned 0.1 rad too far forwards, some 3 cm too far back. With the hip
-//! `h`, the foot `p(q)` from it and the error `e` of pitch, a leg is commanded
+//! The trajectory that the controller follows, in latent coordinates, and legs in flight, turned against the body's error
+//! of pitch: nothing holds the pitch of a body in the air. With the hip `h`, the foot `p(q)` from it and the error `e` of
+//! pitch, a leg is commanded
 //!
 //! ```text
 //! q + J(q)^-1 (R_y(-s e) - 1) (h + p(q))
@@ -15,8 +11,6 @@
 use super::control_model::ControlModel;
 use super::dense::Real;
 use super::error::ControlError;
-use super::estimate::estimate_input;
-use super::linearise::LatentDynamics;
 use super::trajectory::{Instant, Trajectory, write_still};
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg, STATE_DIM};
 
@@ -46,8 +40,8 @@ pub struct Reference {
     time_s: Vec<f64>,
     /// `(z, dz)` a sample.
     state: Vec<f64>,
-    /// Latent input of each sample.
-    input: Option<Vec<f64>>,
+    /// Latent input of each sample, the trajectory's own or an estimate.
+    pub(super) input: Option<Vec<f64>>,
     /// Phase of each sample's feet.
     phase: Vec<usize>,
     /// Robot states, 18 per sample.
@@ -57,11 +51,6 @@ pub struct Reference {
 
 impl Reference {
     /// Encodes a trajectory.
-    ///
-    /// # Errors
-    /// [`ControlError::ReferenceLen`] below two samples, [`ControlError::ReferenceShape`] if array lengths disagree,
-    /// [`ControlError::ReferenceValue`] for values that are not finite, [`ControlError::ReferenceTime`] if time does
-    /// not increase and [`ControlError::ReferencePhase`] if a foot pattern selects no phase.
     pub(crate) fn new(
         plant: &ControlModel,
         samples: ReferenceSamples<'_>,
@@ -86,26 +75,12 @@ impl Reference {
             x: samples.x.to_vec(),
         };
         let [lower, upper] = plant.joint_limits();
-        let decoder = plant.parts().decoder.rows(0, JOINT_DIM).transpose();
+        let decoder = plant.decoder.rows(0, JOINT_DIM).transpose();
         let (mut still, mut deviation) = (vec![0.0; 2 * d], vec![0.0; 2 * d]);
         write_still(decoder.as_slice(), &lower, &upper, d, &mut still);
         reference.write_deviations(&still, &mut deviation);
         reference.deviation = deviation;
         Ok(reference)
-    }
-
-    /// Gives a trajectory that comes without its input the one that the model finds behind its accelerations.
-    pub(super) fn estimate_input(
-        &mut self,
-        plant: &ControlModel,
-        dynamics: &mut dyn LatentDynamics,
-    ) {
-        self.input = Some(estimate_input(plant, dynamics, self));
-    }
-
-    /// Whether the trajectory has an input, its own or an estimate.
-    pub(crate) fn has_input(&self) -> bool {
-        self.input.is_some()
     }
 
     /// Standard deviation of each of `(z, dz)` over the trajectory, never below a hundredth of the largest position's

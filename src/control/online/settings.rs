@@ -261,10 +261,6 @@ macro_rules! settings {
             }
 
             /// The same for the controller.
-            ///
-            /// # Errors
-            /// [`ControlError::Setting`] for a choice or a count that does not exist; other ranges are checked when the
-            /// controller is built.
             pub fn to_mpc(&self) -> Result<MpcSettings, ControlError> {
                 for (setting, found) in SETTINGS.iter().zip(self.numbers()) {
                     if let Accepts::Whole(..) = setting.accepts {
@@ -374,9 +370,6 @@ settings! {
 
 impl MpcSettings {
     /// Checks every number.
-    ///
-    /// # Errors
-    /// [`ControlError::Setting`] names the first one that is out of its range.
     pub fn check(&self) -> Result<(), ControlError> {
         self.check_table()?;
         let (qp, fallback) = (&self.qp, &self.fallback);

@@ -12,9 +12,7 @@ use super::dense::{MOST_LATENT, Real};
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows, pairs};
 
-/// Rows of a friction pyramid.
 pub(super) const PYRAMID_ROWS: usize = 4;
-/// Rows of a friction cone.
 pub(super) const CONE_ROWS: usize = 3;
 /// Share of a friction cone's radius that the pyramid inside it has along an axis.
 pub(super) const SQRT_HALF: Real = std::f64::consts::FRAC_1_SQRT_2;
@@ -22,14 +20,13 @@ pub(super) const SQRT_HALF: Real = std::f64::consts::FRAC_1_SQRT_2;
 /// How the friction cone `‖(F_x, F_y)‖ <= μ F_z` is stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FrictionShape {
-    /// As it is.
     Cone,
     /// By the pyramid `|F_x|, |F_y| <= μ F_z / √2` inside it.
     Pyramid,
 }
 
 /// Rows `entries v <= bounds`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Rows {
     /// Row-major.
     pub entries: Vec<f64>,
@@ -38,10 +35,9 @@ pub(super) struct Rows {
 
 impl Rows {
     fn zeros(count: usize, width: usize) -> Self {
-        Self {
-            entries: vec![0.0; count * width],
-            bounds: vec![0.0; count],
-        }
+        let mut rows = Self::default();
+        rows.resize(count, width);
+        rows
     }
 
     pub(super) fn resize(&mut self, count: usize, width: usize) {
@@ -65,7 +61,6 @@ pub(super) struct StageShape {
 }
 
 impl StageShape {
-    /// That of a controller's stages.
     pub(super) fn of(latent_dim: usize, rows: &StageRows, friction: FrictionShape) -> Self {
         let forces = usize::from(rows.friction.is_some());
         let (pyramids, cones) = match friction {

@@ -5,6 +5,7 @@ use nalgebra::SVector;
 use super::command::{Command, Source, Status};
 use super::controller::{Controller, Measurement, SOFTENED_FROM};
 use super::lift::StanceState;
+use super::stage::unscale;
 use super::trajectory::NO_PHASE;
 use crate::robot::{JOINT_DIM, STATE_DIM};
 use crate::solver::Outcome;
@@ -72,9 +73,9 @@ impl Controller {
         };
         let deviation = reference.deviation();
         let (measured, last_input) = (&self.memory.measured, &self.memory.input);
-        let (stages, start) =
-            (self.horizon).start((measured, deviation), last_input, &self.near_rows);
-        let (outcome, iterations) = self.engine.solve(stages, start);
+        let horizon = &mut self.horizon;
+        horizon.begin((measured, deviation), last_input, &self.near_rows);
+        let (outcome, iterations) = self.engine.solve(&horizon.programs, &horizon.start);
         command.iterations = iterations;
         match outcome {
             Outcome::Solved => {}
@@ -83,16 +84,19 @@ impl Controller {
             Outcome::IterationCap => return Status::IterationCap,
             Outcome::Unbounded | Outcome::NumericalFailure => return Status::NumericalFailure,
         }
-        let first = self.horizon.stage(0);
-        let (plan, phase) = (&mut self.plan, first.phase);
+        let (plan, phase) = (&mut self.plan, horizon.stages[0].phase);
         plan.begin(measurement.time_s, phase, measured);
-        for stage in 0..self.settings.horizon {
-            let out = (&mut plan.inputs[stage][..], &mut plan.states[stage + 1][..]);
-            let scaled = self.engine.stage(stage);
-            (self.horizon).unscale(stage, scaled, &self.plant, deviation, out);
+        for (k, stage) in horizon.stages.iter().enumerate() {
+            let root = self.plant.phases()[stage.phase].latent_root.as_slice();
+            let (input, end) = (&mut plan.inputs[k], &mut plan.states[k + 1]);
+            let (v, x) = self.engine.stage(k);
+            input.copy_from_slice(&stage.input);
+            end.copy_from_slice(&stage.end);
+            unscale(root, deviation, stage.input.len(), v, x, input, end);
         }
         let is_grounded = self.plant.phases()[phase].is_grounded;
-        self.effectiveness.begin(&first.model, is_grounded);
+        let first = &self.horizon.stages[0].model;
+        self.effectiveness.begin(first, is_grounded);
         command.slack = self.largest_violation();
         self.memory.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
         if !self.write_plan(0, command) {
@@ -134,11 +138,11 @@ impl Controller {
         let (z, dz) = self.posture.split_at(self.plant.latent_dim());
         command.u_lat.copy_from_slice(self.plan.input(stage));
         for input in &mut command.u_lat {
-            *input /= self.effectiveness.estimate();
+            *input /= self.effectiveness.share.estimate;
         }
-        command.phase = Some(self.plan.phase());
+        command.phase = Some(self.plan.phase);
         let mut joints = self.plant.decode_joints(z);
-        let in_flight = !self.plant.phases()[self.plan.phase()].is_grounded;
+        let in_flight = !self.plant.phases()[self.plan.phase].is_grounded;
         if in_flight && self.settings.swing_turn > 0.0 {
             let error = stance.attitude_rad[1] - reference.attitude_at(time_s)[1];
             let turn_rad = self.settings.swing_turn * error;
@@ -146,7 +150,7 @@ impl Controller {
         }
         command.joint_position_rad = self.plant.clamp_joints(joints);
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
-        let (start, end) = (self.plan.start(stage), self.plan.end(stage));
+        let (start, end) = (&self.plan.states[stage], self.plan.end(stage));
         stance.losses_nm = self.plant.planned_losses(start, end, self.settings.step_s);
         let stance = *stance;
         let Ok(torque) = self.lift(&command.u_lat, &stance) else {

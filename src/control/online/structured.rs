@@ -4,9 +4,7 @@ use super::conic::{StageSolver, Start};
 use super::dense::Real;
 use super::qp::QpSettings;
 use super::stage::{Rows, StageCost, StageQp, StageShape};
-use crate::solver::{
-    Cost, Links, Outcome, Pairs, Program, Report, RowMatrices, Settings, Shape, Stage,
-};
+use crate::solver::{Cost, Links, Outcome, Program, Report, RowMatrices, Settings, Shape, Stage};
 
 /// Complementarity and violation of rows at which iterations end.
 pub const TOLERANCE: f64 = 1e-9;
@@ -20,41 +18,45 @@ pub const RATE_SOFTNESS: f64 = 1e-8;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
-/// The solver of a horizon, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]. An odd dimension is filled up
-/// to the next even one with inputs and states that nothing moves, which changes no bit and halves what has to be
-/// compiled.
+/// The solver of a horizon, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]; that of a lift where there are no
+/// states. Dimensions in between those that are compiled are filled up with inputs and states that nothing moves, which
+/// changes no bit.
 pub(super) fn structured(
     horizon: usize,
     shape: StageShape,
     cost: &StageCost,
     settings: QpSettings,
 ) -> Option<Box<dyn StageSolver>> {
-    let is_linked = shape.rate_rows > 0;
+    let (is_linked, is_lift) = (shape.rate_rows > 0, shape.states == 0);
     let settings = Settings {
         max_iterations: settings.max_iterations,
         tolerance: if is_linked { RATE_TOLERANCE } else { TOLERANCE },
-        gap: if is_linked { 0.0 } else { GAP },
+        // Of a lift torques are at stake: the largest product alone decides.
+        gap: if is_linked || is_lift { 0.0 } else { GAP },
         accepted_residual: settings.accepted_residual,
     };
+    // Fewer dimensions where vectors are narrow, as each has to be compiled.
+    let multiple = if has_avx2() { 2 } else { 4 };
+    let inputs = shape.inputs.next_multiple_of(multiple);
     macro_rules! of_dimension {
-        ($($dim:literal),*) => {
-            match (shape.inputs.next_multiple_of(2), is_linked) {
-                $(($dim, false) => Some(Box::new(
-                    Structured::<{ 2 * $dim }, $dim, false>::new(horizon, shape, cost, settings)
-                )),)*
-                $(($dim, true) => Some(Box::new(
-                    Structured::<{ 2 * $dim }, $dim, true>::new(horizon, shape, cost, settings)
-                )),)*
+        ($($wide:literal: $(($nx:literal, $nu:literal))*;)*) => {
+            match (has_avx2(), is_lift, inputs) {
+                $($(($wide, is_lift, $nu) if is_lift == ($nx < $nu) => Some(Box::new(
+                    Structured::<$nx, $nu, $wide>::new(horizon, shape, cost, settings)
+                )),)*)*
                 _ => None,
             }
         };
     }
-    of_dimension!(2, 4, 6, 8)
+    of_dimension! {
+        true: (4, 2) (8, 4) (12, 6) (16, 8) (1, 12);
+        false: (8, 4) (16, 8) (1, 12);
+    }
 }
 
-/// Memory of a program with up to `NX` states and `NU` inputs, `LINKED` if torque rates are limited.
+/// Memory of a program with up to `NX` states and `NU` inputs, `WIDE` if it is solved by AVX2.
 #[derive(Debug)]
-pub(super) struct Structured<const NX: usize, const NU: usize, const LINKED: bool> {
+pub(super) struct Structured<const NX: usize, const NU: usize, const WIDE: bool> {
     /// States and inputs that the stages have; what is beyond them stays zero.
     states: usize,
     inputs: usize,
@@ -75,7 +77,7 @@ pub(super) struct Structured<const NX: usize, const NU: usize, const LINKED: boo
     has_gains: bool,
 }
 
-impl<const NX: usize, const NU: usize, const LINKED: bool> Structured<NX, NU, LINKED> {
+impl<const NX: usize, const NU: usize, const WIDE: bool> Structured<NX, NU, WIDE> {
     pub(super) fn new(
         horizon: usize,
         of: StageShape,
@@ -86,11 +88,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Structured<NX, NU, LI
             input: of.input_rows,
             soft: of.soft_rows,
             link: of.rate_rows,
-            pairs: Pairs {
-                input: of.pairs,
-                hard: 0,
-            },
-            ..Shape::default()
+            pairs: of.pairs,
         };
         let mut state = [0.0; NX];
         state[..of.states].copy_from_slice(&cost.state);
@@ -108,7 +106,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Structured<NX, NU, LI
             input_rows: vec![[0.0; NU]; horizon * shape.input],
             soft_rows: vec![[0.0; NU]; horizon * shape.soft],
             rate_rows: vec![[0.0; NU]; horizon * shape.link],
-            rate_gains: vec![[[0.0; NU]; NU]; if LINKED { horizon } else { 0 }],
+            rate_gains: vec![[[0.0; NU]; NU]; if shape.link > 0 { horizon } else { 0 }],
             first: 0,
             shape,
             cost: Cost {
@@ -123,7 +121,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Structured<NX, NU, LI
         }
     }
 
-    fn program(&mut self) -> Program<'_, f64, NX, NU, LINKED> {
+    fn program(&mut self) -> Program<'_, f64, NX, NU> {
         let memory = self.stages.len() * self.shape.memory();
         Program {
             stages: &mut self.stages,
@@ -133,7 +131,6 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> Structured<NX, NU, LI
             matrices: RowMatrices {
                 input: &self.input_rows,
                 soft: &self.soft_rows,
-                hard: &[],
             },
             links: Links {
                 rows: &self.rate_rows,
@@ -193,9 +190,7 @@ fn write_rows<const NU: usize>(matrix: &mut [[f64; NU]], rows: &Rows, width: usi
     }
 }
 
-impl<const NX: usize, const NU: usize, const LINKED: bool> StageSolver
-    for Structured<NX, NU, LINKED>
-{
+impl<const NX: usize, const NU: usize, const WIDE: bool> StageSolver for Structured<NX, NU, WIDE> {
     fn forget(&mut self) {
         (self.is_warm, self.has_gains) = (false, false);
     }
@@ -211,7 +206,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StageSolver
             self.write(self.place(index), &stages[index]);
             self.has_gains = false;
         }
-        self.has_gains = self.has_gains || prepare(&mut self.program());
+        self.has_gains = self.has_gains || prepare::<WIDE, NX, NU>(&mut self.program());
     }
 
     fn solve(&mut self, stages: &[StageQp], start: &Start) -> (Outcome, u32) {
@@ -222,7 +217,7 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StageSolver
         let mut x0 = [0.0; NX];
         x0[..self.states].copy_from_slice(&start.state);
         let (is_warm, settings) = (self.is_warm, self.settings);
-        let report = solve(&mut self.program(), &x0, is_warm, &settings);
+        let report = solve::<WIDE, NX, NU>(&mut self.program(), &x0, is_warm, &settings);
         self.is_warm = report.outcome == Outcome::Solved;
         self.has_gains = report.iterations == 0;
         (report.outcome, report.iterations)
@@ -234,28 +229,37 @@ impl<const NX: usize, const NU: usize, const LINKED: bool> StageSolver
     }
 }
 
-/// [`Program::prepare`] with the widest vectors that the processor has; the bits are the same with all. Programs with
-/// rates, which are rare, make do with the narrowest: a copy less to compile.
-pub fn prepare<const NX: usize, const NU: usize, const LINKED: bool>(
-    program: &mut Program<'_, f64, NX, NU, LINKED>,
+/// Whether the processor has vectors of 256 bits.
+pub fn has_avx2() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return is_x86_feature_detected!("avx2");
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
+/// [`Program::prepare`], `WIDE` with AVX2, which the processor must have; the bits are the same.
+pub fn prepare<const WIDE: bool, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, f64, NX, NU>,
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if !LINKED && is_x86_feature_detected!("avx2") {
+    if WIDE {
+        assert!(has_avx2());
         // SAFETY: the processor has what this is compiled for.
         return unsafe { program.prepare_avx2() };
     }
     program.prepare()
 }
 
-/// [`Program::solve`] with the widest vectors that the processor has; the bits are the same with all.
-pub fn solve<const NX: usize, const NU: usize, const LINKED: bool>(
-    program: &mut Program<'_, f64, NX, NU, LINKED>,
+/// [`Program::solve`] in the same way.
+pub fn solve<const WIDE: bool, const NX: usize, const NU: usize>(
+    program: &mut Program<'_, f64, NX, NU>,
     x0: &[f64; NX],
     is_warm: bool,
     settings: &Settings<f64>,
 ) -> Report<f64> {
     #[cfg(target_arch = "x86_64")]
-    if !LINKED && is_x86_feature_detected!("avx2") {
+    if WIDE {
+        assert!(has_avx2());
         // SAFETY: the processor has what this is compiled for.
         return unsafe { program.solve_avx2(x0, is_warm, settings) };
     }

@@ -5,7 +5,7 @@ use super::lower::Lower;
 use super::point::{Centring, Point, boundary_share};
 use super::problem::{Program, Settings, Stage};
 use super::riccati::{Products, add_multiple, add_product, eliminate};
-use super::rows::{Rows, add_weighted, dot, largest_of, part, part_mut, sum_of};
+use super::rows::{Rows, dot, largest_of, part, part_mut, sum_of};
 use super::scalar::Real;
 
 /// How far a change of all unknowns may go, and the products of the changes of slacks and multipliers.
@@ -18,7 +18,7 @@ struct Reach<T> {
     second_largest: T,
 }
 
-impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
+impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// First point of the iterations, to be centred: the guess, or the point of the gains.
     #[inline(always)]
     pub(super) fn start(&mut self, x0: &[T; NX], is_warm: bool) {
@@ -46,6 +46,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     /// How far the optimum without rows moved since the last program, in units of the input's rows.
     #[inline(always)]
     pub(super) fn change_of_gains(&mut self) -> T {
+        let linked = self.is_linked();
         let mut largest = T::ZERO;
         for k in 0..self.stages.len() {
             let at = self.at(k);
@@ -59,7 +60,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             for i in 0..self.shape.input {
                 largest = dot(&input[i], &change).magnitude().or_larger(largest);
             }
-            if LINKED {
+            if linked {
                 let links = self.link_rows(k);
                 for i in 0..self.shape.link {
                     largest = dot(&links[i], &change).magnitude().or_larger(largest);
@@ -160,6 +161,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let shape = self.shape;
         let memory = shape.memory();
         let horizon = self.stages.len();
+        let linked = self.is_linked();
+        let softness = self.softness();
         let mut after: Before<T, NX, NU> = Before::zeros();
         let mut products: Products<T, NX, NU> = Products::zeros();
         let mut p = [[T::ZERO; NX]; NX];
@@ -169,11 +172,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             let at = self.at(k);
             let before = if k > 0 { self.at(k - 1) } else { 0 };
             let mut rows: Rows<T> = Rows::of(&mut self.rows[at * memory..][..memory], shape.rows());
-            if LINKED {
-                rows.weigh_softened(self.links.softness);
-            } else {
-                rows.weigh(left);
-            }
+            rows.weigh(left, softness);
             let w = &rows.weight[..rows.count];
             let y = &rows.dmultiplier[..rows.count];
             let stage = &mut self.stages[at];
@@ -187,71 +186,37 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             let mut hessian: Lower<T, NU> = Lower::diagonal(&self.cost.input);
             let input = &self.matrices.input[stage.input_rows..];
-            add_weighted(
-                w,
-                y,
-                input,
-                shape.pairs.input,
-                shape.input,
-                &mut hessian,
-                &mut by_v,
-            );
+            hessian.add_rows(w, y, input, shape.pairs, shape.input, &mut by_v);
             if NU <= NX && shape.soft > 0 {
                 let soft = &self.matrices.soft[stage.soft_rows..];
                 let by_z: &mut [T; NU] = part_mut(&mut by_x, 0);
                 let w_soft = &w[shape.input..];
                 let y_soft = &y[shape.input..];
-                stage.add_soft_rows(
-                    w_soft,
-                    y_soft,
-                    soft,
-                    shape.soft,
-                    self.cost.slack,
-                    by_z,
-                    &mut p,
-                );
-            }
-            if NU <= NX && shape.hard > 0 {
-                let hard = &self.matrices.hard[stage.hard_rows..];
-                let by_z: &mut [T; NU] = part_mut(&mut by_x, shape.hard_offset);
-                let w_hard = &w[shape.first_hard()..];
-                let y_hard = &y[shape.first_hard()..];
-                let mut square: Lower<T, NU> = Lower::zeros();
-                add_weighted(
-                    w_hard,
-                    y_hard,
-                    hard,
-                    shape.pairs.hard,
-                    shape.hard,
-                    &mut square,
-                    by_z,
-                );
-                square.add_to(shape.hard_offset, &mut p);
+                let price = self.cost.slack;
+                stage.add_soft_rows(w_soft, y_soft, soft, shape.soft, price, by_z, &mut p);
             }
             products.clear_hessian();
-            if LINKED {
-                let link = shape.link;
+            if linked {
                 let w_link = &w[shape.first_link()..];
                 let y_link = &y[shape.first_link()..];
-                let own = &self.links.rows[at * link..];
-                let earlier = &self.links.rows[before * link..];
-                add_weighted(w_link, y_link, own, 0, link, &mut hessian, &mut by_v);
+                let own = &self.links.rows[at * shape.link..];
+                hessian.add_rows(w_link, y_link, own, 0, shape.link, &mut by_v);
                 hessian.write_rows(&mut products.hvv);
                 after.add_to(stage, &mut by_v, &mut products);
-                if !eliminate(stage, &mut p, &mut products) {
-                    return false;
-                }
-                stage.pull(&mut by_x, &mut by_v);
-                if k > 0 {
-                    let gain = &mut self.links.gains[at];
-                    after.write(stage, gain, w_link, y_link, own, earlier, link, &by_v);
-                }
             } else {
                 hessian.write_rows(&mut products.hvv);
-                if !eliminate(stage, &mut p, &mut products) {
-                    return false;
-                }
-                stage.pull(&mut by_x, &mut by_v);
+            }
+            if !eliminate(stage, &mut p, &mut products) {
+                return false;
+            }
+            stage.pull(&mut by_x, &mut by_v);
+            if linked && k > 0 {
+                let gain = &mut self.links.gains[at];
+                let own = &self.links.rows[at * shape.link..];
+                let earlier = &self.links.rows[before * shape.link..];
+                let w_link = &w[shape.first_link()..];
+                let y_link = &y[shape.first_link()..];
+                after.write(stage, gain, w_link, y_link, own, earlier, shape.link, &by_v);
             }
         }
         true
@@ -263,17 +228,14 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     fn pull_all(&mut self, left: T, aim: T) {
         let shape = self.shape;
         let horizon = self.stages.len();
-        let softness = self.links.softness;
+        let linked = self.is_linked();
+        let softness = self.softness();
         let mut p = [T::ZERO; NX];
         let mut by_after = [T::ZERO; NU];
         for k in (0..horizon).rev() {
             let at = self.at(k);
             let mut rows = self.rows_of(k);
-            if LINKED {
-                rows.aim_softened(softness, aim);
-            } else {
-                rows.aim_at(left, aim);
-            }
+            rows.aim_at(left, softness, aim);
             let stage = &self.stages[at];
             let weight = self.cost.state_at(k, horizon);
             let mut by_v = [T::ZERO; NU];
@@ -285,7 +247,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             let aims = &self.rows[at * shape.memory() + 7 * shape.rows()..][..shape.rows()];
             let by_t = self.add_rows_pull(k, aims, &mut by_v, &mut p);
-            if LINKED {
+            if linked {
                 for i in 0..NU {
                     by_v[i] += by_after[i];
                 }
@@ -303,7 +265,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                 }
             }
             stage.pull(&mut p, &mut by_v);
-            if LINKED && k > 0 {
+            if linked && k > 0 {
                 take_answer(&self.links.gains[at], &by_v, &mut by_after);
             }
         }
@@ -314,7 +276,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     #[inline(always)]
     fn advance(&mut self, left: T, is_corrected: bool) -> Reach<T> {
         let soft = self.shape.soft;
-        let softness = self.links.softness;
+        let linked = self.is_linked();
+        let softness = self.softness();
         let mut times = T::ZERO;
         let mut second_sum = T::ZERO;
         let mut second_largest = T::ZERO;
@@ -325,7 +288,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             let stage = &mut self.stages[at];
             let mut dv = [T::ZERO; NU];
             stage.answer(&dx, &mut dv);
-            if LINKED && k > 0 {
+            if linked && k > 0 {
                 answer_before(&self.links.gains[at], &before, &mut dv);
             }
             let mut end = [T::ZERO; NX];
@@ -342,7 +305,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             let dt = stage.dt;
             let mut rows = self.rows_times(k, &before, &dv, &dx, dt);
             before = dv;
-            if LINKED {
+            if linked {
                 rows.change_softened(softness);
             } else if is_corrected {
                 rows.change_corrected(left);
@@ -365,11 +328,11 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         }
     }
 
-    /// Moves all unknowns along their changes.
     #[inline(always)]
     fn move_by(&mut self, length: T, point: &mut Point<T>) {
         let horizon = self.stages.len();
-        let softness = self.links.softness;
+        let linked = self.is_linked();
+        let softness = self.softness();
         // The rows are linear: each step takes its share of all residuals.
         let rest = T::ONE - length;
         let mut sum = T::ZERO;
@@ -397,7 +360,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             sum += sum_of(rows.target, rows.count);
             largest = largest_of(rows.target, rows.count, largest);
-            if LINKED {
+            if linked {
                 for i in 0..rows.count {
                     rows.residual[i] =
                         rest * rows.residual[i] + length * (softness * rows.dmultiplier[i]);
@@ -406,7 +369,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
         }
         point.left = rest * point.left;
-        if LINKED {
+        if linked {
             point.residual = residual;
         } else {
             point.kept = rest * point.kept;
@@ -440,7 +403,7 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
             by_t -= y[i];
             add_multiple(w[i], &rows[i], &mut pull);
         }
-        add_weighted(w, y, rows, 0, count, &mut square, by_z);
+        square.add_rows(w, y, rows, 0, count, by_z);
         self.soft_pull = pull;
         self.soft_inverse = T::ONE / (curvature + w[count]);
         self.dt = -(by_t - y[count]) * self.soft_inverse;
@@ -448,6 +411,6 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
             by_z[j] = by_z[j] - pull[j] * self.dt;
         }
         square.add_square(-self.soft_inverse, &pull);
-        square.add_to(0, p);
+        square.add_to(p);
     }
 }

@@ -24,7 +24,7 @@ use super::scalar::Real;
 
 /// Rows that link inputs, and memory for their gains.
 #[derive(Debug)]
-pub struct Links<'m, T, const NU: usize, const LINKED: bool> {
+pub struct Links<'m, T, const NU: usize> {
     /// `L`: `Shape::link` rows for each place of the ring of stages.
     pub rows: &'m [[T; NU]],
     /// Memory of the solver, one for each place.
@@ -33,7 +33,7 @@ pub struct Links<'m, T, const NU: usize, const LINKED: bool> {
     pub softness: T,
 }
 
-impl<T: Real, const NU: usize> Links<'_, T, NU, false> {
+impl<T: Real, const NU: usize> Links<'_, T, NU> {
     /// No rows of the kind.
     pub fn none() -> Self {
         Self {
@@ -50,12 +50,10 @@ pub(super) struct Before<T, const NX: usize, const NU: usize> {
     by_state: [[T; NX]; NU],
     /// `N`, of which the lower triangle is written.
     square: [[T; NU]; NU],
-    /// Gradient.
     linear: [T; NU],
 }
 
 impl<T: Real, const NX: usize, const NU: usize> Before<T, NX, NU> {
-    /// No cost, as after the last stage.
     #[inline(always)]
     pub(super) fn zeros() -> Self {
         Self {
@@ -175,10 +173,22 @@ pub(super) fn answer_before<T: Real, const NU: usize>(
     }
 }
 
-impl<'m, T: Real, const NX: usize, const NU: usize, const LINKED: bool>
-    Program<'m, T, NX, NU, LINKED>
-{
-    /// `L` of a stage, of a program with links.
+impl<'m, T: Real, const NX: usize, const NU: usize> Program<'m, T, NX, NU> {
+    #[inline(always)]
+    pub(super) fn is_linked(&self) -> bool {
+        NU <= NX && self.shape.link > 0
+    }
+
+    /// How soft the rows are: not at all without links.
+    #[inline(always)]
+    pub(super) fn softness(&self) -> T {
+        if self.is_linked() {
+            self.links.softness
+        } else {
+            T::ZERO
+        }
+    }
+
     #[inline(always)]
     pub(super) fn link_rows(&self, k: usize) -> &'m [[T; NU]] {
         &self.links.rows[self.at(k) * self.shape.link..][..self.shape.link]

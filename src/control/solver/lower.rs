@@ -11,16 +11,13 @@ pub(super) struct Lower<T, const NU: usize> {
 }
 
 impl<T: Real, const NU: usize> Lower<T, NU> {
-    /// A matrix of zeros.
     #[inline(always)]
     pub(super) fn zeros() -> Self {
-        const { assert!(NU <= WIDE) };
         Self {
             blocks: [[[T::ZERO; 4]; NU]; WIDE / 4],
         }
     }
 
-    /// A diagonal matrix.
     #[inline(always)]
     pub(super) fn diagonal(entries: &[T; NU]) -> Self {
         let mut out: Lower<T, NU> = Lower::zeros();
@@ -46,7 +43,36 @@ impl<T: Real, const NU: usize> Lower<T, NU> {
         }
     }
 
-    /// An entry on or below the diagonal.
+    /// Adds `Σ w row rowᵀ`, and to `sum` `Σ y row`, of `count` rows, of which so many pairs of opposite ones come first.
+    #[inline(always)]
+    pub(super) fn add_rows(
+        &mut self,
+        w: &[T],
+        y: &[T],
+        rows: &[[T; NU]],
+        pairs: usize,
+        count: usize,
+        sum: &mut [T; NU],
+    ) {
+        let w = &w[..count];
+        let y = &y[..count];
+        let rows = &rows[..count];
+        // Local sums stay in registers.
+        let mut local = *self;
+        let mut local_sum = *sum;
+        for pair in 0..pairs {
+            let row = &rows[2 * pair];
+            local.add_square(w[2 * pair] + w[2 * pair + 1], row);
+            add_multiple(y[2 * pair] - y[2 * pair + 1], row, &mut local_sum);
+        }
+        for i in 2 * pairs..count {
+            local.add_square(w[i], &rows[i]);
+            add_multiple(y[i], &rows[i], &mut local_sum);
+        }
+        *self = local;
+        *sum = local_sum;
+    }
+
     #[inline(always)]
     pub(super) fn entry(&self, i: usize, j: usize) -> T {
         self.blocks[j / 4][i][j % 4]
@@ -62,9 +88,9 @@ impl<T: Real, const NU: usize> Lower<T, NU> {
         }
     }
 
-    /// Adds the symmetric matrix to a block on the diagonal of another, from this row on.
+    /// Adds the symmetric matrix to the first block on the diagonal of another.
     #[inline(always)]
-    pub(super) fn add_to<const NX: usize>(&self, first: usize, matrix: &mut [[T; NX]; NX]) {
+    pub(super) fn add_to<const NX: usize>(&self, matrix: &mut [[T; NX]; NX]) {
         for i in 0..NU {
             for j in 0..NU {
                 let entry = if i < j {
@@ -72,7 +98,7 @@ impl<T: Real, const NU: usize> Lower<T, NU> {
                 } else {
                     self.entry(i, j)
                 };
-                matrix[first + i][first + j] += entry;
+                matrix[i][j] += entry;
             }
         }
     }

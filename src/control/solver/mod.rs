@@ -3,7 +3,7 @@
 //! ```text
 //! minimise   Σ_k ½ v_kᵀ R v_k + ½ x_{k+1}ᵀ Q x_{k+1} + price t_k
 //! subject to x_{k+1} = A_k x_k + B_k v_k + c_k,   x_0 given
-//!            G_k v_k <= g_k,   E_k x_{k+1} − t_k <= e_k,   t_k >= 0,   F_k x_{k+1} <= f_k
+//!            G_k v_k <= g_k,   E_k x_{k+1} − t_k <= e_k,   t_k >= 0
 //!            L_k v_k − L_{k−1} v_{k−1} <= l_k,   L_0 v_0 <= l_0
 //! ```
 //!
@@ -31,7 +31,7 @@
 //!     rows: &mut rows,
 //!     first: 0,
 //!     shape,
-//!     matrices: RowMatrices { input: &[[1.0], [-1.0]], soft: &[], hard: &[] },
+//!     matrices: RowMatrices { input: &[[1.0], [-1.0]], soft: &[] },
 //!     links: Links::none(),
 //!     cost: Cost { state: [1.0, 0.1], terminal: [10.0, 1.0], input: [0.01], slack: 0.0 },
 //! };
@@ -67,7 +67,5 @@ mod scalar;
 mod solve;
 
 pub use links::Links;
-pub use problem::{
-    Cost, Outcome, Pairs, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage,
-};
+pub use problem::{Cost, Outcome, Program, Report, Residuals, RowMatrices, Settings, Shape, Stage};
 pub use scalar::Real;

@@ -12,9 +12,7 @@ const MARGIN_FACTOR: f64 = 10.0;
 /// Where slacks and multipliers are centred.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Centring {
-    /// Smallest slack.
     pub(super) slack: f64,
-    /// Smallest product of slack and multiplier.
     pub(super) product: f64,
 }
 
@@ -49,7 +47,6 @@ pub(super) const PATIENCE: u32 = 16;
 /// Share of the residuals at the last centring, those of the gradient among them, that may be left.
 const LEFT: f64 = 1e-6;
 
-/// How far a point is from the optimum.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point<T> {
     /// Share of the gradient that the steps since the last centring have left.
@@ -79,7 +76,6 @@ impl<T: Real> Point<T> {
         }
     }
 
-    /// Largest residual of a row.
     #[inline(always)]
     pub(super) fn infeasibility(&self) -> T {
         self.kept * self.residual

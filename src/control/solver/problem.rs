@@ -18,8 +18,6 @@ pub struct Stage<T, const NX: usize, const NU: usize> {
     pub input_rows: usize,
     /// First of this stage's rows in [`RowMatrices::soft`].
     pub soft_rows: usize,
-    /// First of this stage's rows in [`RowMatrices::hard`].
-    pub hard_rows: usize,
     /// Input of the last solution.
     pub v: [T; NU],
     /// State at the stage's end in the last solution.
@@ -50,7 +48,6 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
             c: [z; NX],
             input_rows: 0,
             soft_rows: 0,
-            hard_rows: 0,
             v: [z; NU],
             x: [z; NX],
             t: z,
@@ -74,24 +71,11 @@ pub struct Shape {
     pub input: usize,
     /// Rows on the first `NU` states at the stage's end, which share one slack.
     pub soft: usize,
-    /// Rows on `NU` states at the stage's end from `hard_offset` on.
-    pub hard: usize,
-    /// First state of the hard rows.
-    pub hard_offset: usize,
-    /// Rows that link the input to that of the stage before; none unless the program has [`Links`].
+    /// Rows that link the input to that of the stage before; their coefficients are in [`Links`].
     pub link: usize,
-    /// How many pairs of opposite rows come first, the two sides of a limit: `row, −row`. Each takes the products and
-    /// squares of one row.
-    pub pairs: Pairs,
-}
-
-/// Pairs of opposite rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Pairs {
-    /// Among the rows on the input.
-    pub input: usize,
-    /// Among the hard rows.
-    pub hard: usize,
+    /// How many pairs of opposite rows on the input come first, the two sides of a limit: `row, −row`. Each takes the
+    /// products and squares of one row.
+    pub pairs: usize,
 }
 
 impl Shape {
@@ -100,17 +84,12 @@ impl Shape {
         self.first_link() + self.link
     }
 
-    /// The row of the slack, if there are soft rows.
     pub(super) fn slack_row(&self) -> usize {
         self.input + self.soft
     }
 
-    pub(super) fn first_hard(&self) -> usize {
-        self.input + self.soft + usize::from(self.soft > 0)
-    }
-
     pub(super) fn first_link(&self) -> usize {
-        self.first_hard() + self.hard
+        self.input + self.soft + usize::from(self.soft > 0)
     }
 
     /// Numbers that a stage's rows need of [`Program::rows`].
@@ -130,8 +109,6 @@ pub struct RowMatrices<'a, T, const NU: usize> {
     pub input: &'a [[T; NU]],
     /// `E` of `E x - t <= bound`.
     pub soft: &'a [[T; NU]],
-    /// `E` of `E x <= bound`.
-    pub hard: &'a [[T; NU]],
 }
 
 /// The cost, the same at all stages but for the last one's states: `½ vᵀ R v + ½ xᵀ Q x + price t`.
@@ -157,9 +134,9 @@ impl<T: Real, const NX: usize, const NU: usize> Cost<T, NX, NU> {
     }
 }
 
-/// A program with the memory to solve it, all lent by the caller; `LINKED` if it has [`Links`].
+/// A program with the memory to solve it, all lent by the caller.
 #[derive(Debug)]
-pub struct Program<'m, T, const NX: usize, const NU: usize, const LINKED: bool> {
+pub struct Program<'m, T, const NX: usize, const NU: usize> {
     /// Stages of the horizon.
     pub stages: &'m mut [Stage<T, NX, NU>],
     /// [`Shape::memory`] numbers for each stage; bounds first, see [`Program::bounds_mut`].
@@ -171,12 +148,12 @@ pub struct Program<'m, T, const NX: usize, const NU: usize, const LINKED: bool> 
     /// Coefficients of the rows.
     pub matrices: RowMatrices<'m, T, NU>,
     /// Rows that link the inputs of consecutive stages.
-    pub links: Links<'m, T, NU, LINKED>,
+    pub links: Links<'m, T, NU>,
     /// The cost.
     pub cost: Cost<T, NX, NU>,
 }
 
-impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
+impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// Where a stage of the horizon stands in the ring.
     #[inline(always)]
     pub fn at(&self, stage: usize) -> usize {
@@ -188,7 +165,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         }
     }
 
-    /// Right-hand sides of a stage's rows: input, soft, hard, link; the one of `t >= 0` in between is zero.
+    /// Right-hand sides of a stage's rows: input, soft, link; the one of `t >= 0` in between is zero.
     pub fn bounds_mut(&mut self, stage: usize) -> &mut [T] {
         let first = self.at(stage) * self.shape.memory();
         &mut self.rows[first..][..self.shape.rows()]

@@ -1,6 +1,5 @@
 //! The rows of a stage: their numbers, their products with a point, and their share of gradients.
 
-use super::lower::Lower;
 use super::problem::Program;
 use super::riccati::add_multiple;
 use super::scalar::Real;
@@ -17,7 +16,6 @@ pub(super) struct Rows<'a, T> {
     pub(super) residual: &'a mut [T],
     pub(super) dslack: &'a mut [T],
     pub(super) dmultiplier: &'a mut [T],
-    /// Inverse of the slack.
     pub(super) inverse: &'a mut [T],
 }
 
@@ -49,46 +47,24 @@ impl<'a, T: Real> Rows<'a, T> {
 
     /// Weights of the rows, and multipliers aimed at by a step that does not centre, in `dmultiplier`.
     #[inline(always)]
-    pub(super) fn weigh(&mut self, left: T) {
-        for i in 0..self.count {
-            let inverse = T::ONE / self.slack[i];
-            let weight = self.multiplier[i] * inverse;
-            self.inverse[i] = inverse;
-            self.weight[i] = weight;
-            self.dmultiplier[i] = weight * (left * self.residual[i]);
-        }
-    }
-
-    /// The same of rows that are softened.
-    #[inline(always)]
-    pub(super) fn weigh_softened(&mut self, softness: T) {
+    pub(super) fn weigh(&mut self, left: T, softness: T) {
         for i in 0..self.count {
             let yield_of_row = softness * self.multiplier[i];
             let inverse = T::ONE / (self.slack[i] + yield_of_row);
             let weight = self.multiplier[i] * inverse;
             self.inverse[i] = inverse;
             self.weight[i] = weight;
-            self.dmultiplier[i] = weight * (self.residual[i] + yield_of_row);
+            self.dmultiplier[i] = weight * (left * self.residual[i] + yield_of_row);
         }
     }
 
     /// Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of the step
     /// that does not centre.
     #[inline(always)]
-    pub(super) fn aim_at(&mut self, left: T, aim: T) {
+    pub(super) fn aim_at(&mut self, left: T, softness: T, aim: T) {
         for i in 0..self.count {
             let second = self.dslack[i] * self.dmultiplier[i];
-            let residual = left * self.residual[i];
-            self.dmultiplier[i] = self.weight[i] * residual + (aim - second) * self.inverse[i];
-        }
-    }
-
-    /// The same of rows that are softened.
-    #[inline(always)]
-    pub(super) fn aim_softened(&mut self, softness: T, aim: T) {
-        for i in 0..self.count {
-            let second = self.dslack[i] * self.dmultiplier[i];
-            let residual = self.residual[i] + softness * self.multiplier[i];
+            let residual = left * self.residual[i] + softness * self.multiplier[i];
             self.dmultiplier[i] = self.weight[i] * residual + (aim - second) * self.inverse[i];
         }
     }
@@ -148,7 +124,7 @@ impl<'a, T: Real> Rows<'a, T> {
     }
 }
 
-impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
+impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     #[inline(always)]
     pub(super) fn rows_of(&mut self, stage: usize) -> Rows<'_, T> {
         let memory = self.shape.memory();
@@ -167,13 +143,14 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         t: T,
     ) -> Rows<'_, T> {
         let shape = self.shape;
+        let linked = self.is_linked();
         let memory = shape.memory();
         let place = self.at(k);
         let before_place = if k > 0 { self.at(k - 1) } else { 0 };
         let rows: Rows<T> = Rows::of(&mut self.rows[place * memory..][..memory], shape.rows());
         let stage = &self.stages[place];
         let input = &self.matrices.input[stage.input_rows..];
-        times(input, shape.pairs.input, shape.input, v, rows.target);
+        times(input, shape.pairs, shape.input, v, rows.target);
         if NU <= NX && shape.soft > 0 {
             let z: &[T; NU] = part(x, 0);
             let soft = &self.matrices.soft[stage.soft_rows..][..shape.soft];
@@ -183,13 +160,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             rows.target[shape.slack_row()] = -t;
         }
-        if NU <= NX && shape.hard > 0 {
-            let z: &[T; NU] = part(x, shape.hard_offset);
-            let hard = &self.matrices.hard[stage.hard_rows..];
-            let products = &mut rows.target[shape.first_hard()..];
-            times(hard, shape.pairs.hard, shape.hard, z, products);
-        }
-        if LINKED {
+        if linked {
             let products = &mut rows.target[shape.first_link()..];
             let first = place * shape.link;
             times(&self.links.rows[first..], 0, shape.link, v, products);
@@ -214,9 +185,10 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         by_x: &mut [T; NX],
     ) -> T {
         let shape = self.shape;
+        let linked = self.is_linked();
         let stage = &self.stages[self.at(k)];
         let input = &self.matrices.input[stage.input_rows..];
-        add_rows(y, input, shape.pairs.input, shape.input, by_v);
+        add_rows(y, input, shape.pairs, shape.input, by_v);
         let mut by_t = T::ZERO;
         if NU <= NX && shape.soft > 0 {
             let y_soft = &y[shape.input..][..shape.soft + 1];
@@ -229,13 +201,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             add_rows(y_soft, soft, 0, shape.soft, by_z);
             by_t -= y_soft[shape.soft];
         }
-        if NU <= NX && shape.hard > 0 {
-            let hard = &self.matrices.hard[stage.hard_rows..];
-            let by_z: &mut [T; NU] = part_mut(by_x, shape.hard_offset);
-            let y_hard = &y[shape.first_hard()..];
-            add_rows(y_hard, hard, shape.pairs.hard, shape.hard, by_z);
-        }
-        if LINKED {
+        if linked {
             let y_link = &y[shape.first_link()..];
             add_rows(y_link, self.link_rows(k), 0, shape.link, by_v);
         }
@@ -243,7 +209,6 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     }
 }
 
-/// Entries of a vector from this one on.
 #[inline(always)]
 pub(super) fn part<T, const N: usize>(values: &[T], first: usize) -> &[T; N] {
     (values[first..].first_chunk()).expect("a part ends before its vector")
@@ -296,35 +261,6 @@ fn add_rows<T: Real, const NU: usize>(
         add_multiple(y[i], &rows[i], &mut local);
     }
     *sum = local;
-}
-
-/// `square += Σ w row rowᵀ` and `sum += Σ y row` of `count` rows, of which so many pairs of opposite ones come first.
-#[inline(always)]
-pub(super) fn add_weighted<T: Real, const NU: usize>(
-    w: &[T],
-    y: &[T],
-    rows: &[[T; NU]],
-    pairs: usize,
-    count: usize,
-    square: &mut Lower<T, NU>,
-    sum: &mut [T; NU],
-) {
-    let w = &w[..count];
-    let y = &y[..count];
-    let rows = &rows[..count];
-    let mut local = *square;
-    let mut local_sum = *sum;
-    for pair in 0..pairs {
-        let row = &rows[2 * pair];
-        local.add_square(w[2 * pair] + w[2 * pair + 1], row);
-        add_multiple(y[2 * pair] - y[2 * pair + 1], row, &mut local_sum);
-    }
-    for i in 2 * pairs..count {
-        local.add_square(w[i], &rows[i]);
-        add_multiple(y[i], &rows[i], &mut local_sum);
-    }
-    *square = local;
-    *sum = local_sum;
 }
 
 #[inline(always)]

@@ -6,7 +6,7 @@ use super::problem::{Outcome, Program, Report, Residuals, Settings};
 use super::riccati::{Products, add_product, add_transposed, eliminate};
 use super::scalar::Real;
 
-impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
+impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// Eliminates all stages without their rows: gains and constant parts of the linear-quadratic optimum from any
     /// initial state. False if a Hessian is not positive definite.
     #[inline(always)]
@@ -157,6 +157,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     #[inline(always)]
     pub(crate) fn residuals(&mut self, x0: &[T; NX]) -> Residuals<T> {
         let horizon = self.stages.len();
+        let linked = self.is_linked();
         let shape = self.shape;
         let mut primal = T::ZERO;
         let mut dual = T::ZERO;
@@ -208,7 +209,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             }
             let y = &self.rows[at * shape.memory() + 2 * shape.rows()..][..shape.rows()];
             let by_t = self.add_rows_pull(k, y, &mut by_v, &mut p);
-            if LINKED {
+            if linked {
                 for i in 0..NU {
                     by_v[i] += by_before[i];
                 }
@@ -234,7 +235,6 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
     }
 }
 
-/// The end of a solve that met a number that is not finite.
 fn failure<T: Real>(iterations: u32) -> Report<T> {
     let zero = T::ZERO;
     let infinite = T::ONE / zero;
@@ -252,7 +252,7 @@ fn failure<T: Real>(iterations: u32) -> Report<T> {
 /// The same code for vector units of 256 bits: sums keep their order and products are not contracted, so that the bits
 /// are those of [`Program::prepare`] and [`Program::solve`].
 #[cfg(target_arch = "x86_64")]
-impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
+impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     /// [`Program::prepare`] on a processor with AVX2.
     ///
     /// # Safety

@@ -3,14 +3,14 @@
 //! Settings of the controller as generated files have them, from the one table [`SETTINGS`].
 
 use askama::Template;
-use nalgebra::Dim;
 use nalgebra::storage::RawStorage;
+use nalgebra::{DMatrix, DVector, Dim};
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::wrapped;
 use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings};
-use crate::mpc::{ControlModel, ControlModelParts, ControlPhase};
-use crate::robot::{Leg, LegGeometry, Robot, STATE_DIM, WrenchFrame};
+use crate::mpc::{ControlModel, ControlPhase};
+use crate::robot::{Leg, Robot, WrenchFrame};
 
 const WIDTH: usize = 5;
 
@@ -24,18 +24,15 @@ pub(crate) struct ControlModelText<'a> {
     model: &'a str,
     name: &'a str,
     robot: String,
-    leg_types: &'static str,
     frame: &'static str,
     actuators: Vec<(&'static str, String)>,
     plant: &'a ControlModel,
-    parts: &'a ControlModelParts,
-    knows_inputs: bool,
     /// Each phase with its constants' beginning.
     phases: Vec<(String, &'a PhaseInterface, &'a ControlPhase)>,
 }
 
-/// Type and value of a matrix as a Rust array, row by row.
-fn array<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
+/// Numbers of a matrix as a Rust array, row by row.
+fn numbers<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     matrix: &nalgebra::Matrix<f64, R, C, S>,
 ) -> String {
     let rows = matrix.row_iter();
@@ -43,11 +40,17 @@ fn array<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
         .flat_map(|row| row.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>())
         .collect();
     let lines: Vec<String> = texts.chunks(WIDTH).map(|line| line.join(", ")).collect();
-    format!(
-        "[f64; {}] = [\n    {},\n]",
-        texts.len(),
-        lines.join(",\n    ")
-    )
+    format!("[{}]", lines.join(",\n    "))
+}
+
+fn matrix(matrix: &DMatrix<f64>) -> String {
+    let (rows, columns) = matrix.shape();
+    let numbers = numbers(matrix);
+    format!("DMatrix::from_row_slice({rows}, {columns}, &{numbers})")
+}
+
+fn vector(vector: &DVector<f64>) -> String {
+    format!("DVector::from_column_slice(&{})", numbers(vector))
 }
 
 impl<'a> ControlModelText<'a> {
@@ -63,7 +66,6 @@ impl<'a> ControlModelText<'a> {
             model: &entries.name,
             name: &entries.identifier,
             robot: robot_text(plant.robot()),
-            leg_types: leg_types(plant.robot()),
             frame: match rule.wrench_frame() {
                 WrenchFrame::Body => "Body",
                 WrenchFrame::World => "World",
@@ -73,25 +75,10 @@ impl<'a> ControlModelText<'a> {
                 .map(|(name, values)| (name, format!("{values:?}")))
                 .collect(),
             plant,
-            parts: plant.parts(),
-            knows_inputs: plant
-                .phases()
-                .iter()
-                .any(|phase| phase.given_state.is_some()),
             phases: pairs
                 .map(|(entries, phase)| (entries.identifier.to_ascii_uppercase(), entries, phase))
                 .collect(),
         }
-    }
-}
-
-/// The names that the robot's text needs beside `LegGeometry`.
-fn leg_types(robot: &Robot) -> &'static str {
-    let is_planar = |leg: Leg| matches!(robot.geometry(leg), LegGeometry::Planar(_));
-    match Leg::ALL.map(is_planar) {
-        [true, true, true, true] => "PlanarLeg",
-        [false, false, false, false] => "ChainLeg",
-        _ => "ChainLeg, PlanarLeg",
     }
 }
 
@@ -134,33 +121,27 @@ impl SettingText {
 
     /// Its declaration in the crate's header.
     pub(super) fn in_crate(&self, upper: &str) -> String {
-        let (kind, width) = match self.setting.kind {
-            "i32" => ("int32_t", 18),
-            _ => ("double", 19),
-        };
-        self.declaration(kind, width, self.setting.text, upper)
+        self.declaration("double", self.setting.text, upper)
     }
 
     /// Its declaration in the header of the generated C, unless it has none.
     pub(in crate::deploy) fn in_c(&self, real: &str, upper: &str) -> Option<String> {
-        let (kind, width) = match self.setting.kind {
-            "i32" => ("int32_t", 19),
-            "f64" => ("double", 20),
-            _ if self.setting.name.len() > 17 => (real, 24),
-            _ => (real, 19),
-        };
         let text = self.setting.in_c;
-        (!text.is_empty()).then(|| self.declaration(kind, width, text, upper))
+        (!text.is_empty()).then(|| self.declaration(real, text, upper))
     }
 
-    fn declaration(&self, kind: &str, width: usize, text: &str, upper: &str) -> String {
-        let name = format!("{};", self.setting.name);
-        let (width, text) = (width.max(name.len() + 1), text.replace("UPPER", upper));
+    fn declaration(&self, real: &str, text: &str, upper: &str) -> String {
+        let kind = match self.setting.kind {
+            "i32" => "int32_t",
+            "f64" => "double",
+            _ => real,
+        };
+        let (name, text) = (self.setting.name, text.replace("UPPER", upper));
         let default = match text.contains("(default)") {
             true => String::new(),
             false => format!(" ({})", self.default),
         };
-        format!("{kind} {name:<width$}/**< {text}{default} */")
+        format!("{kind} {name}; /**< {text}{default} */")
     }
 
     /// The condition under which the generated C refuses a value, and the accepted range in words.

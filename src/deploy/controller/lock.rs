@@ -2,8 +2,6 @@
 //!
 //! A generated controller gets the part of romc's own `Cargo.lock` that it needs, so that its torques have the same
 //! bits and that it can be built from the same downloads.
-//!
-//! The sources of romc that every generated controller holds.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -39,9 +37,10 @@ static PACKAGES: LazyLock<Vec<Package>> = LazyLock::new(|| {
 /// A package by its name, with its version where one name has several.
 fn package(spelled: &str) -> &'static Package {
     let (name, version) = spelled.split_once(' ').unwrap_or((spelled, ""));
-    let mut packages = PACKAGES.iter();
-    let found = packages
-        .find(|package| package.name == name && (version.is_empty() || package.version == version));
+    let is_it = |package: &&Package| {
+        package.name == name && (version.is_empty() || package.version == version)
+    };
+    let found = PACKAGES.iter().find(is_it);
     found.expect("the lock file has all that its entries name")
 }
 
@@ -89,15 +88,16 @@ pub(crate) const LICENCES: [(&str, &str); 2] = [
 
 /// The sources below the generated crate, each with a first line that says what it is.
 pub fn files(provenance: &str) -> impl Iterator<Item = (String, String)> {
-    let robot = romc_robot::sources::SOURCES.iter();
-    let robot =
-        robot.map(|(name, text)| (format!("robot/{}", name.replace("lib.rs", "mod.rs")), *text));
-    let control = romc_control::sources::SOURCES.iter();
-    let control = control.map(|(path, text)| ((*path).to_owned(), *text));
-    control.chain(robot).map(move |(path, text)| {
-        let code = ENDS
-            .iter()
-            .fold(text, |text, end| text.split(end).next().unwrap_or(text));
+    let below = |folder: &str, path: &str| format!("{folder}{}", path.replace("lib.rs", "mod.rs"));
+    let control = romc_control::sources::SOURCES
+        .iter()
+        .map(move |file| ("", file));
+    let robot = romc_robot::sources::SOURCES
+        .iter()
+        .map(move |file| ("robot/", file));
+    control.chain(robot).map(move |(folder, (path, text))| {
+        let path = below(folder, path);
+        let code = (ENDS.iter()).fold(*text, |text, end| text.split(end).next().unwrap_or(text));
         let text = format!(
             "// {provenance}\n// The same in every controller that romc generates.\n{}\n",
             code.trim_end()

@@ -12,7 +12,7 @@ use askama::Template;
 use crate::codegen::interface::ModelInterface;
 use crate::codegen::{Precision, SineCosine, Units, rust};
 use crate::codegen::{tidy, wrapped};
-use crate::deploy::{EmitError, PlannedJump};
+use crate::deploy::{EmitError, PlannedJump, banner};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::lower::Form;
@@ -32,19 +32,25 @@ pub(super) struct Facts<'a> {
     pub(super) state_dim: usize,
     pub(super) state_names: String,
     pub(super) input_names: String,
-    joint_names: String,
+    pub(super) joint_names: String,
     /// How `u` comes from torques, lines of a comment.
     pub(super) input_is: String,
     pub(super) codes: Vec<(String, i32)>,
     pub(super) texts: Vec<(i32, String)>,
     pub(super) defaults: Settings,
     pub(super) settings: Vec<SettingText>,
+    /// Whether the example jumps a plan.
+    has_plan: bool,
     link_m: String,
     rust_version: &'static str,
 }
 
 impl<'a> Facts<'a> {
-    pub(super) fn new(entries: &'a ModelInterface, plant: &'a ControlModel) -> Self {
+    pub(super) fn new(
+        entries: &'a ModelInterface,
+        plant: &'a ControlModel,
+        has_plan: bool,
+    ) -> Self {
         let (name, robot) = (entries.identifier.as_str(), plant.robot());
         let texts = all_codes().map(|(code, text)| (code, text.to_string_lossy().into_owned()));
         let texts: Vec<(i32, String)> = texts.collect();
@@ -65,6 +71,7 @@ impl<'a> Facts<'a> {
             texts,
             defaults: Settings::default(),
             settings: SettingText::all(),
+            has_plan,
             link_m: format!("{:?}", robot.geometry(Leg::FrontRight).lengths()[0]),
             rust_version: env!("CARGO_PKG_RUST_VERSION"),
         }
@@ -78,15 +85,14 @@ impl<'a> Facts<'a> {
 
 templates! {
     #[derive(askama::Template)]
-    Cargo: "controller/cargo.askama",
-    Lib: "controller/lib.askama",
-    Header: "controller/header.askama",
-    Readme: "controller/readme.askama",
-    ExampleC: "controller/example_c.askama",
-    ExamplePlanC: "controller/example_plan_c.askama",
-    ExampleCpp: "controller/example_cpp.askama",
-    Binding: "controller/binding_py.askama",
-    ExamplePy: "controller/example_py.askama",
+    "Cargo.toml": Cargo "controller/cargo.askama",
+    "src/lib.rs": Lib "controller/lib.askama",
+    "include/NAME_controller.h": Header "controller/header.askama",
+    "README.md": Readme "controller/readme.askama",
+    "examples/example.c": ExampleC "controller/example_c.askama",
+    "examples/example.cpp": ExampleCpp "controller/example_cpp.askama",
+    "python/NAME_controller.py": Binding "controller/binding_py.askama",
+    "python/example.py": ExamplePy "controller/example_py.askama",
 }
 
 /// The crate of a model's controller; `provenance` is the text of each file's first line, and `plan` the jump of its C
@@ -99,24 +105,23 @@ pub fn emit(
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let plant = plant(equations.model())?;
     let entries = &ModelInterface::new(equations, form, Units::Si)?;
-    let name = entries.identifier.as_str();
-    let folder = format!("{name}-controller");
-    let mut files = Vec::new();
-    let mut add = |path: &str, text: String| {
-        files.push(EmittedFile::new(format!("{folder}/{path}"), text));
-    };
-    for (path, text) in lock::files(provenance) {
-        add(&path, text);
-    }
-    let text = ControlModelText::new(entries, &plant, format!("// {provenance}"));
-    add("src/control_model.rs", tidy(&text.render()?));
-    for (path, text) in project(entries, &plant, provenance, plan.is_some())? {
-        add(&path, text);
-    }
+    let facts = &Facts::new(entries, &plant, plan.is_some());
+    let (name, folder) = (facts.name, format!("{}-controller", facts.name));
+    let numbers = ControlModelText::new(entries, &plant, format!("// {provenance}")).render()?;
+    let mut texts: Vec<(String, String)> = lock::files(provenance).collect();
+    texts.push(("src/control_model.rs".to_owned(), tidy(&numbers)));
+    texts.extend(self::texts(facts, provenance)?);
+    texts.push((
+        "Cargo.lock".to_owned(),
+        lock::text(&banner("Cargo.lock", provenance), name),
+    ));
+    texts.extend(lock::LICENCES.map(|(path, text)| (path.to_owned(), text.to_owned())));
     for file in rust::emit(entries, provenance, Precision::Double, SineCosine::Inline)? {
-        let path = file.path.replacen(name, "model", 1);
-        add(&path, file.contents);
+        texts.push((file.path.replacen(name, "model", 1), file.contents));
     }
+    let mut files: Vec<EmittedFile> = (texts.into_iter())
+        .map(|(path, text)| EmittedFile::new(format!("{folder}/{path}"), text))
+        .collect();
     if let Some(plan) = plan {
         files.extend(plan.files(&format!("{folder}/examples"), name, provenance));
     }
@@ -160,41 +165,6 @@ fn input_in_words(rule: &InputRule, name: &str) -> String {
         "Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it{of_torques}."
     );
     wrapped(&text, 100, "").join("\n * ")
-}
-
-fn project(
-    entries: &ModelInterface,
-    plant: &ControlModel,
-    provenance: &str,
-    jumps_a_plan: bool,
-) -> Result<Vec<(String, String)>, EmitError> {
-    let facts = &Facts::new(entries, plant);
-    let name = facts.name;
-    let (hash, slashes) = (format!("# {provenance}"), format!("// {provenance}"));
-    let [hash, slashes] = [hash.as_str(), &slashes];
-    let block = &format!("/* {provenance} */");
-    let example_c = match jumps_a_plan {
-        true => ExamplePlanC::text(block, facts)?,
-        false => ExampleC::text(block, facts)?,
-    };
-    let templates = [
-        ("Cargo.toml", Cargo::text(hash, facts)?),
-        ("src/lib.rs", Lib::text(slashes, facts)?),
-        ("include/NAME_controller.h", Header::text(block, facts)?),
-        ("README.md", Readme::text(provenance, facts)?),
-        ("examples/example.c", example_c),
-        ("examples/example.cpp", ExampleCpp::text(slashes, facts)?),
-        ("python/NAME_controller.py", Binding::text(hash, facts)?),
-        ("python/example.py", ExamplePy::text(hash, facts)?),
-    ];
-    let mut files: Vec<(String, String)> = (templates.into_iter())
-        .map(|(path, text)| (path.replace("NAME", name), tidy(&text)))
-        .collect();
-    files.push(("Cargo.lock".to_owned(), lock::text(hash, name)));
-    for (path, text) in lock::LICENCES {
-        files.push((path.to_owned(), text.to_owned()));
-    }
-    Ok(files)
 }
 
 /// The name of a code: the words of its text before the colon.

@@ -22,8 +22,7 @@ use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
 use crate::mpc::problem::StageRows;
-use crate::mpc::shared::torque_deviation;
-use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
+use crate::mpc::{ControlModel, MpcSettings};
 use crate::solver::Shape;
 use source::{Numbers, Source};
 
@@ -37,9 +36,8 @@ struct Facts<'a> {
     real: &'static str,
     /// Torque limits, an initialiser in double precision.
     torque_limit: String,
-    /// Joint limits, initialisers in double precision.
-    joint_lower: String,
-    joint_upper: String,
+    /// Limits of the joints.
+    limits: &'a [(f64, f64)],
     /// Suffix of libm's functions.
     f: &'static str,
     max_rows: usize,
@@ -63,11 +61,11 @@ impl<'a> Deref for Facts<'a> {
 
 templates! {
     #[derive(askama::Template)]
-    Header: "controller_c/header.askama",
-    Cmake: "controller_c/cmake.askama",
-    Readme: "controller_c/readme.askama",
-    Example: "controller_c/example.askama",
-    RobotHeader: "controller_c/robot.askama",
+    "NAME_controller.h": Header "controller_c/header.askama",
+    "NAME_robot.h": RobotHeader "controller_c/robot.askama",
+    "NAME_example.c": Example "controller_c/example.askama",
+    "CMakeLists.txt": Cmake "controller_c/cmake.askama",
+    "README.md": Readme "controller_c/readme.askama",
 }
 
 /// The files of a model's controller in C; `provenance` is the text of each file's first line.
@@ -76,7 +74,7 @@ pub fn emit(
     options: &EmitOptions,
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let model = equations.model();
+    let (model, precision) = (equations.model(), options.precision);
     let plant = plant(model)?;
     // Rates are chosen when it runs: the rows are those of 1 N m a stage.
     let unit_rate = MpcSettings {
@@ -93,24 +91,8 @@ pub fn emit(
             phase: phase.identifier.clone(),
         });
     }
-    let name = entries.identifier.clone();
-    let folder = format!("{name}-controller-c");
-    let mut files = Vec::new();
-    for file in c::emit(&entries, provenance, options.precision, options.sines)? {
-        if !file.path.ends_with("CMakeLists.txt") {
-            let path = format!("{folder}/{}", file.path);
-            files.push(EmittedFile::new(path, file.contents));
-        }
-    }
-    let facts = &facts(&entries, &plant, &rows, options.precision, provenance);
-    let deviation = |phase: &ControlPhase| {
-        torque_deviation(phase).ok_or_else(|| MpcError::Statistics {
-            phase: phase.name.clone(),
-        })
-    };
-    let deviations: Vec<_> = (plant.phases().iter().map(deviation)).collect::<Result<_, _>>()?;
-    let plant_of_lift = (&plant, deviations.as_slice());
-    let source = Source::new(facts, &entries, plant_of_lift, options.precision);
+    let facts = &Facts::new(&entries, &plant, &rows, precision, provenance);
+    let name = facts.name;
     let (what, jump) = match &options.plan {
         Some(plan) => ("A jump of one's own", plan.thinned()),
         None => {
@@ -118,72 +100,56 @@ pub fn emit(
             ("A jump of a simulated go1", shipped.within(model))
         }
     };
-    let heading = (facts.banner.as_str(), facts.upper.as_str());
-    let jump_header = jump.constants(what, heading, options.precision);
-    let (block, hash) = (facts.banner.as_str(), format!("# {provenance}"));
-    let texts = [
-        ("NAME_controller.h", Header::text(block, facts)?),
-        ("NAME_controller.c", source.render()?),
-        ("NAME_jump.h", jump_header),
-        (
-            "NAME_controller_selftest.c",
-            selftest::text(facts, model, &jump, options.precision)?,
-        ),
-        ("NAME_robot.h", RobotHeader::text(block, facts)?),
-        ("NAME_example.c", Example::text(block, facts)?),
-        ("CMakeLists.txt", Cmake::text(&hash, facts)?),
-        ("README.md", Readme::text(provenance, facts)?),
-    ];
-    let texts = texts.map(|(path, text)| (path.to_owned(), text));
-    for (path, text) in texts
-        .into_iter()
-        .chain(ros2_control::files(facts, provenance)?)
-    {
-        let path = format!("{folder}/{}", path.replace("NAME", &name));
-        files.push(EmittedFile::new(path, tidy(&text)));
-    }
-    Ok(files)
+    let source = Source::new(facts, &entries, &plant, precision)?;
+    let self_test = selftest::text(facts, model, &jump, precision)?;
+    let mut texts = texts(facts, provenance)?;
+    texts.extend([
+        (format!("{name}_controller.c"), tidy(&source.render()?)),
+        (format!("{name}_controller_selftest.c"), tidy(&self_test)),
+        jump.constants(what, name, provenance, precision),
+    ]);
+    texts.extend(ros2_control::files(facts, provenance)?);
+    let of_model = c::emit(&entries, provenance, precision, options.sines)?;
+    let of_model = of_model.into_iter().map(|file| (file.path, file.contents));
+    let mut files: Vec<(String, String)> = of_model
+        .filter(|(path, _)| !path.ends_with("CMakeLists.txt"))
+        .collect();
+    files.extend(texts);
+    let place = |(path, text)| EmittedFile::new(format!("{name}-controller-c/{path}"), text);
+    Ok(files.into_iter().map(place).collect())
 }
 
-fn facts<'a>(
-    entries: &'a ModelInterface,
-    plant: &'a ControlModel,
-    rows: &'a StageRows,
-    precision: Precision,
-    provenance: &str,
-) -> Facts<'a> {
-    let joint_limit = |side: fn(&(f64, f64)) -> f64| {
-        Numbers(Precision::Double).vector(plant.robot().joint_limit_rad().iter().map(side))
-    };
-    let controller = controller::Facts::new(entries, plant);
-    let real = match precision {
-        Precision::Double => "double",
-        Precision::Single => "float",
-    };
-    let one_row = Shape {
-        input: 1,
-        ..Shape::default()
-    };
-    Facts {
-        solver_stage: source::stage(controller.name, &controller.upper, real),
-        row_numbers: one_row.memory(),
-        controller,
-        banner: format!("/* {provenance} */"),
-        real,
-        torque_limit: Numbers(Precision::Double)
-            .vector(plant.robot().torque_limit_nm().iter().copied()),
-        joint_lower: joint_limit(|limit| limit.0),
-        joint_upper: joint_limit(|limit| limit.1),
-        f: match precision {
-            Precision::Double => "",
-            Precision::Single => "f",
-        },
-        max_rows: rows.torque.len() + rows.joint.len() + OTHER_ROWS,
-        n_phases: plant.phases().len(),
-        has_given_state: plant
-            .phases()
-            .iter()
-            .all(|phase| phase.given_state.is_some()),
-        rows,
+impl<'a> Facts<'a> {
+    fn new(
+        entries: &'a ModelInterface,
+        plant: &'a ControlModel,
+        rows: &'a StageRows,
+        precision: Precision,
+        provenance: &str,
+    ) -> Self {
+        let controller = controller::Facts::new(entries, plant, false);
+        let (real, f) = match precision {
+            Precision::Double => ("double", ""),
+            Precision::Single => ("float", "f"),
+        };
+        let one_row = Shape {
+            input: 1,
+            ..Shape::default()
+        };
+        let limits = plant.robot().torque_limit_nm();
+        Self {
+            solver_stage: source::stage(controller.name, &controller.upper, real),
+            row_numbers: one_row.memory(),
+            controller,
+            banner: format!("/* {provenance} */"),
+            real,
+            torque_limit: Numbers(Precision::Double).vector(limits),
+            limits: plant.robot().joint_limit_rad(),
+            f,
+            max_rows: rows.torque.len() + rows.joint.len() + OTHER_ROWS,
+            n_phases: plant.phases().len(),
+            has_given_state: (plant.phases().iter()).all(|phase| phase.given_state.is_some()),
+            rows,
+        }
     }
 }

@@ -1,10 +1,13 @@
 //! A plugin of ros2_control around the controller in C: `ros2_control/` beside it.
 
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Deref;
 
-use crate::deploy::EmitError;
+use super::source::nested;
 use crate::mpc::STEP_SLACK;
 use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
+use crate::recording::reader::Column;
+use crate::robot::{FOOT_DIM, JOINT_DIM, STATE_DIM};
 
 /// What its files take besides the facts of the controller.
 struct Facts<'a> {
@@ -12,6 +15,8 @@ struct Facts<'a> {
     /// Name of the package, its namespace and its library.
     package: String,
     version: &'static str,
+    /// The columns of a jump with what a robot can be, as an initialiser.
+    columns: String,
 }
 
 impl<'a> Deref for Facts<'a> {
@@ -24,39 +29,51 @@ impl<'a> Deref for Facts<'a> {
 
 templates! {
     #[derive(askama::Template)]
-    Header: "controller_c/ros2_control/controller_header.askama",
-    Source: "controller_c/ros2_control/controller_source.askama",
-    PlanHeader: "controller_c/ros2_control/plan_header.askama",
-    PlanSource: "controller_c/ros2_control/plan_source.askama",
-    Cmake: "controller_c/ros2_control/cmake.askama",
-    Package: "controller_c/ros2_control/package.askama",
-    Plugin: "controller_c/ros2_control/plugin.askama",
-    Parameters: "controller_c/ros2_control/yaml.askama",
-    Readme: "controller_c/ros2_control/readme.askama",
+    "ros2_control/src/controller.hpp": Header "controller_c/ros2_control/controller_header.askama",
+    "ros2_control/src/controller.cpp": Source "controller_c/ros2_control/controller_source.askama",
+    "ros2_control/src/plan.hpp": PlanHeader "controller_c/ros2_control/plan_header.askama",
+    "ros2_control/src/plan.cpp": PlanSource "controller_c/ros2_control/plan_source.askama",
+    "ros2_control/CMakeLists.txt": Cmake "controller_c/ros2_control/cmake.askama",
+    "ros2_control/package.xml": Package "controller_c/ros2_control/package.askama",
+    "ros2_control/plugin.xml": Plugin "controller_c/ros2_control/plugin.askama",
+    "ros2_control/controllers.yaml": Parameters "controller_c/ros2_control/yaml.askama",
+    "ros2_control/README.md": Readme "controller_c/ros2_control/readme.askama",
 }
 
 /// Paths below the controller's folder, and texts.
 pub(super) fn files(
     controller: &super::Facts<'_>,
     provenance: &str,
-) -> Result<Vec<(String, String)>, EmitError> {
-    let facts = &Facts {
+) -> askama::Result<Vec<(String, String)>> {
+    let facts = Facts {
         controller,
         package: format!("{}_ros2_control", controller.name.to_ascii_lowercase()),
         version: env!("CARGO_PKG_VERSION"),
+        columns: columns(controller.limits),
     };
-    let (hash, slashes) = (format!("# {provenance}"), format!("// {provenance}"));
-    let texts = [
-        ("src/controller.hpp", Header::text(&slashes, facts)?),
-        ("src/controller.cpp", Source::text(&slashes, facts)?),
-        ("src/plan.hpp", PlanHeader::text(&slashes, facts)?),
-        ("src/plan.cpp", PlanSource::text(&slashes, facts)?),
-        ("CMakeLists.txt", Cmake::text(&hash, facts)?),
-        ("package.xml", Package::text(provenance, facts)?),
-        ("plugin.xml", Plugin::text(provenance, facts)?),
-        ("controllers.yaml", Parameters::text(&hash, facts)?),
-        ("README.md", Readme::text(provenance, facts)?),
-    ];
-    let below = texts.map(|(path, text)| (format!("ros2_control/{path}"), text));
-    Ok(below.into())
+    texts(&facts, provenance)
+}
+
+fn columns(joint_limit_rad: &[(f64, f64)]) -> String {
+    let range = |column: Column| match column {
+        Column::Position(i @ 0..JOINT_DIM) => {
+            let (lower, upper) = joint_limit_rad[i];
+            Some((lower - JOINT_MARGIN_RAD, upper + JOINT_MARGIN_RAD))
+        }
+        Column::Position(15 | 16) => Some((-FRAC_PI_2, FRAC_PI_2)),
+        Column::Velocity(12..15) => Some((-BODY_SPEED_M_S, BODY_SPEED_M_S)),
+        _ => None,
+    };
+    let end = |end: f64| match end.is_finite() {
+        true => format!("{end:?}"),
+        false => format!("{}ANY", if end < 0.0 { "-" } else { "" }),
+    };
+    let of_states = [Column::Position, Column::Velocity].into_iter();
+    let states = of_states.flat_map(|kind| (0..STATE_DIM).map(kind));
+    let torques = (0..JOINT_DIM).map(Column::Torque);
+    let all = [Column::Time].into_iter().chain(states).chain(torques);
+    nested(all.chain((0..FOOT_DIM).map(Column::Foot)).map(|column| {
+        let (lower, upper) = range(column).unwrap_or((-f64::INFINITY, f64::INFINITY));
+        format!("{{{:?}, {}, {}}}", column.name(), end(lower), end(upper))
+    }))
 }

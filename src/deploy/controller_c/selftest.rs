@@ -73,9 +73,9 @@ pub(super) fn text(
         ..plain
     };
     let runs = [
-        commands(model, jump, plain, Torques::Known)?,
-        commands(model, jump, consistent, Torques::Known)?,
-        commands(model, jump, about_plan, Torques::Unknown)?,
+        commands(model, jump, plain, true)?,
+        commands(model, jump, consistent, true)?,
+        commands(model, jump, about_plan, false)?,
     ];
     let torques = runs.each_ref().map(|commands| {
         Numbers(Precision::Double).matrix(commands.iter().map(|command| command.torque_nm))
@@ -84,10 +84,7 @@ pub(super) fn text(
         let codes = commands.iter().map(|command| command.status.code());
         integers(codes.map(i64::from))
     });
-    let place = match precision {
-        Precision::Double => 0,
-        Precision::Single => 1,
-    };
+    let place = usize::from(precision == Precision::Single);
     let text = SelfTest {
         facts,
         steps: runs[0].len(),
@@ -100,19 +97,12 @@ pub(super) fn text(
     Ok(text.render()?)
 }
 
-/// Whether the controller is told the torques of the jump.
-#[derive(Clone, Copy)]
-enum Torques {
-    Known,
-    Unknown,
-}
-
 /// Commands along a jump for measurements that are pushed off it.
 fn commands(
     model: &ReducedModel,
     jump: &PlannedJump,
     settings: MpcSettings,
-    torques: Torques,
+    knows_torques: bool,
 ) -> Result<Vec<Command>, EmitError> {
     let mut controller = crate::mpc::controller(model, settings)?;
     let u = inputs(controller.plant().input_rule(), jump)?;
@@ -120,15 +110,10 @@ fn commands(
         time_s: &jump.time_s,
         x: jump.x.as_slice(),
         dx: jump.dx.as_slice(),
-        u: match torques {
-            Torques::Known => Some(&u),
-            Torques::Unknown => None,
-        },
+        u: knows_torques.then_some(&u[..]),
         feet: &jump.feet,
     };
-    controller
-        .set_reference(reference)
-        .map_err(MpcError::from)?;
+    (controller.set_reference(reference)).map_err(MpcError::from)?;
     let steps = STEPS.min(jump.time_s.len());
     Ok((0..steps)
         .map(|k| {

@@ -1,11 +1,7 @@
-//! `NAME_controller.c`.
-//!
-//! Numbers as initialisers of C.
-//!
-//! The legs of a robot as constants of the controller in C.
-//!
-//! The structured solver in C: the text that is made from its Rust, under the names and sizes of an instance.
+//! `NAME_controller.c`: a model's numbers as initialisers of C, and the texts that are made from the controller's Rust,
+//! under the names and sizes of each instance.
 
+use std::borrow::Borrow;
 use std::ops::Deref;
 
 use askama::Template;
@@ -15,30 +11,21 @@ use super::Facts;
 use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
-use crate::mpc::problem::{Row, pairs};
-use crate::mpc::shared::{NO_PHASE, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
-use crate::mpc::{ControlModel, ControlModelParts, FallbackSettings, InputGivenState, MpcSettings};
+use crate::mpc::problem::{Row, StageRows, pairs};
+use crate::mpc::shared::{NO_PHASE, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE, torque_deviation};
+use crate::mpc::{
+    ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings,
+};
 use crate::robot::{
     ChainLeg, DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegGeometry, PlanarLeg, Robot,
     SINGULAR_BOUND, WrenchFrame,
 };
-
-/// Complementarity and residual in single precision, at which rounding ends the progress.
-const SINGLE: (f64, f64) = (1e-4, 1e-3);
-/// Complementarity of a lift in single precision: with that of the plan torques would be off by 0.1 N m.
-const SINGLE_LIFT: f64 = 1e-6;
-
-/// Complementarity and softness of rows with limits on torque rates in single precision: weights of rows stay far below
-/// the inverse of its rounding.
-const SINGLE_RATE: (f64, f64) = (1e-5, 1e-4);
 
 /// `NAME_controller.c`.
 #[derive(Template)]
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
 pub(super) struct Source<'a> {
     facts: &'a Facts<'a>,
-    numbers: Numbers,
-    parts: &'a ControlModelParts,
     /// Of the stage problem: twice the latent dimension, as one number, which Eva wants of the length of an array.
     n_states: usize,
     n_torque_pairs: usize,
@@ -48,33 +35,18 @@ pub(super) struct Source<'a> {
     given_covariance: String,
     acceleration_error: String,
     is_body_frame: bool,
-    solver: SolverNumbers,
+    /// Where iterations end.
+    solver: [(&'static str, f64); 5],
     functions: String,
     lift_functions: String,
     online: String,
+    /// Arrays of constants.
+    constants: String,
     legs: Legs,
     torque_mean: String,
     torque_deviation: String,
     weight_n: f64,
     fallback: FallbackSettings,
-    force: String,
-    phase_of_feet: String,
-    is_grounded: String,
-    input_mean: String,
-    input_root: String,
-    torque_rows: String,
-    torque_bound: String,
-    torque_per_loss: String,
-    torque_joint: String,
-    rate_rows: String,
-    joint_rows: String,
-    joint_bound: String,
-    joint_lower: String,
-    joint_upper: String,
-    torque_limit: String,
-    viscous: String,
-    dry: String,
-    armature: String,
     phases: &'a [PhaseInterface],
 }
 
@@ -86,45 +58,31 @@ impl<'a> Deref for Source<'a> {
     }
 }
 
-/// Where iterations end, by the precision.
-struct SolverNumbers {
-    tolerance: f64,
-    lift_tolerance: f64,
-    rate_tolerance: f64,
-    rate_softness: f64,
-    accepted_residual: f64,
-}
-
 impl<'a> Source<'a> {
-    /// The text of a plant, with deviations `C` of the torques by phase.
     pub(super) fn new(
         facts: &'a Facts<'a>,
         entries: &'a ModelInterface,
-        (plant, deviations): (&'a ControlModel, &[[[f64; JOINT_DIM]; JOINT_DIM]]),
+        plant: &'a ControlModel,
         precision: Precision,
-    ) -> Self {
-        let (numbers, rows) = (Numbers(precision), facts.rows);
-        let (parts, robot) = (plant.parts(), plant.robot());
-        let matrix = |matrix: &DMatrix<f64>| numbers.rows(matrix, facts.latent_dim);
-        let row_matrix = |rows: &[Row]| numbers.matrix(rows.iter().map(|row| row.row.clone()));
-        let limits = robot.joint_limit_rad();
-        let weight_n = robot.mass_kg() * GRAVITY_M_S2;
-        let losses = |index: usize| match plant.input_rule().actuators() {
-            Some(actuators) => numbers.vector(*actuators.named()[index].1),
-            None => String::new(),
-        };
-        let phases = plant.phases();
+    ) -> Result<Self, MpcError> {
+        let (numbers, phases) = (Numbers(precision), plant.phases());
         let mpc = MpcSettings::default();
         let of_given = |part: fn(&InputGivenState) -> &DMatrix<f64>| {
             let given = phases.iter().filter_map(|phase| phase.given_state.as_ref());
-            nested(given.map(|given| matrix(part(given))))
+            nested(given.map(|given| numbers.rows(part(given), facts.latent_dim)))
         };
-        Self {
+        let deviation = |phase: &ControlPhase| match torque_deviation(phase) {
+            Some(rows) => Ok(numbers.matrix(rows)),
+            None => Err(MpcError::Statistics {
+                phase: phase.name.clone(),
+            }),
+        };
+        let deviations: Vec<String> =
+            (phases.iter().map(deviation)).collect::<Result<_, MpcError>>()?;
+        Ok(Self {
             facts,
-            numbers,
-            parts,
             n_states: 2 * facts.latent_dim,
-            n_torque_pairs: pairs(&rows.torque),
+            n_torque_pairs: pairs(&facts.rows.torque),
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())
                 .fold(1, usize::max),
@@ -133,69 +91,111 @@ impl<'a> Source<'a> {
             acceleration_error: of_given(|given| &given.acceleration_error),
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
-            solver: SolverNumbers::new(precision, mpc.qp.accepted_residual),
+            solver: solver_numbers(precision, mpc.qp.accepted_residual),
             functions: of_horizon(facts.name),
             lift_functions: of_lift(),
             online: online(facts.name),
-            legs: Legs::of(robot, numbers),
-            torque_mean: numbers
-                .matrix(phases.iter().map(|phase| phase.torque_mean.iter().copied())),
-            torque_deviation: nested(deviations.iter().map(|rows| numbers.matrix(*rows))),
-            weight_n,
+            constants: constants(plant, facts.rows, numbers),
+            legs: Legs::of(plant.robot(), numbers),
+            torque_mean: numbers.matrix(phases.iter().map(|phase| &phase.torque_mean)),
+            torque_deviation: nested(deviations),
+            weight_n: plant.robot().mass_kg() * GRAVITY_M_S2,
             fallback: mpc.fallback,
-            force: numbers.matrix((0..3).map(|axis| {
-                let row = parts.lift.row(JOINT_DIM + axis);
-                row.iter().map(|entry| entry / weight_n).collect::<Vec<_>>()
-            })),
-            phase_of_feet: integers(
-                (parts.phase_of_feet.iter())
-                    .map(|phase| phase.map_or(NO_PHASE, |phase| phase) as i64),
-            ),
-            is_grounded: integers(phases.iter().map(|phase| i64::from(phase.is_grounded))),
-            input_mean: numbers
-                .matrix(phases.iter().map(|phase| phase.latent_mean.iter().copied())),
-            input_root: nested(
-                phases
-                    .iter()
-                    .map(|phase| matrix(&phase.latent_root.transpose())),
-            ),
-            torque_rows: row_matrix(&rows.torque),
-            torque_bound: numbers.vector(rows.torque.iter().map(|row| row.bound)),
-            torque_per_loss: numbers.vector(rows.torque.iter().map(|row| row.per_loss)),
-            torque_joint: integers(rows.torque.iter().map(|row| row.joint as i64)),
-            rate_rows: row_matrix(&rows.rate),
-            joint_rows: row_matrix(&rows.joint),
-            joint_bound: numbers.vector(rows.joint.iter().map(|row| row.bound)),
-            joint_lower: numbers.vector(limits.iter().map(|limit| limit.0)),
-            joint_upper: numbers.vector(limits.iter().map(|limit| limit.1)),
-            torque_limit: numbers.vector(robot.torque_limit_nm().iter().copied()),
-            viscous: losses(0),
-            dry: losses(1),
-            armature: losses(2),
             phases: &entries.phases,
-        }
+        })
     }
 }
 
-impl SolverNumbers {
-    fn new(precision: Precision, accepted_residual: f64) -> Self {
-        match precision {
-            Precision::Double => Self {
-                tolerance: TOLERANCE,
-                lift_tolerance: TOLERANCE,
-                rate_tolerance: RATE_TOLERANCE,
-                rate_softness: RATE_SOFTNESS,
-                accepted_residual,
-            },
-            Precision::Single => Self {
-                tolerance: SINGLE.0,
-                lift_tolerance: SINGLE_LIFT,
-                rate_tolerance: SINGLE_RATE.0,
-                rate_softness: SINGLE_RATE.1,
-                accepted_residual: SINGLE.1,
-            },
+/// Maps, rows and limits as arrays of C.
+fn constants(plant: &ControlModel, rows: &StageRows, numbers: Numbers) -> String {
+    let (robot, phases) = (plant.robot(), plant.phases());
+    let (d, limits) = (plant.latent_dim(), robot.joint_limit_rad());
+    let row_matrix = |rows: &[Row]| numbers.matrix(rows.iter().map(|row| &row.row));
+    let root = |phase: &ControlPhase| numbers.rows(&phase.latent_root.transpose(), d);
+    let (torque, joint, rate) = (
+        rows.torque.iter(),
+        rows.joint.iter(),
+        row_matrix(&rows.rate),
+    );
+    let feet = plant.phase_of_feet.iter();
+    let force = plant.lift.rows(JOINT_DIM, 3) / (robot.mass_kg() * GRAVITY_M_S2);
+    let [encoder, projection] = [&plant.encoder, &plant.projection].map(|m| numbers.rows(m, d));
+    let [decoder, lift] = [&plant.decoder, &plant.lift].map(|m| numbers.rows(m, JOINT_DIM));
+    let encoder_bias = numbers.vector(&plant.encoder_bias);
+    let decoder_bias = numbers.vector(plant.decoder_bias.iter().take(JOINT_DIM));
+    let force = numbers.rows(&force, 3);
+    let phase_of_feet = integers(feet.map(|phase| phase.unwrap_or(NO_PHASE) as i64));
+    let is_grounded = integers(phases.iter().map(|phase| i64::from(phase.is_grounded)));
+    let input_mean = numbers.matrix(phases.iter().map(|phase| &phase.latent_mean));
+    let input_root = nested(phases.iter().map(root));
+    let torque_rows = row_matrix(&rows.torque);
+    let torque_bound = numbers.vector(torque.clone().map(|row| row.bound));
+    let torque_per_loss = numbers.vector(torque.clone().map(|row| row.per_loss));
+    let torque_joint = integers(torque.map(|row| row.joint as i64));
+    let joint_rows = row_matrix(&rows.joint);
+    let joint_bound = numbers.vector(joint.map(|row| row.bound));
+    let joint_lower = numbers.vector(limits.iter().map(|limit| limit.0));
+    let joint_upper = numbers.vector(limits.iter().map(|limit| limit.1));
+    let torque_limit = numbers.vector(robot.torque_limit_nm());
+    let mut out = format!(
+        "\
+/* W_e s_x and b_e. */
+static const real ENCODER[D][S] = {encoder};
+static const real ENCODER_BIAS[D] = {encoder_bias};
+/* Rows of W_d / s_x and b_d / s_x for the joints. */
+static const real DECODER[12][D] = {decoder};
+static const real DECODER_BIAS[12] = {decoder_bias};
+/* Rows of W_e^T / s_u for torques, and for the force over the robot's weight. */
+static const real LIFT[12][D] = {lift};
+static const real FORCE[3][D] = {force};
+/* pinv(W_e^T) s_u. */
+static const real PROJECTION[D][S] = {projection};
+/* Phase of each foot pattern, bit k for foot k; ONLINE_NO_PHASE for none. */
+static const int PHASE_OF_FEET[16] = {phase_of_feet};
+static const int IS_GROUNDED[N_PHASES] = {is_grounded};
+/* Mean of the training's latent inputs by phase, and lower Cholesky factor of their covariance, column by column. */
+static const real INPUT_MEAN[N_PHASES][D] = {input_mean};
+static const real INPUT_ROOT[N_PHASES][D][D] = {input_root};
+/* Torque limits that can be active, first N_TORQUE_PAIRS with both sides, row and -row: row . u_lat <= bound - per_loss *
+ * loss of the joint. */
+static const real TORQUE_ROWS[][D] = {torque_rows};
+static const real TORQUE_BOUND[] = {torque_bound};
+static const real TORQUE_PER_LOSS[] = {torque_per_loss};
+static const int TORQUE_JOINT[] = {torque_joint};
+/* Torques whose rates can be limited, with both signs: row . (u_lat - the one before) <= rate * step. */
+static const real RATE_ROWS[][D] = {rate};
+/* Joint limits that can be active: row . z <= bound. */
+static const real JOINT_ROWS[][D] = {joint_rows};
+static const real JOINT_BOUND[] = {joint_bound};
+static const real JOINT_LOWER[12] = {joint_lower};
+static const real JOINT_UPPER[12] = {joint_upper};
+static const real TORQUE_LIMIT[12] = {torque_limit};
+"
+    );
+    if let Some(actuators) = plant.input_rule().actuators() {
+        out += "/* What the joints take. */\n";
+        for (name, (_, values)) in ["VISCOUS", "DRY", "ARMATURE"].iter().zip(actuators.named()) {
+            let values = numbers.vector(values);
+            out += &format!("static const real {name}[12] = {values};\n");
         }
     }
+    out
+}
+
+/// Where iterations end. In single precision rounding ends the progress earlier; torques of a lift would be off by 0.1 N m
+/// with the complementarity of a plan, and weights of rows of rates have to stay far below the inverse of rounding.
+fn solver_numbers(precision: Precision, accepted_residual: f64) -> [(&'static str, f64); 5] {
+    [
+        ("TOLERANCE", TOLERANCE, 1e-4),
+        ("LIFT_TOLERANCE", TOLERANCE, 1e-6),
+        ("RATE_TOLERANCE", RATE_TOLERANCE, 1e-5),
+        ("RATE_SOFTNESS", RATE_SOFTNESS, 1e-4),
+        ("ACCEPTED_RESIDUAL", accepted_residual, 1e-3),
+    ]
+    .map(|(name, double, single)| match precision {
+        Precision::Double => (name, double),
+        Precision::Single => (name, single),
+    })
 }
 
 /// Numbers per line.
@@ -215,18 +215,21 @@ impl Numbers {
     }
 
     /// `{1.0, 2.0}`; one zero if there are none, as C has no empty arrays.
-    pub(in crate::deploy) fn vector(self, values: impl IntoIterator<Item = f64>) -> String {
-        list(values.into_iter().map(|value| self.one(value)))
+    pub(in crate::deploy) fn vector<V: Borrow<f64>>(
+        self,
+        values: impl IntoIterator<Item = V>,
+    ) -> String {
+        list(values.into_iter().map(|value| self.one(*value.borrow())))
     }
 
     /// The first rows of a matrix.
-    pub(super) fn rows(self, matrix: &DMatrix<f64>, count: usize) -> String {
+    fn rows(self, matrix: &DMatrix<f64>, count: usize) -> String {
         let row = |i| (0..matrix.ncols()).map(move |j| matrix[(i, j)]);
         self.matrix((0..count).map(row))
     }
 
     /// Rows of vectors; one row of zeros if there are none.
-    pub(in crate::deploy) fn matrix<R: IntoIterator<Item = f64>>(
+    pub(in crate::deploy) fn matrix<R: IntoIterator<Item: Borrow<f64>>>(
         self,
         rows: impl IntoIterator<Item = R>,
     ) -> String {
@@ -316,7 +319,7 @@ const STATE: &str = include_str!("../../../templates/controller_c/online_state.h
 const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
 
 /// The controller's own steps.
-pub(super) fn online(name: &str) -> String {
+fn online(name: &str) -> String {
     renamed(ONLINE, |word| {
         (word == "online_share").then(|| format!("{name}_{word}"))
     })
@@ -324,32 +327,27 @@ pub(super) fn online(name: &str) -> String {
 
 /// A stage of the horizon's solver and the controller's own state, for the header of a controller.
 pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
-    renamed(
-        &format!(
-            "{STAGE}{}",
-            STATE.split_once("\n\n").map_or("", |(_, rest)| rest)
-        ),
-        |word| match word {
-            "real" => Some(real.to_owned()),
-            "NX" => Some(format!("2 * {upper}_LATENT_DIM")),
-            "NU" => Some(format!("{upper}_LATENT_DIM")),
-            "online_share" => Some(format!("{name}_{word}")),
-            _ => word
-                .starts_with("solver_")
-                .then(|| format!("{name}_{word}")),
-        },
-    )
+    let rename = |word: &str| match word {
+        "real" => Some(real.to_owned()),
+        "NX" => Some(format!("2 * {upper}_LATENT_DIM")),
+        "NU" => Some(format!("{upper}_LATENT_DIM")),
+        _ if word == "online_share" || word.starts_with("solver_") => {
+            Some(format!("{name}_{word}"))
+        }
+        _ => None,
+    };
+    renamed(STAGE, rename) + &renamed(STATE, rename)
 }
 
 /// The solver of the horizon.
-pub(super) fn of_horizon(name: &str) -> String {
+fn of_horizon(name: &str) -> String {
     renamed(FUNCTIONS, |word| {
         (word == "solver_stage").then(|| format!("{name}_{word}"))
     })
 }
 
 /// The solver of a lift: one stage of twelve inputs, without states that matter.
-pub(super) fn of_lift() -> String {
+fn of_lift() -> String {
     let lift = |word: &str| {
         Some(match word {
             "NX" => "1".to_owned(),

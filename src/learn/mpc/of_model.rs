@@ -15,8 +15,8 @@ use thiserror::Error;
 use crate::lower::{CompiledModel, LowerError};
 use crate::model::{ModelError, ReducedModel};
 use crate::online::{
-    ControlError, ControlModel, ControlModelParts, ControlPhase, Controller, InputGivenState,
-    LatentDynamics, Lift, MpcSettings, NonlinearMaps, Solver,
+    ControlError, ControlModel, ControlPhase, Controller, InputGivenState, LatentDynamics, Lift,
+    MpcSettings, NonlinearMaps, Solver,
 };
 use crate::recording::RecordingError;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
@@ -78,7 +78,10 @@ pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
     if !model.is_linear() {
         let stand = model.decode(&DVector::zeros(model.latent_dim()))?;
         let base = control_model(&model.linearised_at(&stand)?)?;
-        return Ok(base.with_nonlinear(Arc::new(ModelMaps(model.clone()))));
+        return Ok(ControlModel {
+            nonlinear: Some(Arc::new(ModelMaps(model.clone()))),
+            ..base
+        });
     }
     let input_rule = model.input_rule()?;
     let (encoder, decoder) = (model.encoder()?, model.decoder()?);
@@ -90,7 +93,7 @@ pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
     }
     let tangent = model.tangent(&DVector::zeros(STATE_DIM))?;
     let state_factors = model.state_factors()?;
-    Ok(ControlModel::from_parts(ControlModelParts {
+    let plant = ControlModel {
         input_rule,
         encoder_bias: encoder.bias().clone(),
         decoder: model.decoder_jacobian(&DVector::zeros(model.latent_dim()))?,
@@ -100,7 +103,9 @@ pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
         lift: tangent.lift,
         projection: tangent.project,
         phase_of_feet: std::array::from_fn(|bits| model.phase_for(pattern(bits))),
-    })?)
+        nonlinear: None,
+    };
+    Ok(plant.checked()?)
 }
 
 /// The nonlinear maps of a model over the robot's coordinates with full maps: checked when the plant was made.

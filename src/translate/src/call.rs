@@ -87,6 +87,9 @@ impl Writer<'_> {
         if let Some(value) = of_libm(&receiver, &method) {
             return Ok(value);
         }
+        if let Some(name) = self.items.unit.elsewhere(&method) {
+            return Ok(Value::new(name, Type::Bool, 16));
+        }
         let owner = match receiver.ty.referent() {
             Type::Real => "Real",
             Type::Named(name) => name,

@@ -6,7 +6,7 @@ use syn::{BinOp, Expr, Lit, UnOp};
 
 use crate::Found;
 use crate::function::{Instance, Writer};
-use crate::items::Items;
+use crate::items::{Field, Items};
 use crate::types::Type;
 
 /// An expression of C.
@@ -209,9 +209,6 @@ impl Writer<'_> {
                     let rank = if size.contains(' ') { 3 } else { 16 };
                     return Ok(Value::new(size, Type::Int, rank));
                 }
-                if *name == "LINKED" {
-                    return Ok(Value::new(*name, Type::Bool, 16));
-                }
                 if here.function.const_parameters.iter().any(|p| p == name)
                     || ["NX", "NU"].contains(name)
                 {
@@ -235,8 +232,7 @@ impl Writer<'_> {
         };
         let name = name.to_string();
         let items = self.items;
-        let fields = items.structs.get(of).map_or(&[][..], |found| &found.fields);
-        let Some(found) = fields.iter().find(|field| field.name == name) else {
+        let Some(found) = items.fields(of).iter().find(|field| field.name == name) else {
             return Err(self.outside(here, field, "a field of what is no struct"));
         };
         let ty = self.resolve(&found.ty, &BTreeMap::new());
@@ -440,14 +436,15 @@ impl Writer<'_> {
         };
         let mut fields_in_c = Vec::new();
         for field in &literal.fields {
-            let of = self.items.structs.get(&name);
-            let ty = of.and_then(|of| {
-                of.fields
-                    .iter()
-                    .find(|f| matches!(&field.member, syn::Member::Named(of) if *of == f.name))
-            });
-            let ty = ty.map(|field| field.ty.clone());
-            let value = self.value_as(here, &field.expr, ty.as_ref())?;
+            let items = self.items;
+            let is_it =
+                |of: &&Field| matches!(&field.member, syn::Member::Named(name) if *name == of.name);
+            let ty = items
+                .fields(&name)
+                .iter()
+                .find(is_it)
+                .map(|field| &field.ty);
+            let value = self.value_as(here, &field.expr, ty)?;
             let is_copy = matches!(value.ty, Type::Array(..)) && value.repeated.is_none();
             let (syn::Member::Named(name), false) = (&field.member, is_copy) else {
                 return Err(self.outside(here, field, "a field that is a copied array"));

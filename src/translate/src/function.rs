@@ -69,18 +69,29 @@ impl<'a> Writer<'a> {
         if let Some(name) = ty.named() {
             self.need_type(name);
         }
-        ty.with_lengths(&mut |length| self.resolve_length(length, sizes))
+        ty.with_lengths(&mut |length| {
+            for word in length.split(' ') {
+                let is_known =
+                    self.items.unit.elsewhere(word).is_some() || sizes.contains_key(word);
+                if !is_known && self.items.constants.contains_key(word) {
+                    self.constant(word);
+                }
+            }
+            self.length(length, sizes)
+        })
     }
 
-    fn resolve_length(&mut self, length: &str, sizes: &BTreeMap<String, String>) -> String {
+    /// A length of the Rust as C has it.
+    pub(crate) fn length(&self, length: &str, sizes: &BTreeMap<String, String>) -> String {
         let word = |word: &str| match (self.items.unit.elsewhere(word), sizes.get(word)) {
             (Some(name), _) => name.to_owned(),
             (None, Some(size)) => size.clone(),
-            (None, None) if self.items.constants.contains_key(word) => self.constant(word),
+            (None, None) if self.items.constants.contains_key(word) => {
+                self.items.constant_name(word)
+            }
             (None, None) => word.to_owned(),
         };
-        let words: Vec<String> = length.split(' ').map(word).collect();
-        words.join(" ")
+        length.split(' ').map(word).collect::<Vec<_>>().join(" ")
     }
 
     fn need_type(&mut self, name: &str) {
@@ -88,11 +99,7 @@ impl<'a> Writer<'a> {
             return;
         }
         let items = self.items;
-        for field in items
-            .structs
-            .get(name)
-            .map_or(&[][..], |found| &found.fields)
-        {
+        for field in items.fields(name) {
             self.resolve(&field.ty, &BTreeMap::new());
         }
     }
@@ -121,10 +128,12 @@ impl<'a> Writer<'a> {
     ) -> Found<String> {
         let prefix = self.items.unit.prefix.to_ascii_uppercase() + "_";
         let size = |size: &String| sizes[size].replace(&prefix, "").replace(' ', "");
-        let suffixes: Vec<String> = function.sizes.iter().map(size).collect();
-        let of = if owner == "Real" { "" } else { owner };
-        let mut parts = vec![of, name];
-        let suffixes: Vec<String> = suffixes.iter().map(|s| s.to_ascii_lowercase()).collect();
+        let suffixes: Vec<String> = (function
+            .sizes
+            .iter()
+            .map(|own| size(own).to_ascii_lowercase()))
+        .collect();
+        let mut parts = vec![if owner == "Real" { "" } else { owner }, name];
         parts.extend(suffixes.iter().map(String::as_str));
         let c_name = self.items.name(&parts);
         match self.done.get(&c_name) {

@@ -13,7 +13,7 @@ use crate::types::Type;
 use crate::{Fault, Found, Source, Translated, Unit};
 
 /// Const parameters that stay names in C.
-pub(crate) const SIZES: [&str; 3] = ["NX", "NU", "LINKED"];
+pub(crate) const SIZES: [&str; 2] = ["NX", "NU"];
 
 /// A struct or enum, a constant or a function belongs to a source, of which faults name the path.
 pub(crate) struct Items<'a> {
@@ -96,7 +96,7 @@ impl<'a> Items<'a> {
                 message: error.to_string(),
             })?;
             for item in &file.items {
-                items.add(source, item)?;
+                let _ = items.add(source, item);
             }
         }
         Ok(items)
@@ -128,6 +128,11 @@ impl<'a> Items<'a> {
         above
     }
 
+    /// The fields of a struct, none of anything else.
+    pub(crate) fn fields(&self, name: &str) -> &[Field] {
+        self.structs.get(name).map_or(&[], |found| &found.fields)
+    }
+
     /// A name of C: `solver_before`, `solver_before_write`.
     pub(crate) fn name(&self, parts: &[&str]) -> String {
         let words = parts.iter().filter(|part| !part.is_empty());
@@ -143,76 +148,63 @@ impl<'a> Items<'a> {
         }
     }
 
+    /// Items outside the subset are left out: they are faults where the C needs them.
     fn add(&mut self, source: usize, item: &Item) -> Found<()> {
         match item {
-            Item::Struct(item) if !is_conditional(&item.attrs) => self.add_struct(source, item),
+            Item::Struct(item) if !is_conditional(&item.attrs) => {
+                let field = |field: &syn::Field| {
+                    let name = field.ident.as_ref().map(ToString::to_string);
+                    Ok(Field {
+                        docs: docs(&field.attrs),
+                        name: name
+                            .ok_or_else(|| self.fault(source, field, "a field without name"))?,
+                        ty: self.ty(source, &field.ty, "")?,
+                    })
+                };
+                let fields = item.fields.iter().map(field).collect::<Found<_>>()?;
+                let docs = docs(&item.attrs);
+                self.structs
+                    .insert(item.ident.to_string(), Struct { docs, fields });
+            }
             Item::Enum(item) if item.variants.iter().all(|v| v.fields.is_empty()) => {
                 let names = item.variants.iter().map(|v| v.ident.to_string());
                 let plain = (docs(&item.attrs), names.collect());
                 self.enums.insert(item.ident.to_string(), plain);
-                Ok(())
             }
             Item::Const(item) => {
-                if let Ok(ty) = self.ty(source, &item.ty, "") {
-                    let (docs, value) = (docs(&item.attrs), (*item.expr).clone());
-                    let constant = Constant {
-                        docs,
-                        source,
-                        ty,
-                        value,
-                    };
-                    self.constants.insert(item.ident.to_string(), constant);
-                }
-                Ok(())
+                let constant = Constant {
+                    docs: docs(&item.attrs),
+                    source,
+                    ty: self.ty(source, &item.ty, "")?,
+                    value: (*item.expr).clone(),
+                };
+                self.constants.insert(item.ident.to_string(), constant);
             }
             Item::Fn(item) if !is_conditional(&item.attrs) => {
-                self.add_function(source, "", &item.attrs, &item.sig, Some(&item.block))
+                self.add_function(source, "", &item.attrs, &item.sig, Some(&item.block))?;
             }
             Item::Trait(item) => {
                 let owner = item.ident.to_string();
                 for method in &item.items {
                     if let TraitItem::Fn(method) = method {
                         let (attributes, body) = (&method.attrs, method.default.as_ref());
-                        self.add_function(source, &owner, attributes, &method.sig, body)?;
+                        let _ = self.add_function(source, &owner, attributes, &method.sig, body);
                     }
                 }
-                Ok(())
             }
             Item::Impl(item) if item.trait_.is_none() && !is_conditional(&item.attrs) => {
-                let syn::Type::Path(owner) = item.self_ty.as_ref() else {
+                let Type::Named(owner) = self.ty(source, &item.self_ty, "")? else {
                     return Ok(());
                 };
-                let owner = owner.path.segments.last().expect("a path has segments");
-                let owner = owner.ident.to_string();
                 for method in &item.items {
                     if let ImplItem::Fn(method) = method {
                         let (attributes, body) = (&method.attrs, Some(&method.block));
-                        self.add_function(source, &owner, attributes, &method.sig, body)?;
+                        let _ = self.add_function(source, &owner, attributes, &method.sig, body);
                     }
                 }
-                Ok(())
             }
             // `use`, `mod`, implementations of traits and what is compiled under a condition: nothing to translate.
-            _ => Ok(()),
-        }
-    }
-
-    fn add_struct(&mut self, source: usize, item: &syn::ItemStruct) -> Found<()> {
-        let field = |field: &syn::Field| {
-            let Some(name) = &field.ident else {
-                return Err(self.fault(source, field, "a field without name"));
-            };
-            Ok(Field {
-                docs: docs(&field.attrs),
-                name: name.to_string(),
-                ty: self.ty(source, &field.ty, "")?,
-            })
-        };
-        // Structs that the C does not need may have any fields.
-        if let Ok(fields) = item.fields.iter().map(field).collect() {
-            let docs = docs(&item.attrs);
-            let found = Struct { docs, fields };
-            self.structs.insert(item.ident.to_string(), found);
+            _ => {}
         }
         Ok(())
     }
@@ -254,26 +246,20 @@ impl<'a> Items<'a> {
                 Ok((name.ident.to_string(), ty, name.mutability.is_some()))
             }
         };
-        // Functions that the C never calls may have any parameters.
-        let Ok(parameters) = signature.inputs.iter().map(parameter).collect() else {
-            return Ok(());
-        };
+        let parameters = signature
+            .inputs
+            .iter()
+            .map(parameter)
+            .collect::<Found<_>>()?;
         let output = match &signature.output {
             ReturnType::Default => Type::Unit,
-            ReturnType::Type(_, ty) => match self.ty(source, ty, owner) {
-                Ok(ty) => ty,
-                Err(_) => return Ok(()),
-            },
+            ReturnType::Type(_, ty) => self.ty(source, ty, owner)?,
         };
-        let is_own = |size: &String| !SIZES.contains(&size.as_str());
+        let is_own = |size: &&String| !SIZES.contains(&size.as_str());
         let function = Function {
             docs: docs(attributes),
             source,
-            sizes: const_parameters
-                .iter()
-                .filter(|s| is_own(s))
-                .cloned()
-                .collect(),
+            sizes: const_parameters.iter().filter(is_own).cloned().collect(),
             const_parameters,
             parameters,
             output,
@@ -323,23 +309,20 @@ impl<'a> Items<'a> {
 
     /// The name of a struct whose const arguments are the names that its parameters have.
     fn with_sizes(&self, source: usize, name: &str, segment: &syn::PathSegment) -> Found<String> {
-        if let syn::PathArguments::AngleBracketed(arguments) = &segment.arguments {
-            for argument in &arguments.args {
-                let is_plain = match argument {
-                    syn::GenericArgument::Lifetime(_) => true,
-                    syn::GenericArgument::Type(syn::Type::Path(path)) => {
-                        let is = |name: &&str| path.path.is_ident(name);
-                        path.path.is_ident("T") || SIZES.iter().any(is)
-                    }
-                    _ => false,
-                };
-                if !is_plain {
-                    let message = "arguments of a struct are T, NX, NU and LINKED";
-                    return Err(self.fault(source, argument, message));
-                }
+        let syn::PathArguments::AngleBracketed(arguments) = &segment.arguments else {
+            return Ok(name.to_owned());
+        };
+        let is_plain = |argument: &&syn::GenericArgument| match argument {
+            syn::GenericArgument::Lifetime(_) => true,
+            syn::GenericArgument::Type(syn::Type::Path(of)) => {
+                ["T", "NX", "NU"].iter().any(|name| of.path.is_ident(name))
             }
+            _ => false,
+        };
+        match arguments.args.iter().find(|argument| !is_plain(argument)) {
+            None => Ok(name.to_owned()),
+            Some(other) => Err(self.fault(source, other, "arguments of a struct are T, NX and NU")),
         }
-        Ok(name.to_owned())
     }
 
     /// A length, with the names that it has in Rust.
@@ -379,47 +362,33 @@ impl Writer<'_> {
         for name in unit.header {
             self.write_type(name, &mut header, &mut written);
         }
-        for name in self.constants.iter() {
-            source += &self.scalar_constant(name)?;
+        for name in &self.constants {
+            source += &self.constant_text(name, true)?;
         }
         for name in &self.types {
             self.write_type(name, &mut source, &mut written);
         }
-        for name in self.constants.iter() {
-            source += &self.struct_constant(name)?;
+        for name in &self.constants {
+            source += &self.constant_text(name, false)?;
         }
         source += &self.functions;
         Ok(Translated { header, source })
     }
 
-    fn scalar_constant(&self, name: &str) -> Found<String> {
+    /// A constant, if it is a number or is none, as is asked for.
+    fn constant_text(&self, name: &str, is_number: bool) -> Found<String> {
         let constant = &self.items.constants[name];
-        if !constant.ty.is_number() {
+        if constant.ty.is_number() != is_number {
             return Ok(String::new());
         }
         let value = crate::expression::constant(self.items, constant.source, &constant.value)?;
-        let docs = comment(&constant.docs, "");
-        let cast = if constant.ty == Type::Real {
-            "(real)"
-        } else {
-            ""
-        };
-        Ok(format!(
-            "{docs}#define {} {cast}{value}\n\n",
-            self.items.constant_name(name)
-        ))
-    }
-
-    fn struct_constant(&self, name: &str) -> Found<String> {
-        let constant = &self.items.constants[name];
-        if constant.ty.is_number() {
-            return Ok(String::new());
-        }
-        let value = crate::expression::constant(self.items, constant.source, &constant.value)?;
-        let declared =
-            (constant.ty).declare(&self.items.constant_name(name), &|of| self.spelling(of));
-        let docs = comment(&constant.docs, "");
-        Ok(format!("{docs}static const {declared} = {value};\n\n"))
+        let (docs, name) = (comment(&constant.docs, ""), self.items.constant_name(name));
+        let declared = constant.ty.declare(&name, &|of| self.spelling(of));
+        Ok(match &constant.ty {
+            Type::Real => format!("{docs}#define {name} (real){value}\n\n"),
+            _ if is_number => format!("{docs}#define {name} {value}\n\n"),
+            _ => format!("{docs}static const {declared} = {value};\n\n"),
+        })
     }
 
     /// A struct or enum, behind those that its fields are made of.
@@ -429,15 +398,12 @@ impl Writer<'_> {
         }
         let c_name = self.spelling(name);
         if let Some((docs, variants)) = self.items.enums.get(name) {
-            let variants = variants
+            let variants: Vec<String> = (variants
                 .iter()
-                .map(|variant| self.items.constant_name(variant));
-            let variants: Vec<String> = variants.collect();
-            let docs = comment(docs, "");
-            *out += &format!(
-                "{docs}typedef enum {{ {} }} {c_name};\n\n",
-                variants.join(", ")
-            );
+                .map(|variant| self.items.constant_name(variant)))
+            .collect();
+            let (docs, variants) = (comment(docs, ""), variants.join(", "));
+            *out += &format!("{docs}typedef enum {{ {variants} }} {c_name};\n\n");
             return;
         }
         let Some(found) = self.items.structs.get(name) else {
@@ -448,22 +414,13 @@ impl Writer<'_> {
         }
         let mut text = format!("{}typedef struct {{\n", comment(&found.docs, ""));
         for field in &found.fields {
-            let ty = field.ty.with_lengths(&mut |length| {
-                let word = |word: &str| match self.items.unit.elsewhere(word) {
-                    Some(name) => name.to_owned(),
-                    None if self.items.constants.contains_key(word) => {
-                        self.items.constant_name(word)
-                    }
-                    None => word.to_owned(),
-                };
-                length.split(' ').map(word).collect::<Vec<_>>().join(" ")
-            });
+            let ty = field
+                .ty
+                .with_lengths(&mut |length| self.length(length, &BTreeMap::new()));
             let declared = ty.declare(&field.name, &|of| self.spelling(of));
             text += &format!("{}    {declared};\n", comment(&field.docs, "    "));
-            if self
-                .lengths
-                .contains(&(name.to_owned(), field.name.clone()))
-            {
+            let key = (name.to_owned(), field.name.clone());
+            if self.lengths.contains(&key) {
                 text += &format!("    int {}_len;\n", field.name);
             }
         }

@@ -7,7 +7,7 @@
 //! | Rust | C |
 //! |---|---|
 //! | `T: Real` or the alias `Real`, `f64`, `usize` and `u32`, `bool` | `real`, `double`, `int`, `bool` |
-//! | const parameters of structs, `LINKED` | names that whoever includes the C defines |
+//! | const parameters of structs | names that whoever includes the C defines |
 //! | other const parameters of a function | one function for each value: `add_multiple_nx` |
 //! | structs, arrays, enums without data, constants | the same |
 //! | a trait | a struct that whoever includes the C defines, with its required methods; the others are made |
@@ -79,7 +79,7 @@ pub struct Unit<'a> {
     pub constants: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
     pub header: &'a [&'a str],
-    /// Constants and functions of the Rust that whoever includes the C defines, with their names there.
+    /// Constants of the Rust, and methods that state a condition, that whoever includes the C defines, with their names there.
     pub elsewhere: &'a [(&'a str, &'a str)],
     /// What stands before the type of every function, with a space.
     pub attribute: &'a str,
@@ -212,6 +212,7 @@ pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Faul
             "Program::solve",
         ],
         header: &["Stage"],
+        elsewhere: &[("is_linked", "LINKED")],
         ..Unit::default()
     };
     let Translated { header, source } = translate(sources, &unit)?;

@@ -104,11 +104,8 @@ impl Writer<'_> {
         {
             let whole = self.value(here, &call.receiver)?;
             let count = self.value(here, &call.args[0])?;
-            let rest = Value {
-                text: format!("{} + {}", whole.text, count.at_least(12)),
-                rank: 12,
-                ..whole.clone()
-            };
+            let rest = format!("{} + {}", whole.text, count.at_least(12));
+            let rest = Value::new(rest, whole.ty.clone(), 12);
             self.bind(here, &pair.elems[0], whole)?;
             return self.bind(here, &pair.elems[1], rest);
         }
@@ -167,25 +164,19 @@ impl Writer<'_> {
         length: &str,
         value: &Value,
     ) {
+        let (lines, text) = (&mut here.lines, &value.text);
         match &value.repeated {
-            Some(element) if element == "0" => {
-                here.lines.add(&format!("{declared} = {};", value.text))
+            Some(element) if element != "0" => {
+                lines.add(&format!("{declared};"));
+                lines.open(&format!("for (int i = 0; i < {length}; ++i) {{"));
+                lines.add(&format!("{name}[i] = {element};"));
+                lines.close("}");
             }
-            None if value.text.starts_with('{') => {
-                here.lines.add(&format!("{declared} = {};", value.text))
+            None if !text.starts_with('{') => {
+                lines.add(&format!("{declared};"));
+                lines.add(&format!("memcpy({name}, {text}, sizeof {name});"));
             }
-            Some(element) => {
-                here.lines.add(&format!("{declared};"));
-                here.lines
-                    .open(&format!("for (int i = 0; i < {length}; ++i) {{"));
-                here.lines.add(&format!("{name}[i] = {element};"));
-                here.lines.close("}");
-            }
-            None => {
-                here.lines.add(&format!("{declared};"));
-                here.lines
-                    .add(&format!("memcpy({name}, {}, sizeof {name});", value.text));
-            }
+            _ => lines.add(&format!("{declared} = {text};")),
         }
     }
 
@@ -198,17 +189,9 @@ impl Writer<'_> {
             }
             Expr::While(turns) => {
                 let condition = self.value(here, &turns.cond)?;
-                here.lines.open(&format!("while ({}) {{", condition.text));
-                self.block(here, &turns.body, false)?;
-                here.lines.close("}");
-                Ok(())
+                self.turns(here, &format!("while ({})", condition.text), &turns.body)
             }
-            Expr::Loop(turns) if turns.label.is_none() => {
-                here.lines.open("for (;;) {");
-                self.block(here, &turns.body, false)?;
-                here.lines.close("}");
-                Ok(())
-            }
+            Expr::Loop(turns) if turns.label.is_none() => self.turns(here, "for (;;)", &turns.body),
             Expr::ForLoop(turns) if turns.label.is_none() => self.for_loop(here, turns),
             Expr::Break(end) if end.label.is_none() && end.expr.is_none() => {
                 here.lines.add("break;");
@@ -230,7 +213,6 @@ impl Writer<'_> {
                 Ok(())
             }
             Expr::Assign(assign) => self.assign(here, assign),
-            Expr::Const(checked) => self.check(here, checked),
             Expr::Binary(_) | Expr::Call(_) | Expr::MethodCall(_) => {
                 let value = self.value(here, expression)?;
                 here.lines.add(&format!("{};", value.text));
@@ -310,10 +292,15 @@ impl Writer<'_> {
             }
             _ => return Err(self.outside(here, range, "a reversed loop in steps")),
         };
-        here.lines.open(&format!("for ({head}) {{"));
         here.scopes.push(BTreeMap::from([(i, Type::Int)]));
-        self.block(here, &turns.body, false)?;
+        self.turns(here, &format!("for ({head})"), &turns.body)?;
         here.scopes.pop();
+        Ok(())
+    }
+
+    fn turns(&mut self, here: &mut Instance<'_>, head: &str, body: &Block) -> Found<()> {
+        here.lines.open(&format!("{head} {{"));
+        self.block(here, body, false)?;
         here.lines.close("}");
         Ok(())
     }
@@ -322,19 +309,18 @@ impl Writer<'_> {
         let left = self.value(here, &assign.left)?;
         let right = self.value_as(here, &assign.right, Some(&left.ty))?;
         let place = left.at_least(16);
+        let size = left
+            .ty
+            .declare("", &|of| self.spelling(of))
+            .replace(" [", "[");
         match (&left.ty, &right.repeated) {
             (Type::Array(..), Some(element)) if element == "0" => {
-                let size = left.ty.declare("", &|of| self.spelling(of));
-                here.lines.add(&format!(
-                    "memset({place}, 0, sizeof({}));",
-                    size.replace(" [", "[")
-                ));
+                here.lines
+                    .add(&format!("memset({place}, 0, sizeof({size}));"));
             }
             (Type::Array(..), None) => {
-                let size = left.ty.declare("", &|of| self.spelling(of));
-                let size = size.replace(" [", "[");
-                here.lines
-                    .add(&format!("memcpy({place}, {}, sizeof({size}));", right.text));
+                let text = format!("memcpy({place}, {}, sizeof({size}));", right.text);
+                here.lines.add(&text);
             }
             (Type::Array(..), Some(_)) => {
                 return Err(self.outside(here, assign, "assigning repeated numbers"));
@@ -342,21 +328,5 @@ impl Writer<'_> {
             _ => here.lines.add(&format!("{} = {};", left.text, right.text)),
         }
         Ok(())
-    }
-
-    /// `const { assert!(condition) }`, an array of negative length where it is false.
-    fn check(&mut self, here: &mut Instance<'_>, checked: &syn::ExprConst) -> Found<()> {
-        if let [Stmt::Expr(Expr::Macro(assertion), None)] = checked.block.stmts.as_slice()
-            && assertion.mac.path.is_ident("assert")
-            && let Ok(condition) = assertion.mac.parse_body::<Expr>()
-        {
-            let condition = self.value(here, &condition)?;
-            here.lines.add(&format!(
-                "(void)sizeof(char[{} ? 1 : -1]);",
-                condition.at_least(11)
-            ));
-            return Ok(());
-        }
-        Err(self.outside(here, checked, "a constant block that is no assertion"))
     }
 }

@@ -16,48 +16,23 @@ pub(crate) fn snake(name: &str) -> String {
 }
 
 /// The signs of comments in ASCII; links of rustdoc become plain words.
-pub(crate) fn ascii(comment: &str) -> String {
-    const SIGNS: [(&str, &str); 20] = [
-        ("⁻¹", "^-1"),
-        ("⁻ᵀ", "^-T"),
-        ("ᵀ", "^T"),
-        ("½", "1/2"),
-        ("Σ", "sum of"),
-        ("−", "-"),
-        ("·", "."),
-        ("←", "<-"),
-        ("…", "..."),
-        ("₀", "_0"),
-        ("≤", "<="),
-        ("×", "x"),
-        ("σ", "sigma"),
-        ("μ", "mu"),
-        ("γ̂", "gamma"),
-        ("φ", "phi"),
-        ("[`", ""),
-        ("`]", ""),
-        ("`", ""),
-        ("*/", "* /"),
-    ];
-    let mut text = comment.to_owned();
-    for (sign, plain) in SIGNS {
-        text = text.replace(sign, plain);
-    }
-    text
+fn ascii(comment: &str) -> String {
+    const SIGNS: &str = "⁻¹=^-1,⁻ᵀ=^-T,ᵀ=^T,½=1/2,Σ=sum of,−=-,·=.,←=<-,…=...,₀=_0,≤=<=,×=x,σ=sigma,μ=mu,γ̂=gamma,φ=phi,\
+                         [`=,`]=,`=,*/=* /";
+    let signs = SIGNS.split(',').filter_map(|pair| pair.split_once('='));
+    signs.fold(comment.to_owned(), |text, (sign, plain)| {
+        text.replace(sign, plain)
+    })
 }
 
 /// A comment of C above a definition.
 pub(crate) fn comment(lines: &[String], indent: &str) -> String {
-    let lines: Vec<String> = lines.iter().map(|line| ascii(line.trim())).collect();
-    match lines.as_slice() {
-        [] => String::new(),
-        lines => format!(
-            "{indent}/* {} */\n",
-            lines
-                .join(&format!("\n{indent} * "))
-                .replace(" * \n", " *\n")
-        ),
+    if lines.is_empty() {
+        return String::new();
     }
+    let lines: Vec<String> = lines.iter().map(|line| ascii(line.trim())).collect();
+    let text = lines.join(&format!("\n{indent} * "));
+    format!("{indent}/* {} */\n", text.replace(" * \n", " *\n"))
 }
 
 /// Breaks lines that are too long behind a comma or before an operator.
