@@ -24,7 +24,6 @@ fn fault(sheet: &Sheet) -> RecordingError {
 #[test]
 fn missing_file_is_told_with_its_path() {
     let error = recording::read(Path::new("no/such/jump.csv")).unwrap_err();
-    assert!(matches!(error.kind, RecordingFault::Missing));
     assert_eq!(error.to_string(), "no/such/jump.csv: no such file");
 }
 
@@ -43,11 +42,10 @@ fn folder_instead_of_a_file_is_told() {
 fn empty_and_blank_files_are_told_apart_from_headers() {
     for text in ["", "\n\n", "\u{feff}", "\r\n  \r\n"] {
         let error = read_from_bytes("landing.csv", text.as_bytes()).unwrap_err();
-        assert!(matches!(error.kind, RecordingFault::Empty), "{error:?}");
         assert!(message(&error).starts_with("empty file, expected a header"));
     }
     let error = read_from_bytes("landing.csv", &gzip(b"")).unwrap_err();
-    assert!(matches!(error.kind, RecordingFault::Empty), "{error:?}");
+    assert!(message(&error).starts_with("empty file, expected a header"));
 }
 
 #[test]
@@ -55,7 +53,6 @@ fn header_without_samples_is_told() {
     let mut sheet = Sheet::landing();
     sheet.rows.truncate(1);
     let error = fault(&sheet);
-    assert!(matches!(error.kind, RecordingFault::HeaderOnly(71)));
     assert_eq!(message(&error), "header of 71 columns but no sample");
 }
 
@@ -224,10 +221,6 @@ fn missing_columns_are_listed() {
     let mut sheet = Sheet::landing();
     sheet.remove_columns(|name| name == "rr.kn Torque" || name == "Body linear Position z");
     let error = fault(&sheet);
-    let RecordingFault::MissingColumns { columns, .. } = &error.kind else {
-        panic!("{error:?}");
-    };
-    assert_eq!(columns, &["Body linear Position z", "rr.kn Torque"]);
     assert_eq!(
         message(&error),
         "row 1: missing `Body linear Position z`, `rr.kn Torque`; \
@@ -260,14 +253,6 @@ fn duplicate_column_names_both_places() {
     let mut sheet = Sheet::landing();
     sheet.rows[0][8] = "fr.hx Velocity".to_owned();
     let error = fault(&sheet);
-    assert!(matches!(
-        error.kind,
-        RecordingFault::DuplicateColumn {
-            first: 3,
-            second: 9,
-            ..
-        }
-    ));
     assert_eq!(
         message(&error),
         "row 1, column `fr.hx Velocity`: occurs twice, as number 3 and 9"

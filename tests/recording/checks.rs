@@ -3,8 +3,7 @@
 use nalgebra::DMatrix;
 use romc::recording::check::{Finding, Implausible, check, without};
 use romc::recording::{
-    ConditionOptions, ImplausibleSamples, PhaseRule, Recording, RecordingError, RecordingFault,
-    Segment,
+    ConditionOptions, ImplausibleSamples, PhaseRule, Recording, RecordingError, Segment,
 };
 use romc::robot::{JOINT_DIM, Robot, STATE_DIM};
 
@@ -409,7 +408,6 @@ mod phases {
         let rule = PhaseRule::new(vec![pattern("flight", FeetRule::None)]);
         let error = rule.spans(&segment("3x1100")).unwrap_err();
         let text = error.to_string();
-        assert!(matches!(error.kind, RecordingFault::NoPhase { .. }));
         assert_eq!(error.place.row(), Some(2));
         assert!(text.contains("none of the phases `flight`"), "{text}");
     }

@@ -204,3 +204,46 @@ fn clocks_that_count_from_an_epoch_count_from_the_first_sample() {
         assert!((read - (right_s - right[0])).abs() < 1e-6);
     }
 }
+
+/// Samples every 2 ms, each stamped in another notation of dates.
+#[test]
+fn dates_of_every_kind_are_seconds_since_1970() {
+    let read = |times: &[&str]| {
+        let mut sheet = Sheet::landing();
+        sheet.rows.truncate(1 + times.len());
+        (times.iter().zip(2..)).for_each(|(time, row)| sheet.set(row, "Time", time));
+        sheet.read()
+    };
+    for times in [
+        &[
+            "2024-02-29T23:59:59.998Z",
+            "2024-03-01 00:00:00,000",
+            "2024-03-01T02:00:00.002+02:00",
+            "2024-02-29T22:30:00.004-0130",
+            "2024/03/01 00:00:00.006",
+        ][..],
+        &["2000-02-29T23:59:59.999", "2000-03-01T00:00:00.001"],
+        &["2023-02-28T23:59:59.999", "2023-03-01T00:00:00.001"],
+        &["1999-12-31T23:59:59.999", "2000-01-01T00:00:00.001"],
+        &["1970-01-01T00:00:00Z", "1970-01-01T00:00:00.002Z"],
+        &["00:59:59.999999999", "01:00:00.001999999"],
+    ] {
+        let found = read(times).unwrap().segments.remove(0).time_s;
+        for (i, time) in found.iter().enumerate() {
+            let expected = 0.002 * i as f64;
+            let is_exact = (time - found[0] - expected).abs() < 1e-11;
+            assert!(is_exact, "{} is {time}, not {expected}", times[i]);
+        }
+    }
+    // Nanoseconds of an epoch.
+    let found = read(&[
+        "2023-11-14T22:13:20.123456789Z",
+        "2023-11-14T22:13:20.125456790Z",
+    ]);
+    let found = found.unwrap().segments.remove(0).time_s;
+    assert!((found[1] - 0.002_000_001).abs() < 1e-15, "{found:?}");
+    for text in "2024-13-01T00:00:00|2024-01-01T|a:b|1:2:3:4|1:2:3+x|-1:00:00".split('|') {
+        let error = read(&[text, "00:00:01"]).unwrap_err().to_string();
+        assert!(error.contains("row 2, column `Time`: found `"), "{error}");
+    }
+}

@@ -451,3 +451,128 @@ fn columns_of_one_family_are_taken_and_the_others_named() {
         assert!(difference(&found, &s).0 < 1e-9, "{}", guess.text);
     }
 }
+
+/// A log of these columns with others that say nothing, and the guess of its map.
+fn guess_of_names(names: &[String]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    let mut log = Log::default();
+    log.add("Time [ms]", (0..8).map(|k| f64::from(2 * k)));
+    for (i, name) in names.iter().enumerate() {
+        log.add(name, (0..8).map(|k| 0.01 * f64::from(k) + i as f64));
+    }
+    log.write(&path, ",", true);
+    let go1 = romc::robot_file::by_name("go1").unwrap();
+    guess(&path, go1).unwrap().text
+}
+
+/// `{leg}` with the words for legs behind a bar, `{joint}` with those for joints, `{axis}` for axes or angles; `{n}` for
+/// numbers from the one behind the bar on.
+fn names_of(pattern: &str, count: usize) -> Vec<String> {
+    let (pattern, words) = pattern.split_once(" | ").unwrap();
+    let words: Vec<&str> = words.split(' ').collect();
+    let name = |i: usize| match count {
+        _ if pattern.contains("{n}") => {
+            let first: usize = words[0].parse().unwrap();
+            pattern.replace("{n}", &(first + i).to_string())
+        }
+        12 => pattern
+            .replace("{leg}", words[i / 3])
+            .replace("{joint}", words[4 + i % 3]),
+        _ => pattern
+            .replace("{leg}", words[i])
+            .replace("{axis}", words[i]),
+    };
+    (0..count).map(name).collect()
+}
+
+#[test]
+fn names_of_many_loggers_are_known() {
+    for (table, count, patterns) in [
+        (
+            "joint.position",
+            12,
+            "{leg}_{joint}_joint/position | FR FL RR RL hip thigh calf; \
+             position[{leg}_{joint}_joint] | FR FL RR RL hip thigh calf; q_{n} | 1; \
+             {leg} {joint} angle (deg) | RightFront FrontLeft RearRight RearLeft abad thigh knee; \
+             qpos[{n}] | 7; {leg}{joint}Pos | FR FL RR RL Hip Thigh Knee",
+        ),
+        (
+            "joint.torque",
+            12,
+            "effort[{leg}_{joint}] | RF LF RH LH HAA HFE KFE; tau{n} | 0; ctrl[{n}] | 0; \
+             {leg}.{joint}.torque | fr fl hr hl hip_roll hip_pitch knee; \
+             {leg}_{joint}_torque | leg0 leg1 leg2 leg3 joint0 joint1 joint2; \
+             tau_{leg}_{joint} [Nm] | FR FL RR RL hip thigh knee",
+        ),
+        (
+            "joint.velocity",
+            12,
+            "motor_state[{n}].dq | 0; qvel_{n} | 6; dof_vel[{n}] | 0; dQ_{n} | 0; \
+             {leg}.{joint}.vel | front_right front_left rear_right rear_left abduction hip knee",
+        ),
+        (
+            "body.position",
+            3,
+            "pose.pose.position.{axis} | x y z; com_{axis} | x y z; CoM {axis} | X Y Z; p_{axis} | x y z; qpos[{n}] | 0",
+        ),
+        (
+            "body.orientation",
+            4,
+            "pose.pose.orientation.{axis} | w x y z; imu_state.quaternion[{n}] | 0; q{axis} | w x y z; qpos[{n}] | 3",
+        ),
+        (
+            "body.orientation",
+            3,
+            "base_{axis} | roll pitch yaw; Body angular Position {axis} | x y z; {axis} | phi theta psi",
+        ),
+        (
+            "body.velocity",
+            3,
+            "twist.twist.linear.{axis} | x y z; body_v{axis} | x y z; Body linear Velocity {axis} | x y z; \
+             base v{axis} [m/s] | x y z",
+        ),
+        (
+            "body.angular_velocity",
+            3,
+            "twist.twist.angular.{axis} | x y z; imu_state.gyroscope[{n}] | 0; w{axis} | x y z; qvel_{n} | 3; \
+             {axis}_rate | roll pitch yaw; {axis}_dot | phi theta psi; {axis} rate [deg/s] | roll pitch yaw",
+        ),
+        (
+            "feet",
+            4,
+            "foot_force[{n}] | 0; contact_{leg} | FR FL RR RL; {leg} Foot | fr fl rr rl; Fz {leg} | RF LF RH LH; \
+             F_{leg} [N] | FR FL RR RL; {leg} load (N) | FR FL RR RL; c_{n} | 0",
+        ),
+    ] {
+        for pattern in patterns.split("; ") {
+            let names = names_of(pattern, count);
+            let others = [
+                "wireless_remote[0]",
+                "temperature",
+                "FR_foot_position_x",
+                "battery",
+            ];
+            let others = others.iter().chain(&["mode", "tick", "foot_speed_body[1]"]);
+            let mut columns: Vec<String> = names.iter().rev().cloned().collect();
+            columns.extend(others.map(|&name| name.to_owned()));
+            let text = guess_of_names(&columns);
+            let clock = "[time]\ncolumn = \"Time [ms]\"\nunit = \"ms\"\n";
+            assert!(text.contains(clock), "{text}");
+            let own = text.split(&format!("\n[{table}]\n")).nth(1);
+            let own = own.unwrap_or_else(|| panic!("{pattern}: {text}"));
+            let own = own
+                .strip_prefix("columns = [")
+                .unwrap()
+                .split("]\n")
+                .next()
+                .unwrap();
+            let found: Vec<&str> = own.split('"').skip(1).step_by(2).collect();
+            assert_eq!(found, names, "{pattern}: {text}");
+            let is_free = |name: &&String| !text.contains(&format!("\"{name}\""));
+            assert_eq!(columns[count..].iter().filter(is_free).count(), 7, "{text}");
+        }
+    }
+    let both = ["q_{n} | 0", "q_des_{n} | 0"].map(|pattern| names_of(pattern, 12));
+    assert!(!guess_of_names(&both.concat()).contains("q_des_3"));
+}

@@ -899,3 +899,56 @@ fn of_two_topics_the_faster_is_taken_and_the_other_named() {
     let notes = reading.notes.join("\n");
     assert!(notes.contains("`/lf/lowstate` (50 Hz)"), "{notes}");
 }
+
+#[test]
+fn whole_numbers_of_messages_have_their_signs() {
+    let folder = tempfile::tempdir().unwrap();
+    let jump = jump().slice(220..400);
+    let mut bag = Bag::of(&jump);
+    let definition = b"bool fr\nint8 fl\nint64 rr\nint16 rl\n".to_vec();
+    bag.schemas.insert(
+        "/foot_contacts".to_owned(),
+        ("a/Feet".to_owned(), definition),
+    );
+    let contacts = bag
+        .messages
+        .iter_mut()
+        .filter(|message| message.topic == "/foot_contacts");
+    for (message, feet) in contacts.zip(&jump.feet) {
+        let sign = feet.map(|down| if down { 1 } else { -1 });
+        let mut out = Cdr::default();
+        out.put(1, &[u8::from(feet[0]), (sign[1] as i8).to_le_bytes()[0]]);
+        out.put(8, &(9 * i64::from(sign[2])).to_le_bytes());
+        out.put(2, &(300 * sign[3] as i16).to_le_bytes());
+        message.bytes = out.message();
+    }
+    let path = bag.file(folder.path(), &bag.messages);
+    let map = "[joint.position]\ntopic = \"/joint_states\"\ncolumns = \"position[{leg}.{joint}]\"\n\
+         [joint.torque]\ntopic = \"/joint_states\"\ncolumns = \"effort[{leg}.{joint}]\"\n\
+         [body.position]\ntopic = \"/odom\"\ncolumns = \"pose.pose.position.{axis}\"\n\
+         [body.orientation]\ntopic = \"/odom\"\norder = \"xyzw\"\ncolumns = [\"pose.pose.orientation.x\", \
+         \"pose.pose.orientation.y\", \"pose.pose.orientation.z\", \"pose.pose.orientation.w\"]\n\
+         [feet]\ntopic = \"/foot_contacts\"\ncolumns = \"{leg}\"\nthreshold = LEVEL\n";
+    // Below the least of the positive numbers, and between the negative ones of one byte and of more.
+    for (level, expected) in [
+        ("0.5", jump.feet.clone()),
+        (
+            "-5.0",
+            (jump.feet.iter())
+                .map(|feet| [true, true, feet[2], feet[3]])
+                .collect(),
+        ),
+        (
+            "-100.0",
+            (jump.feet.iter())
+                .map(|feet| [true, true, true, feet[3]])
+                .collect(),
+        ),
+    ] {
+        let map = ColumnMap::parse("map.toml", &map.replace("LEVEL", level)).unwrap();
+        let found = Reader::new(Some(map), Clocks::Recorded)
+            .read(&path)
+            .unwrap();
+        assert_eq!(found.recording.segments[0].feet, expected, "{level}");
+    }
+}

@@ -6,9 +6,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use nalgebra::DMatrix;
-
-use super::error::{RecordingError, RecordingFault};
+use super::error::{Outcome, RecordingFault};
 use super::preprocess::median;
 use super::reader::Column;
 use super::segment::{Recording, Segment, stretches};
@@ -23,15 +21,13 @@ pub const JOINT_MARGIN_RAD: f64 = 0.05;
 /// Largest speed of the body along an axis, in m/s.
 pub const BODY_SPEED_M_S: f64 = 10.0;
 const BODY_RATE_RAD_S: f64 = 30.0; // largest rate of a body angle, in rad/s
-/// Disagreement of a rate with differences, as a share of the 95th percentile of that rate, that is still accepted on
-/// top of the floor and of what the noise of the differentiated column explains.
+/// Disagreement of a rate with differences that is accepted, as a share of the 95th percentile of that rate.
 const CONSISTENCY_SHARE: f64 = 0.3;
 /// Floor of that disagreement for velocities: joints, body linear, body angular.
 const VELOCITY_FLOOR: [f64; 3] = [1.0, 0.2, 0.5];
-const ACCELERATION_FLOOR: [f64; 3] = [100.0, 10.0, 50.0]; // the same for accelerations
+const RATE_FLOOR: [f64; 3] = [100.0, 10.0, 50.0]; // the same for accelerations
 const BODY_XY: Range<usize> = JOINT_DIM..JOINT_DIM + 2; // coordinates of the body along the floor
-/// Equal consecutive velocities at an extreme that count as clipped.
-const CLIPPED_SAMPLES: usize = 5;
+const CLIPPED_SAMPLES: usize = 5; // equal consecutive velocities at an extreme that count as clipped
 const STEP_SHARE: f64 = 0.5; // departure of a time step from the median, as a share of it
 
 /// What is wrong with a run of samples; a finding's `bound` is what its `value` breaks.
@@ -47,10 +43,9 @@ pub enum Implausible {
     Acceleration,
     Clipped,
     TimeStep,
-    /// A leg on the ground is near a singularity: `value` is the span of thigh and calf (its knee's column) or the
-    /// height of its hip over the foot (its flexion's column), both normalised as in
-    /// [`LegGeometry::spans`](crate::robot::LegGeometry::spans), `bound` where damping begins. The robot may well have
-    /// done that, so that such samples are reported, and never left out.
+    /// `value` is the span of thigh and calf (the knee's column) or the height of the hip over the foot (the flexion's),
+    /// as in [`LegGeometry::spans`](crate::robot::LegGeometry::spans), `bound` where damping begins. The robot may well
+    /// have done that: such samples are reported, and never left out.
     NearSingular,
 }
 
@@ -76,24 +71,17 @@ impl Implausible {
     }
 }
 
-/// A run of implausible samples in one column.
+/// A run of implausible samples in one column, with its first row in the file and that of its worst value.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "the names say it")]
 pub struct Finding {
-    /// What is wrong.
     pub kind: Implausible,
-    /// Index of the segment.
     pub segment: usize,
-    /// Samples of the segment.
     pub samples: Range<usize>,
-    /// First line of the file.
     pub first_row: usize,
-    /// Line of the worst sample.
     pub worst_row: usize,
-    /// The column.
     pub column: String,
-    /// The worst value, in the column's unit.
     pub value: f64,
-    /// What it is measured against.
     pub bound: f64,
 }
 
@@ -116,16 +104,15 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Everything implausible in a recording, in the order of its rows.
-///
-/// Neighbouring samples with the same fault in the same column are one finding.
+/// Everything implausible in a recording, in the order of its rows; neighbours with one fault are one finding.
 pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
     let mut out = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {
+        let found = &mut out;
         let mut scan = Scan {
             segment,
             index,
-            found: &mut out,
+            found,
         };
         scan.limits(robot);
         scan.singularities(robot);
@@ -142,15 +129,12 @@ pub fn check(recording: &Recording, robot: &Robot) -> Vec<Finding> {
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`] if nothing remains.
-pub fn without(
-    recording: &Recording,
-    findings: &[Finding],
-) -> Result<(Recording, usize), RecordingError> {
+pub fn without(recording: &Recording, findings: &[Finding]) -> Outcome<(Recording, usize)> {
     let mut segments = Vec::new();
     for (index, segment) in recording.segments.iter().enumerate() {
         let mut keep = vec![true; segment.len()];
-        let own = findings.iter().filter(|f| f.segment == index);
-        for finding in own.filter(|f| f.kind.can_be_left_out()) {
+        let is_own = |f: &&Finding| f.segment == index && f.kind.can_be_left_out();
+        for finding in findings.iter().filter(is_own) {
             let end = finding.samples.end.min(keep.len());
             keep[finding.samples.start.min(end)..end].fill(false);
         }
@@ -173,7 +157,6 @@ struct Scan<'a> {
     found: &'a mut Vec<Finding>,
 }
 
-/// A value and the bound it breaks.
 pub(super) type Breach = Option<(f64, f64)>;
 
 impl Scan<'_> {
@@ -241,10 +224,10 @@ impl Scan<'_> {
     fn singularities(&mut self, robot: &Robot) {
         let segment = self.segment;
         for leg in Leg::ALL {
-            let first = LEG_JOINT_DIM * leg.index();
-            let joint_of = [(2, LEAST_SPAN), (1, LEAST_HEIGHT)];
-            for (span, (joint, least)) in joint_of.into_iter().enumerate() {
-                let column = Column::Position(first + joint);
+            for (span, (joint, least)) in
+                [(2, LEAST_SPAN), (1, LEAST_HEIGHT)].into_iter().enumerate()
+            {
+                let column = Column::Position(LEG_JOINT_DIM * leg.index() + joint);
                 self.column(Implausible::NearSingular, column, |j| {
                     let q = leg.of_joints(&segment.joints(j));
                     let value = robot.geometry(leg).spans(&q)[span];
@@ -255,19 +238,19 @@ impl Scan<'_> {
     }
 
     fn consistency(&mut self) {
-        let segment = self.segment;
+        let time_s = &self.segment.time_s;
         for i in 0..STATE_DIM {
-            let [x, dx, ddx] = [&segment.x, &segment.dx, &segment.ddx].map(|m| row(m, i));
-            let of_dx = (Column::Velocity(i), VELOCITY_FLOOR, &x, &dx);
-            let of_ddx = (Column::Acceleration(i), ACCELERATION_FLOOR, &dx, &ddx);
-            let kinds = [Implausible::Velocity, Implausible::Acceleration];
-            for (kind, (column, floor, values, rates)) in kinds.into_iter().zip([of_dx, of_ddx]) {
+            let [x, dx, ddx] = [&self.segment.x, &self.segment.dx, &self.segment.ddx]
+                .map(|matrix| Vec::from_iter(matrix.row(i).iter().copied()));
+            let (of_dx, of_ddx) = (Column::Velocity(i), Column::Acceleration(i));
+            for (kind, column, floor, values, rates) in [
+                (Implausible::Velocity, of_dx, VELOCITY_FLOOR, &x, &dx),
+                (Implausible::Acceleration, of_ddx, RATE_FLOOR, &dx, &ddx),
+            ] {
                 let slack = floor[group(i)]
                     + CONSISTENCY_SHARE * quantile(rates.iter().map(|v| v.abs()), 0.95)
-                    + noise(&segment.time_s, values);
-                self.column(kind, column, |j| {
-                    disagrees(&segment.time_s, values, rates, j, slack)
-                });
+                    + noise(time_s, values);
+                self.column(kind, column, |j| disagrees(time_s, values, rates, j, slack));
             }
         }
     }
@@ -295,8 +278,7 @@ impl Scan<'_> {
 
     fn time_steps(&mut self) {
         let segment = self.segment;
-        let steps = segment.time_s.windows(2).map(|pair| pair[1] - pair[0]);
-        let median = median(steps);
+        let median = median(segment.time_s.windows(2).map(|pair| pair[1] - pair[0]));
         self.column(Implausible::TimeStep, Column::Time, |j| {
             let step = segment.time_s[j] - segment.time_s[j.checked_sub(1)?];
             ((step - median).abs() > STEP_SHARE * median).then_some((step, median))
@@ -321,10 +303,6 @@ pub(super) fn outside(value: f64, low: f64, high: f64) -> Breach {
     }
 }
 
-fn row(matrix: &DMatrix<f64>, index: usize) -> Vec<f64> {
-    matrix.row(index).iter().copied().collect()
-}
-
 /// The value below which a share of the values lies; 0 if there are none.
 pub(super) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
@@ -333,20 +311,17 @@ pub(super) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     sorted.get(place).copied().unwrap_or(0.0)
 }
 
-/// Slope of `values` from the sample before `j`.
 fn slope(time_s: &[f64], values: &[f64], j: usize) -> f64 {
     (values[j] - values[j - 1]) / (time_s[j] - time_s[j - 1])
 }
 
-/// Three times the median change of slope from step to step: what sensor noise puts between a rate and the differences
-/// of a noisy value.
+/// Three times the median change of slope from step to step: what noise puts between a rate and differences.
 fn noise(time_s: &[f64], values: &[f64]) -> f64 {
     let change = |j: usize| (slope(time_s, values, j + 1) - slope(time_s, values, j)).abs();
     3.0 * quantile((1..values.len().saturating_sub(1)).map(change), 0.5)
 }
 
-/// Compares the rate recorded at a sample with the slopes of the values before and after it: a rate lies between the
-/// two unless it turns within the steps.
+/// A rate lies between the slopes of the values before and after it unless it turns within the steps.
 fn disagrees(time_s: &[f64], values: &[f64], rates: &[f64], j: usize, slack: f64) -> Breach {
     if j == 0 || j + 1 >= rates.len() {
         return None;

@@ -1,11 +1,8 @@
 //! Segments whose time stamps disagree with their motion, mended.
 //!
-//! A logger that counts its samples instead of reading a clock says that time passes evenly even where samples came
-//! late or were lost. The velocities know better: between two samples the robot moved by velocity times elapsed time,
-//! in every coordinate. A clock is wrong for all of them alike: where they disagree, a coordinate is wrong, not the
-//! clock.
-//!
-//! Times of clocks that count from an epoch, kept to the nanosecond.
+//! A logger that counts its samples says that time passes evenly even where samples came late or were lost; between two
+//! samples the robot moved by velocity times elapsed time. A clock is wrong for all coordinates alike: where they
+//! disagree, a coordinate is wrong. Also times of clocks that count from an epoch, kept to the nanosecond.
 
 use super::error::RecordingError;
 use super::lines::count;
@@ -13,19 +10,15 @@ use super::preprocess::{differences, median, resampled};
 use super::segment::Segment;
 use crate::robot::{BODY_DIM, JOINT_DIM};
 
-/// Elapsed over stamped time from which a segment's clock is replaced.
-const LEAST_DISAGREEMENT: f64 = 0.03;
-/// Weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2.
-const JOINT_WEIGHT: f64 = 0.01;
+const LEAST_DISAGREEMENT: f64 = 0.03; // elapsed over stamped time from which a segment's clock is replaced
+const JOINT_WEIGHT: f64 = 0.01; // weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2
 const STANDSTILL: f64 = 1e-3; // motion that counts as evidence of either clock, (m/s)^2
 /// Largest difference of a coordinate's ratio of elapsed to stamped time from the median that agrees with it, relative.
 const AGREES: f64 = 0.25;
 /// Joints and position of the body: angles of the body are mended by themselves.
 const COORDINATES: usize = JOINT_DIM + BODY_DIM / 2;
-/// Samples closer than this share of a step are the same sample, logged again.
-const SAME_SAMPLE: f64 = 0.4;
-/// Steps between two samples from which what lies between them is lost rather than late.
-const LOST_STEPS: f64 = 5.0;
+const SAME_SAMPLE: f64 = 0.4; // samples closer than this share of a step are the same sample, logged again
+const LOST_STEPS: f64 = 5.0; // steps between two samples from which what lies between them is lost rather than late
 /// Disagreement of the trunk's angular rates with its angles from which they are replaced.
 const RATE_DISAGREEMENT: f64 = 0.2;
 const EVEN: f64 = 0.01; // unevenness of time steps, relative, from which a segment is resampled
@@ -33,7 +26,7 @@ const EVEN: f64 = 0.01; // unevenness of time steps, relative, from which a segm
 /// A segment at even time steps, and what its own clock said.
 #[derive(Debug, Clone)]
 pub struct Timed {
-    /// The segment.
+    /// At even steps.
     pub segment: Segment,
     /// Time that passed by the motion, over time that passed by the stamps.
     pub elapsed_ratio: f64,
@@ -46,8 +39,7 @@ pub struct Timed {
 /// What was mended in a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mended {
-    /// Where times were rebuilt, time that passed by the motion over time that passed by the stamps; [`Timed`] has it
-    /// also of clocks that agree.
+    /// Where times were rebuilt, time that passed by the motion over time that passed by the stamps.
     pub elapsed_ratio: Option<f64>,
     /// Whether steps were uneven and the segment is resampled.
     pub resampled: bool,
@@ -92,8 +84,7 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     })
 }
 
-/// The coordinates without those that move and disagree on how fast time passes; none if more than a third of those
-/// that move do, or if the joints disagree with the body: one of the two is wrong, not the clock.
+/// The coordinates that agree on how fast time passes; none if a third disagrees, or the joints with the body.
 fn agreeing_coordinates(segment: &Segment) -> Vec<usize> {
     let least = STANDSTILL * segment.duration_s();
     let ratio = |row: usize| ratio(&Interval::all(segment, &[row]), least);
@@ -126,7 +117,6 @@ fn ratio(intervals: &[Interval], least: f64) -> Option<f64> {
     (stamped > least).then(|| moved / stamped)
 }
 
-/// Which times lie between samples that are more than [`LOST_STEPS`] apart.
 fn lost(samples_s: &[f64], time_s: &[f64], step_s: f64) -> Vec<bool> {
     let mut right = 1;
     let of = |time: &f64| {
@@ -165,9 +155,6 @@ fn by_motion(segment: &Segment, elapsed: &[Interval]) -> Segment {
 }
 
 /// Replaces the trunk's angular rates by differences of its angles if the two disagree; whether so.
-///
-/// Rates that clip, that are differences over wrong stamps, or that a gyroscope measured about the trunk's own axes are
-/// no rates of roll, pitch and yaw.
 fn replace_angular_rates(segment: &mut Segment) -> bool {
     const FIRST: usize = JOINT_DIM + BODY_DIM / 2;
     let angles = segment.x.rows(FIRST, BODY_DIM / 2).into_owned();
@@ -210,7 +197,6 @@ impl Interval {
         }
     }
 
-    /// Time that passed, s, at least none.
     fn elapsed_s(&self) -> f64 {
         let time = (self.moved + STANDSTILL * self.stamped_s) / (self.speed + STANDSTILL);
         time.max(0.0)
@@ -219,7 +205,7 @@ impl Interval {
 
 /// A time as whole units and the rest, so that nanoseconds since 1970 lose nothing in differences.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Instant {
+pub(crate) struct Instant {
     pub whole: i64,
     pub rest: f64,
 }
@@ -227,11 +213,8 @@ pub(super) struct Instant {
 impl Instant {
     /// A time of a clock whose values need no care.
     pub(crate) fn of(value: f64) -> Option<Self> {
-        let whole = value.floor();
-        (whole.abs() < 9e18).then_some(Instant {
-            whole: whole as i64,
-            rest: value - whole,
-        })
+        let (whole, rest) = (value.floor() as i64, value - value.floor());
+        (value.floor().abs() < 9e18).then_some(Instant { whole, rest })
     }
 
     pub(crate) fn since(self, start: Instant) -> f64 {
@@ -245,26 +228,21 @@ impl Instant {
     /// A decimal number of any length, with a decimal point; `None` for other text.
     pub(crate) fn from_decimal(text: &str) -> Option<Self> {
         let (whole, rest) = text.split_once('.').unwrap_or((text, "0"));
-        if !is_digits(rest) {
-            return None;
-        }
-        Some(Instant {
-            whole: self::whole(whole)?,
-            rest: format!("0.{rest}").parse().ok()?,
-        })
+        let is_fraction = !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit());
+        let fraction = || format!("0.{rest}").parse().ok();
+        let (whole, rest) = (self::whole(whole)?, is_fraction.then(fraction)??);
+        Some(Instant { whole, rest })
     }
 
-    /// A date and time as ISO 8601 writes it, in s since 1970: `2026-03-01T12:00:00.002Z`, with a blank for the `T` and
-    /// `+01:00` for the `Z` if need be; or a time of day alone, `12:00:00.002`.
+    /// A date and time as ISO 8601 writes it, or a time of day alone, in s since 1970; also with blanks and commas.
     pub(crate) fn from_iso(text: &str) -> Option<Self> {
         if count(text, ':') == 0 {
             return None;
         }
-        let (date, time) = match text.split_once(['T', 't', ' ']) {
-            Some((date, time)) => (Some(date), time.trim_start()),
-            None => (None, text),
+        let (days, time) = match text.split_once(['T', 't', ' ']) {
+            Some((date, time)) => (days_since_1970(date)?, time.trim_start()),
+            None => (0, text),
         };
-        let days = date.map_or(Some(0), days_since_1970)?;
         let (clock, zone_s) = without_zone(time)?;
         let mut parts = clock.split(':');
         let (hour, minute) = (whole(parts.next()?)?, whole(parts.next()?)?);
@@ -272,13 +250,12 @@ impl Instant {
         if parts.next().is_some() || hour > 24 || minute > 59 || second.whole > 60 {
             return None;
         }
-        Some(Instant {
-            whole: days * 86_400 + hour * 3600 + minute * 60 + second.whole - zone_s,
-            rest: second.rest,
-        })
+        let whole = days * 86_400 + hour * 3600 + minute * 60 + second.whole - zone_s;
+        Some(Instant { whole, ..second })
     }
 }
 
+/// The time of day, and what its zone is ahead of Greenwich, in s.
 fn without_zone(time: &str) -> Option<(&str, i64)> {
     if let Some(clock) = time.strip_suffix(['Z', 'z']) {
         return Some((clock, 0));
@@ -287,73 +264,33 @@ fn without_zone(time: &str) -> Option<(&str, i64)> {
         return Some((time, 0));
     };
     let (clock, zone) = time.split_at(place);
-    let sign = if zone.starts_with('-') { -1 } else { 1 };
-    let digits: String = zone[1..].chars().filter(|c| *c != ':').collect();
-    let (hours, minutes) = match digits.len() {
-        2 => (whole(&digits)?, 0),
-        4 => (whole(&digits[..2])?, whole(&digits[2..])?),
+    let digits = zone[1..].replace(':', "");
+    let minutes = match (digits.len(), whole(&digits)?) {
+        (2, hours) => hours * 60,
+        (4, both) => both / 100 * 60 + both % 100,
         _ => return None,
     };
-    Some((clock, sign * (hours * 3600 + minutes * 60)))
-}
-
-fn is_digits(text: &str) -> bool {
-    !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
+    let sign = if zone.starts_with('-') { -60 } else { 60 };
+    Some((clock, sign * minutes))
 }
 
 fn whole(text: &str) -> Option<i64> {
-    text.parse().ok().filter(|_| is_digits(text))
+    let is_number = text.bytes().all(|b| b.is_ascii_digit());
+    text.parse().ok().filter(|_| is_number)
 }
 
 /// Days from 1970-01-01 to a date of the Gregorian calendar, `2026-03-01`.
 fn days_since_1970(date: &str) -> Option<i64> {
-    let mut parts = date.trim().split(['-', '/']);
-    let mut next = || whole(parts.next()?);
-    let (year, month, day) = (next()?, next()?, next()?);
-    let valid = (1..=12).contains(&month) && (1..=31).contains(&day) && year < 10_000;
-    if parts.next().is_some() || !valid {
+    let parts = date.trim().split(['-', '/']).map(whole);
+    let [year, month, day] = parts.collect::<Option<Vec<_>>>()?[..] else {
+        return None;
+    };
+    if !(1..=12).contains(&month) || !(1..=31).contains(&day) || year >= 10_000 {
         return None;
     }
     // Years that begin in March end with the leap day.
-    let (year, month) = match month > 2 {
-        true => (year, month - 3),
-        false => (year - 1, month + 9),
-    };
+    let year = year - i64::from(month < 3);
     let leap_days = year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
-    let day_of_year = (153 * month + 2) / 5 + day - 1;
+    let day_of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
     Some(365 * year + leap_days + day_of_year - 719_468)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn iso(text: &str) -> f64 {
-        Instant::from_iso(text).expect(text).value()
-    }
-
-    #[test]
-    fn from_iso_dates_of_every_kind_are_seconds_since_1970() {
-        assert_eq!(iso("1970-01-01T00:00:00Z"), 0.0);
-        assert_eq!(iso("2000-02-29T12:00:00"), 951_825_600.0);
-        assert_eq!(iso("2024-03-01 00:00:01,5"), 1_709_251_201.5);
-        assert_eq!(iso("2024-03-01T02:00:00+02:00"), 1_709_251_200.0);
-        assert_eq!(iso("2024-02-29T22:30:00-0130"), 1_709_251_200.0);
-        assert_eq!(iso("00:01:02.25"), 62.25);
-        for text in "12|2024-13-01T00:00:00|2024-01-01T|a:b|1:2:3:4|1:2:3+x".split('|') {
-            assert_eq!(Instant::from_iso(text), None, "{text}");
-        }
-    }
-
-    #[test]
-    fn since_keeps_nanoseconds_of_an_epoch() {
-        let at = |text| Instant::from_decimal(text).unwrap();
-        let start = at("1700000000123456789");
-        assert_eq!(at("1700000000125456790").since(start), 2_000_001.0);
-        let start = at("1700000000.123456789");
-        assert!((at("1700000000.125456790").since(start) - 0.002_000_001).abs() < 1e-15);
-        assert_eq!(Instant::from_decimal("-1"), None);
-        let (whole, rest) = (-1, 0.75);
-        assert_eq!(Instant::of(-0.25), Some(Instant { whole, rest }));
-    }
 }

@@ -1,7 +1,5 @@
-//! Sets of recordings: read once, checked and conditioned, held in memory.
-//!
-//! Recordings made ready for training: implausible samples are found and, when asked, left out; accelerations are
-//! recomputed and rows smoothed, when asked.
+//! Sets of recordings: read once, checked and conditioned, held in memory. When asked, implausible samples are left
+//! out, accelerations recomputed and rows smoothed.
 
 use std::path::PathBuf;
 
@@ -10,15 +8,14 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::check::{Finding, check, without};
-use super::error::{RecordingError, RecordingFault};
+use super::error::{Outcome, RecordingError, RecordingFault};
 use super::mismatch::{Balance, Mismatch, contradiction, mismatches};
 use super::preprocess::{SavitzkyGolay, differences};
 use super::reader::{Clocks, Reader, Reading, ReadingNotes};
 use super::segment::{Recording, Segment};
 use crate::robot::Robot;
 
-/// Half the window over which rows of late samples are smoothed, in s.
-const HALF_SMOOTHING_S: f64 = 0.015;
+const HALF_SMOOTHING_S: f64 = 0.015; // half the window over which rows of late samples are smoothed, in s
 const SMOOTHING_ORDER: usize = 3; // degree of the polynomials that smooth them
 
 /// A file, or some of its segments.
@@ -30,30 +27,24 @@ pub struct RecordingFile {
     pub segments: Option<Vec<usize>>,
 }
 
-/// The recordings of several files, ready for training, and notes on them.
+/// The recordings of several files, checked and conditioned, in their order, and notes on them.
 #[derive(Clone, Debug, Default)]
+#[allow(missing_docs, reason = "the types say it")]
 pub struct RecordingSet {
-    /// Checked and conditioned, in the order of the files.
     pub recordings: Vec<Recording>,
-    /// Implausible runs of samples with their files.
     pub findings: Vec<(PathBuf, Finding)>,
-    /// What cannot be true of the robot, with the files.
     pub mismatches: Vec<(PathBuf, Mismatch)>,
     /// Number of samples that were left out.
     pub left_out: usize,
-    /// What reading did besides reading.
     pub reading: ReadingNotes,
-    /// What forces and accelerations of each recording come to, with its file.
     balances: Vec<(PathBuf, Balance)>,
 }
 
 impl RecordingSet {
-    /// Reads files of recordings of `robot`, two at a time where there are two cores; `self` has what was read before
-    /// an error.
+    /// Reads recordings of `robot`, two at a time where there are two cores; `self` has what was read before an error.
     ///
     /// # Errors
-    /// The first fault in the order of the files; [`RecordingFault::Contradiction`] for a recording that contradicts
-    /// physics or the others.
+    /// The first fault in the order of the files, or a recording that contradicts physics or the others.
     pub fn read(
         &mut self,
         files: &[RecordingFile],
@@ -80,11 +71,10 @@ impl RecordingSet {
         let (paths, balances): (Vec<_>, Vec<_>) = self.balances.drain(..).unzip();
         match contradiction(&balances) {
             None => Ok(()),
-            Some((at, found)) => Err(RecordingFault::Contradiction(found).of(&paths[at])),
+            Some((at, found)) => Err(RecordingFault::contradiction(&found).of(&paths[at])),
         }
     }
 
-    /// Adds other recordings and what was found in them, but not what reading them did.
     pub(crate) fn append(&mut self, other: Self) {
         self.recordings.extend(other.recordings);
         self.findings.extend(other.findings);
@@ -112,13 +102,12 @@ pub fn as_recorded(
     Ok(recordings)
 }
 
-/// The recordings of one file, and its reading without samples.
 fn read_file(
     file: &RecordingFile,
     robot: &Robot,
     options: &ConditionOptions,
     reader: &Reader,
-) -> Result<(RecordingSet, Reading), RecordingError> {
+) -> Outcome<(RecordingSet, Reading)> {
     let mut reading = reader.read(&file.path)?;
     let options = options_for(&mut reading, options)?;
     let segments = std::mem::take(&mut reading.recording.segments);
@@ -128,7 +117,7 @@ fn read_file(
         let findings = check(&recording, robot);
         for found in mismatches(&recording, robot) {
             if found.kind == "fallen" {
-                return Err(RecordingFault::Contradiction(found.words).of(&path));
+                return Err(RecordingFault::contradiction(&found.words).of(&path));
             }
             set.mismatches.push((path.clone(), found));
         }
@@ -143,29 +132,20 @@ fn read_file(
     Ok((set, reading))
 }
 
-/// The steps for one recording: where times were rebuilt, which is where samples came late or were lost, rows are
-/// smoothed unless a filter is asked for.
-fn options_for(
-    reading: &mut Reading,
-    options: &ConditionOptions,
-) -> Result<ConditionOptions, RecordingError> {
+/// The steps for one recording: where times were rebuilt, rows are smoothed unless a filter is asked for.
+fn options_for(reading: &mut Reading, options: &ConditionOptions) -> Outcome<ConditionOptions> {
     let mut options = options.clone();
     let rebuilt = (reading.mended.iter()).any(|mended| mended.elapsed_ratio.is_some());
     let segments = || reading.recording.segments.iter();
     let step_s = segments().map(Segment::mean_step_s).fold(0.0, f64::max);
     let half = (HALF_SMOOTHING_S / step_s).round();
-    let window = if half.is_finite() {
-        2 * half as usize + 1
-    } else {
-        1
-    };
+    let window = 1 + 2 * if half.is_finite() { half as usize } else { 0 };
     let fits = segments().all(|segment| segment.len() >= window);
     if options.smoothing.is_none() && rebuilt && window > SMOOTHING_ORDER && fits {
         let filter = SavitzkyGolay::new(window, SMOOTHING_ORDER)?;
         options.smoothing = Some((filter, SmoothedRows::All));
-        reading.notes.push(format!(
-            "rows are smoothed (--smooth {window},{SMOOTHING_ORDER} --smooth-rows all)"
-        ));
+        let option = format!("--smooth {window},{SMOOTHING_ORDER} --smooth-rows all");
+        reading.notes.push(format!("rows are smoothed ({option})"));
     }
     Ok(options)
 }
@@ -255,12 +235,7 @@ pub fn condition(
     Ok((kept, left_out))
 }
 
-/// Smooths a segment along time.
-fn smooth(
-    segment: &mut Segment,
-    filter: &SavitzkyGolay,
-    rows: SmoothedRows,
-) -> Result<(), RecordingError> {
+fn smooth(segment: &mut Segment, filter: &SavitzkyGolay, rows: SmoothedRows) -> Outcome<()> {
     if segment.len() < filter.window() {
         let fault = RecordingFault::too_short(segment.len(), filter.window());
         return Err(fault.at(&segment.path, segment.row(0)));
@@ -276,8 +251,7 @@ fn smooth(
     Ok(())
 }
 
-/// The recording without segments under `least` samples.
-fn long_enough(mut recording: Recording, least: usize) -> Result<Recording, RecordingError> {
+fn long_enough(mut recording: Recording, least: usize) -> Outcome<Recording> {
     let longest = recording.segments.iter().max_by_key(|part| part.len());
     let (row, found) = longest.map_or((1, 0), |part| (part.first_row, part.len()));
     recording.segments.retain(|segment| segment.len() >= least);

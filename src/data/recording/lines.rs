@@ -6,7 +6,7 @@ use std::path::Path;
 
 use flate2::bufread::MultiGzDecoder;
 
-use super::error::{RecordingError, RecordingFault};
+use super::error::{Outcome, RecordingError, RecordingFault, io_fault, unexpected};
 use crate::files::magic::{MAGIC_BYTES, recognised};
 use crate::files::size::{Capped, Format};
 
@@ -15,9 +15,7 @@ pub(super) const MAX_ROWS: usize = 1_000_000;
 /// Longest line accepted, in bytes: some thirty times a row of 71 columns.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
 
-/// Most empty lines in a row, and in all beyond one for each that is not; compressed, billions would fit into a small
-/// file.
-const MAX_BLANK_ROWS: usize = 10_000;
+const MAX_BLANK_ROWS: usize = 10_000; // most empty lines in a row, and in all beyond one for each that is not
 
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
@@ -32,25 +30,18 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub(crate) fn open(path: &'a Path) -> Result<Self, RecordingError> {
-        let file = File::open(path)
-            .map_err(|source| RecordingFault::unreadable("open", source).of(path))?;
+    pub(crate) fn open(path: &'a Path) -> Outcome<Self> {
+        let file = File::open(path).map_err(|source| io_fault("open", source).of(path))?;
         let size = file.metadata().ok().filter(fs::Metadata::is_file);
         Self::of(path, file, size.map_or(u64::MAX, |size| size.len()))
     }
 
-    /// Of a source of so many bytes, which bound what they may unpack to: plain or gzip, found from the first two
-    /// bytes; `path` stands for it in messages.
-    pub(crate) fn of(
-        path: &'a Path,
-        mut source: impl Read + 'a,
-        size: u64,
-    ) -> Result<Self, RecordingError> {
+    /// Of a source of so many bytes, which bound what they may unpack to, plain or gzip.
+    pub(crate) fn of(path: &'a Path, mut source: impl Read + 'a, size: u64) -> Outcome<Self> {
         let mut start = Vec::with_capacity(MAGIC_BYTES);
-        (&mut source)
-            .take(MAGIC_BYTES as u64)
-            .read_to_end(&mut start)
-            .map_err(|source| RecordingFault::io("read", source).of(path))?;
+        let mut first = (&mut source).take(MAGIC_BYTES as u64);
+        let read = first.read_to_end(&mut start);
+        read.map_err(|source| io_fault("read", source).of(path))?;
         let compressed = start.starts_with(&GZIP_MAGIC);
         let plain = recognised(path, &start).filter(|_| !compressed);
         let source = io::Cursor::new(start).chain(source);
@@ -80,28 +71,21 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// The next row's number and text; `None` at the end of the file.
-    pub(crate) fn next_row(&mut self) -> Result<Option<(usize, &str)>, RecordingError> {
+    pub(crate) fn next_row(&mut self) -> Outcome<Option<(usize, &str)>> {
         self.row += 1;
         self.buffer.clear();
         let most = MAX_LINE_BYTES as u64 + 1;
-        let read = (&mut self.source)
-            .take(most)
-            .read_until(b'\n', &mut self.buffer)
-            .map_err(|source| self.read_error(source))?;
-        if read == 0 {
+        let mut source = (&mut self.source).take(most);
+        let read = source.read_until(b'\n', &mut self.buffer);
+        if read.map_err(|source| self.read_error(source))? == 0 {
             return Ok(None);
         }
-        if self.buffer.last() == Some(&b'\n') {
-            self.buffer.pop();
-            if self.buffer.last() == Some(&b'\r') {
-                self.buffer.pop();
-            }
+        if self.buffer.pop_if(|last| *last == b'\n').is_some() {
+            self.buffer.pop_if(|last| *last == b'\r');
         }
         if self.buffer.len() > MAX_LINE_BYTES {
             let found = format!("a line of more than {MAX_LINE_BYTES} bytes");
-            let fault = RecordingFault::unexpected(found, "a recording");
-            return Err(fault.at(self.path, self.row));
+            return Err(unexpected(found, "a recording").at(self.path, self.row));
         }
         self.count_blank()?;
         let bytes = match self.buffer.strip_prefix(b"\xef\xbb\xbf") {
@@ -113,12 +97,12 @@ impl<'a> Lines<'a> {
             Err(error) => {
                 let at = error.valid_up_to();
                 let found = format!("0x{:02x} as byte {}", bytes[at], at + 1);
-                Err(RecordingFault::unexpected(found, "UTF-8 text").at(self.path, self.row))
+                Err(unexpected(found, "UTF-8 text").at(self.path, self.row))
             }
         }
     }
 
-    fn count_blank(&mut self) -> Result<(), RecordingError> {
+    fn count_blank(&mut self) -> Outcome<()> {
         let is_blank = match self.buffer.first() {
             Some(first) if first.is_ascii_graphic() => false,
             _ => String::from_utf8_lossy(&self.buffer).trim().is_empty(),
@@ -131,8 +115,7 @@ impl<'a> Lines<'a> {
         let filled = self.row - *all;
         if *since > MAX_BLANK_ROWS || *all > filled.saturating_add(MAX_BLANK_ROWS) {
             let found = format!("more than {MAX_BLANK_ROWS} empty lines");
-            let fault = RecordingFault::unexpected(found, "samples or the end");
-            return Err(fault.at(self.path, self.row));
+            return Err(unexpected(found, "samples or the end").at(self.path, self.row));
         }
         Ok(())
     }
@@ -140,14 +123,12 @@ impl<'a> Lines<'a> {
     fn read_error(&self, source: io::Error) -> RecordingError {
         match self.compressed && source.kind() != io::ErrorKind::FileTooLarge {
             true => RecordingFault::Gzip(source).at(self.path, self.row.max(1)),
-            false => RecordingFault::io("read", source).of(self.path),
+            false => io_fault("read", source).of(self.path),
         }
     }
 }
 
-/// The cells of a line, trimmed and without their quotes.
-///
-/// A delimiter (an ASCII character) inside a pair of double quotes does not separate.
+/// The cells of a line, trimmed and without their quotes, inside which a delimiter (in ASCII) does not separate.
 pub(super) fn cells(line: &str, delimiter: char) -> impl Iterator<Item = &str> {
     let mut rest = Some(line);
     std::iter::from_fn(move || {
@@ -176,16 +157,9 @@ fn trimmed(cell: &str) -> &str {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Mark {
-    Point,
-    Comma,
-}
-
-/// Reads cells, and learns the file's decimal mark from them.
 #[derive(Debug)]
 pub(super) struct NumberReader {
-    mark: Option<Mark>, // the first one met holds for the rest
+    mark: Option<u8>, // `.` or `,`: the first one met holds for the rest
     pointed: String,
 }
 
@@ -193,7 +167,7 @@ impl NumberReader {
     /// Of cells that are separated by this character: between commas the mark is a point.
     pub(crate) fn new(delimiter: char) -> Self {
         NumberReader {
-            mark: (delimiter == ',').then_some(Mark::Point),
+            mark: (delimiter == ',').then_some(b'.'),
             pointed: String::new(),
         }
     }
@@ -201,8 +175,8 @@ impl NumberReader {
     pub(crate) fn expected(&self) -> &'static str {
         match self.mark {
             None => "a number",
-            Some(Mark::Point) => "a number with a decimal point",
-            Some(Mark::Comma) => "a number with a decimal comma",
+            Some(b'.') => "a number with a decimal point",
+            Some(_) => "a number with a decimal comma",
         }
     }
 
@@ -211,23 +185,18 @@ impl NumberReader {
         let Some(place) = cell.bytes().position(|b| b == b'.' || b == b',') else {
             return cell.parse().ok();
         };
-        let found = match cell.as_bytes()[place] {
-            b'.' => Mark::Point,
-            _ => Mark::Comma,
-        };
+        let found = cell.as_bytes()[place];
         if self.mark.is_some_and(|mark| mark != found) {
             return None;
         }
-        let value = match found {
-            Mark::Point => cell.parse().ok()?,
-            Mark::Comma => {
-                // A second mark of either kind fails to parse.
-                let (whole, rest) = (&cell[..place], &cell[place + 1..]);
-                self.pointed.clear();
-                self.pointed.extend([whole, ".", rest]);
-                self.pointed.parse().ok()?
-            }
-        };
+        // A second mark of either kind fails to parse.
+        let mut pointed = cell;
+        if found == b',' {
+            self.pointed.clear();
+            (self.pointed).extend([&cell[..place], ".", &cell[place + 1..]]);
+            pointed = &self.pointed;
+        }
+        let value = pointed.parse().ok()?;
         self.mark = Some(found);
         Some(value)
     }

@@ -1,36 +1,34 @@
 //! Mismatches: what whole jumps say that cannot be true of this robot.
 //!
-//! [`check`](super::check) looks at samples; a recording in which every sample is possible can still be of another
-//! robot, in other units, or have legs, signs or columns exchanged. The robot's own geometry shows it: a foot on the
-//! ground stays where it is, the feet carry the weight, a body in flight falls, a hip holds the weight on its own side.
-//! Each figure is taken over a whole recording and compared with bounds that leave room for what right recordings of
-//! simulated and real jumps have (`docs/recordings.md` has the table).
+//! A recording in which every sample is possible can still be of another robot, in other units, or have legs, signs or
+//! columns exchanged. The robot's geometry shows it: a foot on the ground stays where it is, the feet carry the weight,
+//! a body in flight falls. Figures over a whole recording are compared with the bounds of `docs/recordings.md`.
 
 mod feet;
 mod stance;
 
 use std::fmt;
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::check::{Breach, check, outside};
 use super::preprocess::{differences, median};
 use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
+use crate::robot_file;
 pub use stance::Balance;
 use stance::{Slip, best_other_place, best_other_reading};
 pub(super) use stance::{foot_place, hip_torque, median_place, stances};
 
-/// Largest root mean square of the places of feet on the ground about their medians, m.
-const SLIP_M: f64 = 0.025;
+const SLIP_M: f64 = 0.025; // largest root mean square of the places of feet on the ground about their medians, m
 /// How many times better feet have to stay in place under another reading of the columns.
 const READING_FACTOR: f64 = 1.4;
 const READING_LEAST_M: f64 = 3e-4; // by how much they have to stay better in place, m
 /// How many times, and by how much, m, feet stay better where they are with the body's place read otherwise.
 const PLACE: (f64, f64) = (2.0, 0.004);
 const FALL_M_S2: (f64, f64) = (-16.0, -6.5); // vertical acceleration of the body in flight, m/s^2
-/// Force of the feet over what weight and acceleration need.
-const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7);
+const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7); // force of the feet over what weight and acceleration need
 /// Least share of the hips' torques that hold the feet on their own side: 1 for vertical forces.
 const HIP_SHARE: f64 = -0.3;
 const HIP_SHARE_OF_PAIR: f64 = -0.5; // the same where both legs of one end alone are below that
@@ -47,17 +45,14 @@ const OTHER_SLIP: f64 = 1.15;
 /// Distance from the origin, m, and turn about the vertical, rad, at which a segment may begin.
 const ORIGIN: (f64, f64) = (1.0, 0.5);
 
-/// Something about a whole recording that cannot be true of the robot.
+/// Something about a whole recording that cannot be true of the robot, its figure and the bound that it breaks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the names say it")]
 pub struct Mismatch {
-    /// What does not fit, one word such as `foot_slip`.
     #[serde(rename = "what")]
     pub kind: &'static str,
-    /// The figure.
     pub value: f64,
-    /// The bound that it breaks.
     pub bound: f64,
-    /// What was found and what it may come from, one sentence.
     pub words: String,
 }
 
@@ -67,15 +62,14 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// The mismatch of a figure that breaks a bound, `(value, bound)`.
 fn mismatch(kind: &'static str, breach: Breach, words: String) -> Option<Mismatch> {
-    let of_breach = |(value, bound)| Mismatch {
+    let (value, bound) = breach?;
+    Some(Mismatch {
         kind,
         value,
         bound,
         words,
-    };
-    breach.map(of_breach)
+    })
 }
 
 /// Everything about a recording that cannot be true of the robot.
@@ -111,7 +105,6 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
 pub struct Figures {
     /// Root mean square of the places of feet on the ground about the medians of their stances.
     foot_slip_m: Option<f64>,
-    /// The same of what feet that stand together do not have in common.
     relative_foot_slip_m: Option<f64>,
     /// That for the best other order of the legs or sign of an angle.
     other_reading_m: Option<f64>,
@@ -132,16 +125,13 @@ impl Figures {
     }
 }
 
-/// What cannot be true of any robot, or of one robot beside the others of these recordings, with the index of the
-/// recording and in words: torques that carry nothing, a body that does not fall in flight, torques that carry another
-/// share of the weight than most.
+/// What cannot be true of any robot, or of one robot: the index of the recording, and words.
 pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
     let each = || balances.iter().enumerate();
     let shares = || each().filter_map(|(at, balance)| Some((at, balance.weight_share?)));
     if let Some((at, share)) = shares().find(|(_, share)| share.abs() < NOTHING_CARRIED) {
-        let words = format!(
-            "its feet bear weight, and its torques carry {share:.3} of it: torques that were not recorded, or in other units"
-        );
+        let found = format!("its feet bear weight, and its torques carry {share:.3} of it");
+        let words = format!("{found}: torques that were not recorded, or in other units");
         return Some((at, words));
     }
     // Velocities may be broken where heights are right.
@@ -164,8 +154,7 @@ pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
     Some((at, words))
 }
 
-/// Notes for people: the mismatches of a recording, and how many runs of samples are implausible, such as the first.
-/// Legs near a singularity are no fault.
+/// Notes for people: the mismatches of a recording, and how many runs of samples are implausible.
 pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
     let path = recording.path.display();
     let found = mismatches(recording, robot);
@@ -175,9 +164,8 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
     let mut faults = findings.iter().filter(|f| f.kind.can_be_left_out());
     if let Some(first) = faults.next() {
         let count = 1 + faults.count();
-        notes.push(format!(
-            "{path}: {count} implausible runs of samples, such as {first}"
-        ));
+        let found = format!("{count} implausible runs of samples, such as {first}");
+        notes.push(format!("{path}: {found}"));
     }
     notes
 }
@@ -215,57 +203,51 @@ fn foot_slip(slip: &Slip) -> Option<Mismatch> {
 fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Mismatch, bool)> {
     // The bound is at least this.
     let value = slip.rms_m().filter(|value| *value > PLACE.1)?;
-    let (best, reading, is_attitude) = best_other_place(recording, robot)?;
+    let (best, (reading, .., elements)) = best_other_place(recording, robot)?;
     let breach = outside(value, 0.0, PLACE.0 * best + PLACE.1);
+    let [value_mm, best_mm] = [1e3 * value, 1e3 * best];
     let words = format!(
-        "feet on the ground move by {:.1} mm, and by {:.1} mm {reading}: is the body's place in another frame than \
-         its attitude?",
-        1e3 * value,
-        1e3 * best
+        "feet on the ground move by {value_mm:.1} mm, and by {best_mm:.1} mm {reading}: is the body's place in another \
+         frame than its attitude?"
     );
-    Some((mismatch("foot_slip", breach, words)?, is_attitude))
+    Some((mismatch("foot_slip", breach, words)?, elements.is_some()))
 }
 
 fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {
     let value = slip.relative_rms_m()?;
     let (best, reading) = best_other_reading(recording, robot)?;
     let breach = outside(value, 0.0, READING_FACTOR * best + READING_LEAST_M);
+    let [value_mm, best_mm] = [1e3 * value, 1e3 * best];
     let words = format!(
-        "feet on the ground move by {:.1} mm against each other, and by {:.1} mm {reading}: are legs or signs \
-         exchanged?",
-        1e3 * value,
-        1e3 * best
+        "feet on the ground move by {value_mm:.1} mm against each other, and by {best_mm:.1} mm {reading}: are legs or \
+         signs exchanged?"
     );
     mismatch("legs_or_signs", breach, words)
 }
 
 fn fall(balance: &Balance) -> Option<Mismatch> {
-    let value = balance.fall_m_s2?;
+    let (value, (low, high)) = (balance.fall_m_s2?, FALL_M_S2);
     let words = format!(
-        "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {} to {}: another axis, sign or \
-         unit, another time, or contacts that are not the feet's",
-        FALL_M_S2.0, FALL_M_S2.1
+        "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {low} to {high}: another axis, sign or \
+         unit, another time, or contacts that are not the feet's"
     );
     mismatch("fall", beyond(value, FALL_M_S2), words)
 }
 
 fn weight(balance: &Balance, robot: &Robot) -> Option<Mismatch> {
-    let value = balance.weight_share?;
+    let (value, (low, high)) = (balance.weight_share?, WEIGHT_SHARE);
+    let mass_kg = (1e6 * robot.mass_kg()).round() / 1e6;
     let words = format!(
-        "the torques carry {value:.3} of what {} kg need ({} to {} are accepted): torques in other units, of \
-         other signs or other joints, or another robot",
-        (1e6 * robot.mass_kg()).round() / 1e6,
-        WEIGHT_SHARE.0,
-        WEIGHT_SHARE.1
+        "the torques carry {value:.3} of what {mass_kg} kg need ({low} to {high} are accepted): torques in other \
+         units, of other signs or other joints, or another robot"
     );
     mismatch("weight", beyond(value, WEIGHT_SHARE), words)
 }
 
 fn hip_torques(balance: &Balance) -> Option<Mismatch> {
     let shares = Leg::ALL.into_iter().zip(balance.hip_share);
-    let is_wrong =
-        |(leg, share): (Leg, Option<f64>)| Some((leg, share.filter(|s| *s < HIP_SHARE)?));
-    let wrong: Vec<(Leg, f64)> = shares.filter_map(is_wrong).collect();
+    let known = shares.filter_map(|(leg, share)| Some((leg, share?)));
+    let wrong: Vec<(Leg, f64)> = known.filter(|(_, share)| *share < HIP_SHARE).collect();
     let value = (wrong.iter().map(|(_, share)| *share)).min_by(f64::total_cmp)?;
     // Both legs of one end alone pull inwards where feet stick and positions are controlled, and less than exchanged
     // ones.
@@ -283,37 +265,33 @@ fn hip_torques(balance: &Balance) -> Option<Mismatch> {
     mismatch("hip_torques", Some((value, HIP_SHARE)), words)
 }
 
+const MILLISECONDS: &str = "velocities per millisecond, or positions in millimetres";
+const TURNS: &str = "positions in degrees and velocities in radians";
 /// Factors by which velocities may be off, with what they come from: a unit with the expected one, or other words.
 const FACTORS: [(f64, &str, &str); 6] = [
     (57.2958, "degrees where radians", "deg/s"),
-    (
-        0.017_453_3,
-        "positions in degrees and velocities in radians",
-        "",
-    ),
+    (0.017_453_3, TURNS, ""),
     (1000.0, "millimetres where metres", "mm/s"),
     (100.0, "centimetres where metres", "cm/s"),
-    (
-        0.001,
-        "velocities per millisecond, or positions in millimetres",
-        "",
-    ),
+    (0.001, MILLISECONDS, ""),
     (-1.0, "the other sign", ""),
 ];
 const FACTOR_SHARE: f64 = 0.1; // distance from such a factor, as a share of it
+/// First row of three groups of rates, the row behind them, and whose they are.
+const RATES: [(usize, usize, &str); 3] = [
+    (0, JOINT_DIM, "the joints"),
+    (JOINT_DIM, JOINT_DIM + 3, "the body"),
+    (JOINT_DIM + 3, STATE_DIM, "roll, pitch and yaw"),
+];
 
 /// Velocities that are a multiple of the changes of their positions.
 fn rates(recording: &Recording) -> Option<Mismatch> {
-    const GROUPS: [(std::ops::Range<usize>, &str); 3] = [
-        (0..JOINT_DIM, "the joints"),
-        (JOINT_DIM..JOINT_DIM + 3, "the body"),
-        (JOINT_DIM + 3..STATE_DIM, "roll, pitch and yaw"),
-    ];
-    GROUPS.into_iter().find_map(|(rows, what)| {
+    RATES.into_iter().find_map(|(first, end, what)| {
         let (mut product, mut squares, mut own) = (0.0, 0.0, 0.0);
         for segment in &recording.segments {
-            let rows = |matrix: &nalgebra::DMatrix<f64>| matrix.rows(rows.start, rows.len()).into_owned();
-            let (slopes, rates) = (differences(&segment.time_s, &rows(&segment.x)), rows(&segment.dx));
+            let rows = |matrix: &DMatrix<f64>| matrix.rows(first, end - first).into_owned();
+            let (angles, rates) = (rows(&segment.x), rows(&segment.dx));
+            let slopes = differences(&segment.time_s, &angles);
             product += slopes.dot(&rates);
             squares += slopes.norm_squared();
             own += rates.norm_squared();
@@ -355,22 +333,20 @@ fn other_robot(
     if own <= OTHER_WEIGHT.0 {
         return None;
     }
-    let others = crate::robot_file::known_names().into_iter();
-    let others = others.filter_map(|name| crate::robot_file::by_name(name).ok());
+    let others = robot_file::known_names().into_iter();
+    let others = others.filter_map(|name| robot_file::by_name(name).ok());
     let explains = others.filter_map(|other| {
         let share = Balance::of(recording, other).weight_share?;
         let fits = share > 0.0 && share.ln().abs() < OTHER_WEIGHT.1;
         let as_well = Slip::of(recording, other).rms_m()? < OTHER_SLIP * own_slip;
         (fits && as_well && other.name() != robot.name()).then_some((share, other))
     });
-    let nearest =
-        |one: &(f64, &Robot), two: &(f64, &Robot)| one.0.ln().abs().total_cmp(&two.0.ln().abs());
-    let (other_share, other) = explains.min_by(nearest)?;
-    let other = other.name();
+    let off = |(share, _): &(f64, &Robot)| share.ln().abs();
+    let (other_share, other) = explains.min_by(|one, two| off(one).total_cmp(&off(two)))?;
+    let (name, other) = (robot.name(), other.name());
     let words = format!(
-        "the torques carry {share:.2} of the weight of a {} and {other_share:.2} of that of a {other}, and feet on \
-         the ground stay in place as well: is it a recording of a {other}?",
-        robot.name(),
+        "the torques carry {share:.2} of the weight of a {name} and {other_share:.2} of that of a {other}, and feet on \
+         the ground stay in place as well: is it a recording of a {other}?"
     );
     mismatch("other_robot", Some((share, OTHER_WEIGHT.0.exp())), words)
 }

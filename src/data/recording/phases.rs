@@ -8,19 +8,18 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use super::error::{RecordingError, RecordingFault};
+use super::error::{RecordingError, listed, text};
 use super::segment::{Segment, stretches};
 use crate::robot::{ContactFlags, FeetRule};
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
 pub const CHATTER_SAMPLES: usize = 5;
 
-/// A phase and its feet.
+/// A phase by its name, and the feet that select it.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the types say it")]
 pub struct PhasePattern {
-    /// Name of the phase.
     pub name: String,
-    /// Feet that select it.
     pub feet: FeetRule,
 }
 
@@ -45,14 +44,12 @@ pub enum Stance {
     Landing,
 }
 
-/// Consecutive samples of one phase.
+/// Consecutive samples of a segment of one phase, by its index in [`PhaseRule::patterns`].
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the types say it")]
 pub struct PhaseSpan {
-    /// Index of the phase in [`PhaseRule::patterns`].
     pub phase: usize,
-    /// Place in the jump.
     pub kind: Stance,
-    /// Samples of the segment.
     pub range: Range<usize>,
 }
 
@@ -112,7 +109,7 @@ impl PhaseRule {
     /// neighbour with more feet down, on a tie the one before it.
     ///
     /// # Errors
-    /// [`RecordingFault::NoPhase`] if no sample matches any pattern.
+    /// [`RecordingError`] if no sample matches any pattern.
     pub fn spans(&self, segment: &Segment) -> Result<Vec<PhaseSpan>, RecordingError> {
         let feet = &segment.feet;
         let mut phases: Vec<Option<usize>> = feet.iter().map(|f| self.phase_of(*f)).collect();
@@ -120,9 +117,9 @@ impl PhaseRule {
             let Some(&feet) = feet.first() else {
                 return Ok(Vec::new());
             };
-            let phases = self.names();
-            let fault = RecordingFault::NoPhase { feet, phases };
-            return Err(fault.at(&segment.path, segment.row(0)));
+            let phases = listed(&self.names(), 8);
+            let words = format!("feet {feet:?} (fr, fl, rr, rl) match none of the phases {phases}");
+            return Err(text(words).at(&segment.path, segment.row(0)));
         }
         assign_transitional(&mut phases, feet);
         let phases: Vec<usize> = phases.into_iter().flatten().collect();
@@ -139,21 +136,15 @@ fn feet_down(feet: ContactFlags) -> usize {
 
 /// Gives runs of samples without phase that of a neighbour, of which at least one has a phase.
 fn assign_transitional(phases: &mut [Option<usize>], feet: &[ContactFlags]) {
-    let runs = stretches(0..phases.len(), |a, b| {
-        phases[a].is_some() == phases[b].is_some()
-    });
-    for run in runs {
+    let alike = |a: usize, b: usize| phases[a].is_some() == phases[b].is_some();
+    for run in stretches(0..phases.len(), alike) {
         if phases[run.start].is_some() {
             continue;
         }
         let before = run.start.checked_sub(1);
         let after = (run.end < phases.len()).then_some(run.end);
         let down = |sample: Option<usize>| sample.map(|sample| feet_down(feet[sample]));
-        let joined = if down(after) > down(before) {
-            after
-        } else {
-            before
-        };
+        let joined = after.filter(|_| down(after) > down(before)).or(before);
         let phase = joined.and_then(|sample| phases[sample]);
         phases[run].fill(phase);
     }

@@ -3,21 +3,21 @@
 //!
 //! Nothing crosses the border of a segment. Scaling belongs to the model.
 //!
-//! Moving averages, and Savitzky-Golay smoothing: a polynomial through each window by least squares.
-//!
+//! Savitzky-Golay smoothing takes a polynomial through each window by least squares.
 //! Inside, each sample takes the value of the polynomial fitted to the window centred on it; at the ends, the first and
 //! last window's polynomial is evaluated off centre, so no sample is lost and polynomials up to the order pass
 //! unchanged everywhere. Samples count as equally spaced.
 
 use std::ops::Range;
+use std::path::Path;
 use std::str::FromStr;
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::error::{RecordingError, RecordingFault};
+use super::error::{Outcome, RecordingError, RecordingFault, text};
 use super::phases::{PhaseRule, PhaseSpan};
-use super::segment::{Recording, Segment};
+use super::segment::{Recording, Rows, Segment};
 
 /// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).
 pub const BATCH_ROWS: usize = 100;
@@ -25,11 +25,8 @@ pub const BATCH_ROWS: usize = 100;
 /// The phases of every segment of a recording, each with its samples resampled to a multiple of 100.
 ///
 /// # Errors
-/// [`RecordingFault::Unexpected`] for a span of one sample, [`RecordingFault::NoPhase`].
-pub fn prepare(
-    recording: &Recording,
-    rule: &PhaseRule,
-) -> Result<Vec<(PhaseSpan, Segment)>, RecordingError> {
+/// [`RecordingError`] for a span of one sample, or a segment without any of the phases.
+pub fn prepare(recording: &Recording, rule: &PhaseRule) -> Outcome<Vec<(PhaseSpan, Segment)>> {
     let mut out = Vec::new();
     for segment in &recording.segments {
         for span in rule.spans(segment)? {
@@ -42,9 +39,7 @@ pub fn prepare(
 }
 
 /// Slopes of each row over time: second-order differences inside, also for unequal steps, first-order at the two ends
-/// (equation 21).
-///
-/// `rows` has one column a time; a single sample has slope 0.
+/// (equation 21). `rows` has one column a time; a single sample has slope 0.
 pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     let n = time_s.len().min(rows.ncols());
     let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
@@ -68,11 +63,7 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// [`differences`] within each of the ranges alone; 0 outside them.
-pub(super) fn differences_within(
-    ranges: &[Range<usize>],
-    time_s: &[f64],
-    rows: &DMatrix<f64>,
-) -> DMatrix<f64> {
+pub(super) fn differences_within(ranges: &[Range<usize>], time_s: &[f64], rows: &Rows) -> Rows {
     let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
     for range in ranges {
         let own = rows.columns(range.start, range.len()).into_owned();
@@ -82,9 +73,8 @@ pub(super) fn differences_within(
     out
 }
 
-/// A segment at `rows` equally spaced times over the same duration, by straight lines between samples.
-///
-/// Contact flags are those of the nearest sample.
+/// A segment at `rows` equally spaced times over the same duration, by straight lines between samples; contact is that
+/// of the nearest sample.
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`] if it has one sample or `rows` is below 2.
@@ -141,37 +131,35 @@ impl SavitzkyGolay {
     /// A filter over an odd `window` of samples with polynomials of degree `order`.
     ///
     /// # Errors
-    /// [`RecordingFault::Text`] for an even window or one not above the order.
+    /// [`RecordingError`] for an even window or one not above the order.
     pub fn new(window: usize, order: usize) -> Result<Self, RecordingError> {
         const LARGEST: (usize, usize) = (1001, 12);
         if window.is_multiple_of(2) || window <= order || window > LARGEST.0 || order > LARGEST.1 {
-            let text = format!(
+            let words = format!(
                 "smoothing window {window} with order {order}: expected an odd window above the order, \
                  at most {}, and an order of at most {}",
                 LARGEST.0, LARGEST.1
             );
-            return Err(RecordingFault::Text(text).of_argument());
+            return Err(text(words).of(Path::new("")));
         }
         let half = (window / 2) as f64;
         // Places scaled to -1..1 keep the powers well conditioned.
         let place = |r: usize| (r as f64 - half) / half.max(1.0);
         let powers = DMatrix::from_fn(window, order + 1, |r, k| place(r).powi(k as i32));
         let q = powers.qr().q();
+        let values = &q * q.transpose();
         Ok(SavitzkyGolay {
             window,
             order,
-            values: &q * q.transpose(),
+            values,
         })
     }
 
-    /// Samples of the window.
     pub(crate) fn window(&self) -> usize {
         self.window
     }
 
-    /// Each row of `rows` smoothed along its samples (columns).
-    ///
-    /// `None` if there are fewer samples than the window has.
+    /// Each row of `rows` smoothed along its samples (columns); `None` if these are fewer than the window's.
     pub fn smooth(&self, rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let n = rows.ncols();
         if n < self.window {
@@ -183,8 +171,8 @@ impl SavitzkyGolay {
             let first = sample.saturating_sub(half).min(n - self.window);
             let weights = self.values.row(sample - first);
             let window = rows.columns(first, self.window);
-            out.column_mut(sample)
-                .gemv(1.0, &window, &weights.transpose(), 0.0);
+            let mut to = out.column_mut(sample);
+            to.gemv(1.0, &window, &weights.transpose(), 0.0);
         }
         Some(out)
     }
@@ -216,10 +204,8 @@ impl From<SavitzkyGolay> for String {
     }
 }
 
-/// Mean over a centred window of `window` samples (columns), shortened symmetrically at both ends.
-///
-/// Landing and lift-off spikes in accelerations weigh a regression more than the whole rest of a jump; averaged over 11
-/// samples (20 ms) they carry the momentum change they stand for. A window of 0 or 1 returns the samples.
+/// Mean over a centred window of `window` samples (columns), shortened symmetrically at both ends. Spikes of landing
+/// and lift-off, which would outweigh the rest of a jump, then carry the change of momentum that they stand for.
 pub fn moving_average(samples: &DMatrix<f64>, window: usize) -> DMatrix<f64> {
     let n = samples.ncols();
     let half = window / 2;

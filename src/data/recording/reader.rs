@@ -2,8 +2,6 @@
 //!
 //! romc's own text: `;` or tabs with decimal comma or point, or `,` with decimal point, found from the header; columns
 //! by name in any order; gzip found from the first two bytes. Memory is bounded by the samples kept.
-//!
-//! Names of columns and the header that arranges them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,7 +10,7 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::clock::{Mended, timed};
-use super::error::{RecordingError, RecordingFault};
+use super::error::{Outcome, RecordingError, listed, text, unexpected};
 use super::foreign::guess::guess_of;
 use super::foreign::{ColumnMap, TextFormat, assemble, is_mcap, read_lines, read_mcap, read_texts};
 use super::lines::Lines;
@@ -42,23 +40,12 @@ pub struct Reader {
 /// A recording and what was done to it besides reading.
 #[derive(Debug, Clone)]
 pub struct Reading {
-    /// The recording.
+    /// In SI units.
     pub recording: Recording,
     /// What was derived, resampled, turned or cut, in words.
     pub notes: Vec<String>,
     /// What was mended, segment by segment; empty with [`Clocks::Recorded`].
     pub mended: Vec<Mended>,
-}
-
-impl Reading {
-    /// A recording whose clock was not mended.
-    pub(super) fn as_recorded(recording: Recording, notes: Vec<String>) -> Self {
-        Self {
-            recording,
-            notes,
-            mended: Vec::new(),
-        }
-    }
 }
 
 impl Reader {
@@ -73,10 +60,8 @@ impl Reader {
 
     /// The reader for recordings of a robot, whose names of joints it knows; the Go1's otherwise.
     pub fn for_robot(self, robot: &'static Robot) -> Self {
-        Self {
-            robot: Some(robot),
-            ..self
-        }
+        let robot = Some(robot);
+        Self { robot, ..self }
     }
 
     /// Reads a file, or with a map a folder of files that are one recording.
@@ -93,7 +78,7 @@ impl Reader {
             }
             None if path.is_dir() => {
                 let expected = "a file, or `--columns` with a map that names the folder's files";
-                return Err(RecordingFault::unexpected("a folder", expected).of(path));
+                return Err(unexpected("a folder", expected).of(path));
             }
             None => read_noted(path, Lines::open(path)?)?,
         };
@@ -125,20 +110,14 @@ pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Result<Recording, RecordingE
     read_noted(path, Lines::of(path, bytes, u64::MAX)?).map(|reading| reading.recording)
 }
 
-/// [`read`], with a note of what the file leaves to be derived.
-fn read_noted(path: &Path, lines: Lines<'_>) -> Result<Reading, RecordingError> {
-    let format = TextFormat {
-        own: true,
-        ..TextFormat::default()
-    };
-    let log = read_lines(path, lines, &format)?;
+fn read_noted(path: &Path, lines: Lines<'_>) -> Outcome<Reading> {
+    let (own, other) = (true, TextFormat::default());
+    let log = read_lines(path, lines, &TextFormat { own, ..other })?;
     let columns = Column::arranged(path, &log.names())?;
     let time = columns.iter().position(|c| *c == Some(Column::Time));
     let time = time.expect("invariant: an arranged header has the time");
-    let mut whole = Segment {
-        first_row: log.first_row,
-        ..Segment::still(path, log.columns[time].times())
-    };
+    let mut whole = Segment::still(path, log.columns[time].times());
+    whole.first_row = log.first_row;
     let has_acceleration = columns.contains(&Some(Column::Acceleration(0)));
     let mut ignored_columns = Vec::new();
     for (column, channel) in columns.into_iter().zip(log.columns) {
@@ -155,18 +134,18 @@ fn read_noted(path: &Path, lines: Lines<'_>) -> Result<Reading, RecordingError> 
         ignored_columns,
     };
     let derived = (!has_acceleration).then(|| DERIVED_DDX.to_owned());
-    Ok(Reading::as_recorded(
+    Ok(Reading {
         recording,
-        derived.into_iter().collect(),
-    ))
+        notes: Vec::from_iter(derived),
+        mended: Vec::new(),
+    })
 }
 
-/// Advice for topics that are not a recording by their names.
 const TO_COMPLETE: &str =
     "; `romc inspect --guess LOG` writes a map for --columns, to be completed";
 
 /// An MCAP file by the names of its topics and fields.
-fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
+fn by_guess(path: &Path, robot: &Robot) -> Outcome<Reading> {
     let logs = read_mcap(path)?;
     let guess = guess_of(path, &logs, robot)?;
     if !guess.missing.is_empty() {
@@ -179,33 +158,28 @@ fn by_guess(path: &Path, robot: &Robot) -> Result<Reading, RecordingError> {
         let own = &robot.joint_names()[0];
         let names = format!("joints named as fr.hx, FR_hip_joint, LF_HAA or {own}");
         let expected = format!("topics of the robot: {names}{TO_COMPLETE}");
-        return Err(RecordingFault::unexpected(found, expected).of(path));
+        return Err(unexpected(found, expected).of(path));
     }
     if !guess.open.is_empty() {
         let expected = format!("one reading by names{TO_COMPLETE}");
-        return Err(RecordingFault::unexpected(guess.open.join("; "), expected).of(path));
+        return Err(unexpected(guess.open.join("; "), expected).of(path));
     }
     let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &guess.text)?;
     let mut reading = assemble(path, &logs, &map)?;
-    let note = "topics are taken by their names (`romc inspect --guess` prints the map)".to_owned();
-    reading.notes.extend([note].into_iter().chain(guess.notes));
+    let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
+    reading.notes.push(note.to_owned());
+    reading.notes.extend(guess.notes);
     Ok(reading)
 }
 
+const REBUILT: &str = "times are rebuilt from the motion, which takes {} s in a recorded second";
+const EVENED: &str = "uneven steps are resampled";
+const REPLACED: &str = "angular rates, which disagree with the angles, are differences of these";
 /// Repairs of clocks, in words; `{}` is the range of [`Mended::elapsed_ratio`].
 const REPAIRS: [(fn(&Mended) -> bool, &str); 3] = [
-    (
-        |m| m.elapsed_ratio.is_some(),
-        "times are rebuilt from the motion, which takes {} s in a recorded second",
-    ),
-    (
-        |m| m.elapsed_ratio.is_none() && m.resampled,
-        "uneven steps are resampled",
-    ),
-    (
-        |m| m.rates_replaced,
-        "angular rates, which disagree with the angles, are differences of these",
-    ),
+    (|m| m.elapsed_ratio.is_some(), REBUILT),
+    (|m| m.elapsed_ratio.is_none() && m.resampled, EVENED),
+    (|m| m.rates_replaced, REPLACED),
 ];
 
 /// What was done to several recordings besides reading.
@@ -213,7 +187,6 @@ const REPAIRS: [(fn(&Mended) -> bool, &str); 3] = [
 pub struct ReadingNotes {
     recordings: usize,
     ratios: Vec<f64>,
-    /// Recordings by [`REPAIRS`].
     repaired: [usize; 3],
     others: Vec<(String, usize)>,
 }
@@ -246,37 +219,28 @@ impl ReadingNotes {
             true => most,
             false => format!("{least} to {most}"),
         };
-        let repairs = self
-            .repaired
-            .iter()
-            .zip(REPAIRS)
-            .filter(|(count, _)| **count > 0);
-        let repairs =
-            repairs.map(|(count, (_, words))| counted(&words.replace("{}", &range), *count));
-        let repairs = repairs.collect::<Vec<_>>().join("; ");
-        let repairs =
-            (!repairs.is_empty()).then(|| format!("{repairs} (--clock recorded: as recorded)"));
+        let repairs = self.repaired.iter().zip(REPAIRS);
+        let repairs = repairs.filter(|(count, _)| **count > 0);
+        let words = repairs.map(|(n, (_, words))| counted(&words.replace("{}", &range), *n));
+        let repairs = words.collect::<Vec<_>>().join("; ");
+        let repairs = Some(repairs).filter(|repairs| !repairs.is_empty());
+        let repairs = repairs.map(|repairs| repairs + " (--clock recorded: as recorded)");
         let others = (self.others.iter()).map(|(note, count)| counted(note, *count));
         repairs.into_iter().chain(others).collect()
     }
 }
 
-/// The quantity in a column; indices follow the state, the wrench and the feet.
+/// The quantity in a column, in SI units; indices follow the state, the wrench and the feet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "`name` has the words")]
 pub enum Column {
-    /// `Time`, in s.
     Time,
-    /// Coordinate of the state.
     Position(usize),
-    /// Its rate.
     Velocity(usize),
-    /// Its acceleration.
     Acceleration(usize),
-    /// Joint torque, in N m.
     Torque(usize),
-    /// Entry of the body wrench, in N or N m.
+    /// Entry of the body wrench.
     Force(usize),
-    /// Contact flag.
     Foot(usize),
 }
 
@@ -294,8 +258,7 @@ impl Column {
         }
     }
 
-    /// The columns of a file, with or without accelerations and the body wrench, in the order in which they are
-    /// written.
+    /// The columns of a file, with or without accelerations and the body wrench, in the order of writing.
     pub fn all(accelerations: bool, force: bool) -> Vec<Column> {
         let mut out = vec![Column::Time];
         for i in 0..STATE_DIM {
@@ -308,13 +271,8 @@ impl Column {
         out
     }
 
-    /// The columns that the cells of a header name, none for unknown names. Case and runs of blanks do not matter.
-    ///
-    /// Accelerations and forces may be absent, but only all of them.
-    pub(super) fn arranged(
-        path: &Path,
-        names: &[String],
-    ) -> Result<Vec<Option<Column>>, RecordingError> {
+    /// The columns that the cells of a header name, none for unknown names; accelerations or forces may be absent.
+    pub(super) fn arranged(path: &Path, names: &[String]) -> Outcome<Vec<Option<Column>>> {
         let known = Column::all(true, true).into_iter();
         let known: Vec<_> = (known.map(|column| (folded(&column.name()), column))).collect();
         let mut columns: Vec<Option<Column>> = Vec::with_capacity(names.len());
@@ -325,7 +283,7 @@ impl Column {
                 && let Some(first) = columns.iter().position(|c| *c == Some(found))
             {
                 let (first, second) = (first + 1, columns.len() + 1);
-                let fault = RecordingFault::DuplicateColumn { first, second };
+                let fault = text(format!("occurs twice, as number {first} and {second}"));
                 return Err(fault.in_cell(path, 1, &found.name()));
             }
             columns.push(column);
@@ -336,11 +294,17 @@ impl Column {
         let expected = Column::all(acceleration, force).into_iter();
         let missing = expected.filter(|c| !columns.contains(&Some(*c)));
         let missing: Vec<String> = missing.map(Column::name).collect();
-        if !missing.is_empty() {
-            let (columns, found) = (missing, names.to_vec());
-            return Err(RecordingFault::MissingColumns { columns, found }.at(path, 1));
-        }
-        Ok(columns)
+        // Hardly a name of the format.
+        let hint = match missing.len() {
+            0 => return Ok(columns),
+            ..30 => "",
+            _ => {
+                "; for a log of another program `romc inspect --guess LOG` writes a map for --columns"
+            }
+        };
+        let (missing, found) = (listed(&missing, 8), listed(names, 3));
+        let words = format!("missing {missing}; the header starts with {found}{hint}");
+        Err(text(words).at(path, 1))
     }
 }
 
@@ -356,7 +320,6 @@ fn body(i: usize, quantity: &str) -> String {
     format!("Body {part} {quantity} {}", ["x", "y", "z"][i % 3])
 }
 
-/// A name without capitals and runs of blanks.
 pub(super) fn folded(name: &str) -> String {
     let words: Vec<&str> = name.split_whitespace().collect();
     words.join(" ").to_lowercase()

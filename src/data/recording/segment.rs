@@ -1,20 +1,20 @@
 //! The data: recordings and their segments of consecutive samples.
-//!
-//! Samples divided into segments.
 
 use std::ops::Range;
 use std::path::PathBuf;
 
 use nalgebra::DMatrix;
 
-use super::error::{RecordingError, RecordingFault};
+use super::error::{Outcome, RecordingError, RecordingFault, unexpected};
 use super::preprocess::{differences, moving_average};
 use super::reader::Column;
 use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
-/// Time over which accelerations of joints are averaged before the inertia of the motors counts, in s: 11 samples at
-/// 500 Hz.
+/// Time over which accelerations of joints are averaged before the inertia of the motors counts, in s.
 const ACCELERATION_WINDOW_S: f64 = 0.02;
+
+/// Quantities by row, one column a sample.
+pub(crate) type Rows = DMatrix<f64>;
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +28,6 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// These segments as a recording of the same file.
     pub(crate) fn with_segments(&self, segments: Vec<Segment>) -> Self {
         Self {
             path: self.path.clone(),
@@ -54,7 +53,7 @@ impl From<Segment> for Recording {
     }
 }
 
-/// Consecutive samples; every matrix has one column a sample.
+/// Consecutive samples of a file; every matrix has one column a sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {
     /// The file that the samples come from.
@@ -91,8 +90,7 @@ pub fn stretches(samples: Range<usize>, alike: impl Fn(usize, usize) -> bool) ->
     out
 }
 
-/// The samples left and right of a time and how much of the way it is from one to the other; outside the times the
-/// nearest sample twice.
+/// The samples left and right of a time, its share of the way between them; outside, the nearest sample twice.
 pub fn between(times_s: &[f64], time_s: f64) -> (usize, usize, f64) {
     let after = times_s.partition_point(|&t| t <= time_s);
     let (left, right) = (after.saturating_sub(1), after.min(times_s.len() - 1));
@@ -143,7 +141,6 @@ impl Segment {
         }
     }
 
-    /// Sets all samples of a column; a foot with 1 is down.
     pub(super) fn set(&mut self, column: Column, values: impl Iterator<Item = f64>) {
         let n = self.len();
         let (matrix, row) = match column {
@@ -222,8 +219,7 @@ impl Segment {
     }
 
     /// Accelerations of the joints, 12 x n, in rad/s^2: [`Self::ddx`] averaged over 20 ms within stretches of equal
-    /// contact (a foot down, or none), so that the noise of differences and the spikes of landings do not become
-    /// torques.
+    /// contact (a foot down, or none), so that noise and the spikes of landings do not become torques.
     pub fn joint_accelerations(&self) -> DMatrix<f64> {
         let half = match self.mean_step_s() {
             step if step > 0.0 => (0.5 * ACCELERATION_WINDOW_S / step).round() as usize,
@@ -266,8 +262,7 @@ impl Segment {
     /// the links, recorded ones less [`Segment::losses`], `F` and `M` what they and the contacts do to the body
     /// (equation 22); under the published rule the file's own, if it carries them.
     ///
-    /// Near a singularity of a leg in contact its force is damped, see
-    /// [`Robot::damped_force_map`](crate::robot::Robot::damped_force_map).
+    /// Near a singularity of a leg in contact its force is damped ([`Robot::damped_force_map`]).
     ///
     /// # Errors
     /// [`RecordingFault::Wrench`] with the row of an angle or torque that is not finite.
@@ -289,12 +284,7 @@ impl Segment {
         torque_nm
     }
 
-    /// The input of these torques of the motors; the file's wrench is that of the recorded ones.
-    fn input_of(
-        &self,
-        rule: &InputRule,
-        torque_nm: &DMatrix<f64>,
-    ) -> Result<DMatrix<f64>, RecordingError> {
+    fn input_of(&self, rule: &InputRule, torque_nm: &DMatrix<f64>) -> Outcome<DMatrix<f64>> {
         let mut out = DMatrix::zeros(STATE_DIM, self.len());
         let net = torque_nm - self.losses(rule);
         out.rows_mut(0, JOINT_DIM).copy_from(&net);
@@ -328,19 +318,13 @@ impl Segment {
 }
 
 pub(super) const DERIVED_DDX: &str = "accelerations are differences of velocities";
-/// A step this many times the one before it starts a new segment, as a jump back does: samples were left out between
-/// the two.
-const GAP_STEPS: f64 = 20.0;
+const GAP_STEPS: f64 = 20.0; // a step this many times the one before it starts a new segment, as a jump back does
 /// A first time beyond this is that of a clock that counts from an epoch: times count from it then.
 pub(super) const EPOCH_S: f64 = 1e7;
-/// Largest mean distance between samples: a jump lasts less than a second.
-const LARGEST_STEP_S: f64 = 0.1;
+const LARGEST_STEP_S: f64 = 0.1; // largest mean distance between samples: a jump lasts less than a second
 
 /// The segments of all samples of a file, which get differences for accelerations that they do not have.
-pub(super) fn divided(
-    mut whole: Segment,
-    has_acceleration: bool,
-) -> Result<Vec<Segment>, RecordingError> {
+pub(super) fn divided(mut whole: Segment, has_acceleration: bool) -> Outcome<Vec<Segment>> {
     let start_s = whole.time_s.first().copied().unwrap_or_default();
     if start_s.abs() > EPOCH_S {
         whole.time_s.iter_mut().for_each(|time| *time -= start_s);
@@ -360,8 +344,7 @@ pub(super) fn divided(
         if step_s > LARGEST_STEP_S {
             let found = format!("a sample every {step_s} s on average");
             let expected = format!("at most {LARGEST_STEP_S} s; is `Time` in milliseconds?");
-            let fault = RecordingFault::unexpected(found, expected);
-            return Err(fault.in_cell(&segment.path, row, "Time"));
+            return Err(unexpected(found, expected).in_cell(&segment.path, row, "Time"));
         }
         if !has_acceleration {
             segment.ddx = differences(&segment.time_s, &segment.dx);

@@ -11,7 +11,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use nalgebra::DMatrix;
 
-use super::error::{RecordingError, RecordingFault};
+use super::error::{RecordingError, RecordingFault, io_fault};
 use super::foreign;
 use super::reader::Column;
 use super::segment::{Recording, Segment};
@@ -49,7 +49,7 @@ impl Default for WriteOptions {
 /// Writes a recording as published files are; gzip if the name ends in `.gz`.
 ///
 /// # Errors
-/// [`RecordingFault::Io`]. An existing file is replaced.
+/// [`RecordingError`]. An existing file is replaced.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
     let options = WriteOptions::default();
     write_as(path, recording, None, &options, Overwrite::Replace)
@@ -76,7 +76,7 @@ pub fn write_as(
         write_to(&mut packed, recording, inputs, options)?;
         packed.finish().map(|_| ())
     });
-    written.map_err(|source| RecordingFault::io("write", source).of(path))
+    written.map_err(|source| io_fault("write", source).of(path))
 }
 
 /// Writes a segment as an MCAP file: joint states, odometry, contact, and if given the inputs (18 x samples).
@@ -91,14 +91,12 @@ pub fn write_mcap(
 ) -> Result<(), RecordingError> {
     let mut bytes = io::Cursor::new(Vec::new());
     foreign::write_mcap(&mut bytes, segment, inputs)
-        .map_err(|error| RecordingFault::Mcap(error.to_string()).of(path))?;
+        .map_err(|error| RecordingFault::mcap(error).of(path))?;
     let written = write_whole(path, overwrite, |file| file.write_all(bytes.get_ref()));
-    written.map_err(|source| RecordingFault::io("write", source).of(path))
+    written.map_err(|source| io_fault("write", source).of(path))
 }
 
-/// Writes a recording as text, its inputs as [`write_as`].
-///
-/// The wrench is written if every segment carries one.
+/// Writes a recording as text, its inputs as [`write_as`], the wrench if every segment carries one.
 ///
 /// # Errors
 /// Those of the destination.
@@ -124,17 +122,17 @@ pub fn write_to(
         for sample in 0..segment.len() {
             line.clear();
             for column in &columns {
-                match (column, segment.get(*column, sample)) {
-                    (Column::Foot(_), down) => line.push(if down == 1.0 { '1' } else { '0' }),
-                    (_, value) => push_number(&mut line, value),
-                }
-                line.push_str(separator);
+                let value = segment.get(*column, sample);
+                // Debug has an exponent where Display would print hundreds of zeros.
+                let written = match column {
+                    Column::Foot(_) => write!(line, "{value}{separator}"),
+                    _ => write!(line, "{value:?}{separator}"),
+                };
+                written.expect(ANY_TEXT);
             }
-            if let Some(inputs) = inputs {
-                for value in inputs[index].column(sample).iter() {
-                    push_number(&mut line, *value);
-                    line.push_str(separator);
-                }
+            let inputs = inputs.map(|inputs| inputs[index].column(sample));
+            for value in inputs.iter().flatten() {
+                write!(line, "{value:?}{separator}").expect(ANY_TEXT);
             }
             line.pop();
             line.push('\n');
@@ -147,7 +145,4 @@ pub fn write_to(
     Ok(())
 }
 
-fn push_number(out: &mut String, value: f64) {
-    // Debug has an exponent where Display would print hundreds of zeros.
-    write!(out, "{value:?}").expect("a String takes any text");
-}
+const ANY_TEXT: &str = "a String takes any text";

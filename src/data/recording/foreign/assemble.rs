@@ -1,7 +1,6 @@
 //! Quantities of a log, each with its clock, to the segments of a recording.
-//!
-//! Values of a topic at the times of another clock.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
@@ -11,23 +10,18 @@ use nalgebra::DMatrix;
 use super::elements::{QUATERNION, Quantity, angle_rates, angles_of_quaternions, in_world, unwrap};
 use super::map::{ColumnMap, Frame, Origin};
 use super::signal::{Log, Signal, Source};
-use crate::recording::error::{RecordingError, RecordingFault};
+use crate::recording::error::{Outcome, RecordingFault, unexpected};
 use crate::recording::preprocess::{differences, differences_within, place};
-use crate::recording::reader::Reading;
-use crate::recording::segment::{DERIVED_DDX, EPOCH_S, Recording, Segment, divided, ranges};
+use crate::recording::reader::{Column, Reading};
+use crate::recording::segment::{DERIVED_DDX, EPOCH_S, Recording, Rows, Segment, divided, ranges};
 use crate::robot::FOOT_DIM;
 
-/// Largest distance between samples of a topic that is interpolated, in s.
-const MAX_GAP_S: f64 = 0.05;
+const MAX_GAP_S: f64 = 0.05; // largest distance between samples of a topic that is interpolated, in s
 const QUATERNION_TOLERANCE: f64 = 0.05; // how far the length of a quaternion may be from one
 const MAX_RESAMPLED: usize = 10_000_000; // most samples of a recording that is resampled
 
 /// Makes a recording of the logs as the map says, with notes of what was derived, resampled, turned or cut.
-pub(in crate::recording) fn assemble(
-    path: &Path,
-    logs: &[Log],
-    map: &ColumnMap,
-) -> Result<Reading, RecordingError> {
+pub(crate) fn assemble(path: &Path, logs: &[Log], map: &ColumnMap) -> Outcome<Reading> {
     let (mut signals, mut notes, mut epoch_s) = (BTreeMap::new(), Vec::new(), None);
     for quantity in Quantity::ALL {
         let Some(source) = Source::find(logs, map, quantity)? else {
@@ -36,7 +30,7 @@ pub(in crate::recording) fn assemble(
         if quantity == Quantity::JointPosition {
             epoch_s = source.epoch_s()?;
         }
-        for note in &source.log().notes {
+        for note in &source.log.notes {
             if !notes.contains(note) {
                 notes.push(note.clone());
             }
@@ -44,7 +38,7 @@ pub(in crate::recording) fn assemble(
         signals.insert(quantity, source.take(epoch_s.unwrap_or(0))?);
     }
     let base: &Signal = &signals[&Quantity::JointPosition];
-    let mut rows = Rows {
+    let mut rows = Assembly {
         path,
         logs,
         map,
@@ -63,24 +57,32 @@ pub(in crate::recording) fn assemble(
         (rows.notes).push("times count from the first sample".to_owned());
     }
     rows.to_world()?;
-    rows.derive_velocities();
+    for (velocity, of) in [
+        (Quantity::JointVelocity, Quantity::JointPosition),
+        (Quantity::BodyVelocity, Quantity::BodyPosition),
+        (Quantity::AngularVelocity, Quantity::Orientation),
+    ] {
+        if rows.derive(velocity, of) {
+            let note = format!("{} are differences of {}", velocity.key(), of.key());
+            rows.notes.push(note);
+        }
+    }
     rows.shift_origin();
     rows.recording()
 }
 
-struct Rows<'a> {
+struct Assembly<'a> {
     path: &'a Path,
     logs: &'a [Log],
     map: &'a ColumnMap,
     first_row: usize,
-    /// Times of the recording: those of the joints' positions unless all are brought to others.
-    times_s: Vec<f64>,
+    times_s: Vec<f64>, // times of the recording: those of the joints' positions unless all are brought to others
     ranges: Vec<Range<usize>>,
     signals: BTreeMap<Quantity, Signal>,
     notes: Vec<String>,
 }
 
-impl Rows<'_> {
+impl Assembly<'_> {
     fn required(&mut self, quantity: Quantity) -> &mut Signal {
         let signal = self.signals.get_mut(&quantity);
         signal.expect("a map has what is required")
@@ -91,12 +93,12 @@ impl Rows<'_> {
     }
 
     /// Quaternions become angles, and angles do not jump by whole turns.
-    fn angles(&mut self) -> Result<(), RecordingError> {
+    fn angles(&mut self) -> Outcome<()> {
         let path = self.path;
         let signal = self.required(Quantity::Orientation);
         if signal.values.nrows() == QUATERNION.len() {
-            let norms = signal.values.column_iter().map(|q| q.norm());
-            for (sample, norm) in norms.enumerate() {
+            for (sample, q) in signal.values.column_iter().enumerate() {
+                let norm = q.norm();
                 if norm.is_nan() || (1.0 - norm).abs() > QUATERNION_TOLERANCE {
                     let found = format!("a quaternion of length {norm:.3}");
                     let fault = RecordingFault::number(&found, "one of length 1");
@@ -112,7 +114,7 @@ impl Rows<'_> {
     }
 
     /// Forces become contact: down from the threshold on, up below the release.
-    fn contacts(&mut self) -> Result<(), RecordingError> {
+    fn contacts(&mut self) -> Outcome<()> {
         let (path, logs) = (self.path, self.logs);
         let table = self.map.table(Quantity::Feet).expect("a map has the feet");
         let signal = self.required(Quantity::Feet);
@@ -123,17 +125,14 @@ impl Rows<'_> {
             for sample in 0..signal.times_s.len() {
                 let value = signal.values[(foot, sample)];
                 down = match table.threshold {
-                    Some(threshold) => {
-                        let release = table.release.unwrap_or(threshold);
-                        value >= unit * if down { release } else { threshold }
-                    }
+                    Some(threshold) if !down => value >= unit * threshold,
+                    Some(threshold) => value >= unit * table.release.unwrap_or(threshold),
                     None if value == 0.0 || value == 1.0 => value == 1.0,
                     None => {
                         let mut files = logs.iter();
                         let file = files.find(|log| Some(&log.name) == table.file.as_ref());
                         let path = file.map_or(path, |log| &log.path);
-                        let row = signal.first_row + sample;
-                        let name = Quantity::Feet.column(foot).name();
+                        let (row, name) = (signal.first_row + sample, Column::Foot(foot).name());
                         return Err(RecordingFault::contact(value).in_cell(path, row, &name));
                     }
                 };
@@ -144,7 +143,7 @@ impl Rows<'_> {
     }
 
     /// Brings quantities with clocks of their own to one, or all to even steps if the map asks for it.
-    fn one_clock(&mut self) -> Result<(), RecordingError> {
+    fn one_clock(&mut self) -> Outcome<()> {
         let mut signals = self.signals.values();
         let own_clocks = signals.any(|signal| signal.times_s != self.times_s);
         if own_clocks || self.map.time.resample_s.is_some() {
@@ -159,22 +158,21 @@ impl Rows<'_> {
     }
 
     /// Times that every clock covers: those of the joints' positions, or even steps.
-    fn common_times(&mut self) -> Result<Vec<f64>, RecordingError> {
+    fn common_times(&mut self) -> Outcome<Vec<f64>> {
         let time = &self.map.time;
         let max_gap_s = time.max_gap_s.unwrap_or(MAX_GAP_S);
         let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
         for (quantity, signal) in &self.signals {
             let times = &signal.times_s;
             for i in 1..times.len() {
-                let (found, previous) = (times[i], times[i - 1]);
-                let fault = if found <= previous {
-                    RecordingFault::time(found, previous)
-                } else if found - previous > max_gap_s {
-                    let found = format!("no sample for {} s", found - previous);
-                    let expected = format!("at most {max_gap_s} s (`max_gap_s` in `[time]`)");
-                    RecordingFault::unexpected(found, expected)
-                } else {
-                    continue;
+                let step = times[i] - times[i - 1];
+                let fault = match times[i] <= times[i - 1] {
+                    true => RecordingFault::time(times[i], times[i - 1]),
+                    false if step > max_gap_s => {
+                        let expected = format!("at most {max_gap_s} s (`max_gap_s` in `[time]`)");
+                        unexpected(format!("no sample for {step} s"), expected)
+                    }
+                    false => continue,
                 };
                 let (row, name) = (signal.first_row + i, quantity.column(0).name());
                 return Err(fault.in_cell(self.path, row, &name));
@@ -200,8 +198,7 @@ impl Rows<'_> {
         };
         if times.len() < 2 {
             let found = "clocks that do not overlap";
-            let fault = RecordingFault::unexpected(found, "topics of the same time");
-            return Err(fault.of(self.path));
+            return Err(unexpected(found, "topics of the same time").of(self.path));
         }
         self.notes.push(match time.resample_s {
             Some(step) => format!("all quantities are brought to even steps of {step} s"),
@@ -214,7 +211,7 @@ impl Rows<'_> {
         Ok(times)
     }
 
-    fn resample(&mut self) -> Result<(), RecordingError> {
+    fn resample(&mut self) -> Outcome<()> {
         let mut values = Vec::new();
         for (quantity, signal) in &self.signals {
             let own_s = &signal.times_s;
@@ -229,13 +226,7 @@ impl Rows<'_> {
             };
             let rates = self.known_rates(*quantity);
             let slopes = (rates.filter(|rates| rates.times_s == *own_s)).map(|rates| &rates.values);
-            values.push(at_times(
-                own_s,
-                &signal.values,
-                slopes,
-                &self.times_s,
-                between,
-            ));
+            values.push(at_times(signal, slopes, &self.times_s, between));
         }
         for (signal, values) in self.signals.values_mut().zip(values) {
             signal.values = values;
@@ -261,11 +252,11 @@ impl Rows<'_> {
 
     /// Velocities about the body's own axes become the derivatives of position and angles.
     #[allow(clippy::wrong_self_convention)] // turns what it holds
-    fn to_world(&mut self) -> Result<(), RecordingError> {
+    fn to_world(&mut self) -> Outcome<()> {
         let angles = self.required(Quantity::Orientation).values.clone();
-        if self.frame(Quantity::BodyVelocity) == Some(Frame::Body)
-            && let Some(signal) = self.signals.get_mut(&Quantity::BodyVelocity)
-        {
+        let in_body = self.frame(Quantity::BodyVelocity) == Some(Frame::Body);
+        let velocity = self.signals.get_mut(&Quantity::BodyVelocity);
+        if let Some(signal) = velocity.filter(|_| in_body) {
             signal.values = in_world(&angles, &signal.values);
         }
         let frame = self.frame(Quantity::AngularVelocity);
@@ -273,34 +264,19 @@ impl Rows<'_> {
             let turned = angle_rates(&angles, &signal.values, frame.unwrap_or(Frame::Angles));
             signal.values = turned.map_err(|sample| {
                 let expected = "less where rates come from angular velocities";
-                let fault = RecordingFault::unexpected("a pitch of 90 degrees", expected);
+                let fault = unexpected("a pitch of 90 degrees", expected);
                 fault.at(self.path, self.first_row + sample)
             })?;
         }
         Ok(())
     }
 
-    fn derive_velocities(&mut self) {
-        for (velocity, of) in [
-            (Quantity::JointVelocity, Quantity::JointPosition),
-            (Quantity::BodyVelocity, Quantity::BodyPosition),
-            (Quantity::AngularVelocity, Quantity::Orientation),
-        ] {
-            if self.derive(velocity, of) {
-                let (velocity, of) = (velocity.key(), of.key());
-                (self.notes).push(format!("{velocity} are differences of {of}"));
-            }
-        }
-    }
-
     /// Makes a quantity that the log does not have of differences of another; whether it had to be made.
     fn derive(&mut self, quantity: Quantity, of: Quantity) -> bool {
         let is_absent = !self.signals.contains_key(&quantity);
         if is_absent {
-            let of = self.signals.get(&of);
-            let of = &of.expect("invariant: a required quantity").values;
             let signal = Signal {
-                values: differences_within(&self.ranges, &self.times_s, of),
+                values: differences_within(&self.ranges, &self.times_s, &self.signals[&of].values),
                 times_s: Vec::new(),
                 first_row: self.first_row,
             };
@@ -318,28 +294,23 @@ impl Rows<'_> {
         let ranges = self.ranges.clone();
         let values = &mut self.required(Quantity::BodyPosition).values;
         for range in ranges {
-            for axis in 0..2 {
-                let start = values[(axis, range.start)];
-                let mut row = values.row_mut(axis);
-                range.clone().for_each(|i| row[i] -= start);
+            let mut places = values.view_mut((0, range.start), (2, range.len()));
+            let start = places.column(0).into_owned();
+            for mut place in places.column_iter_mut() {
+                place -= &start;
             }
         }
     }
 
-    fn recording(mut self) -> Result<Reading, RecordingError> {
-        let kept = match self.map.text.rows {
-            None => 0..self.times_s.len(),
-            Some([first, last]) => {
-                let end = last.min(self.times_s.len());
-                let start = first.saturating_sub(1);
-                if first == 0 || start + 2 > end {
-                    let found = format!("{first} to {last}");
-                    let expected = format!("two or more of {} samples", self.times_s.len());
-                    return Err(self.map.fault("text.rows", found, expected));
-                }
-                start..end
-            }
-        };
+    fn recording(mut self) -> Outcome<Reading> {
+        let count = self.times_s.len();
+        let [first, last] = self.map.text.rows.unwrap_or([1, count]);
+        let kept = first.saturating_sub(1)..last.min(count);
+        if self.map.text.rows.is_some() && (first == 0 || kept.start + 2 > kept.end) {
+            let found = format!("{first} to {last}");
+            let expected = format!("two or more of {count} samples");
+            return Err(self.map.fault("text.rows", found, expected));
+        }
         let is_known = |(own, _): &(Quantity, Quantity)| self.signals.contains_key(own);
         let has_acceleration = Quantity::ACCELERATIONS.iter().any(is_known);
         if has_acceleration {
@@ -364,13 +335,16 @@ impl Rows<'_> {
             segments: divided(whole, has_acceleration)?,
             ignored_columns: Vec::new(),
         };
-        Ok(Reading::as_recorded(recording, self.notes))
+        Ok(Reading {
+            recording,
+            notes: self.notes,
+            mended: Vec::new(),
+        })
     }
 }
 
-/// How values run between two samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Between {
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Between {
     /// Cubic polynomials: motion.
     Smooth,
     /// Straight lines: torques, which may step.
@@ -386,23 +360,10 @@ const STENCIL: usize = 5;
 /// How much longer than the shortest step of a stencil its longest may be: beyond, polynomials swing.
 const UNEVEN: f64 = 4.0;
 
-/// Values at `times_s`, one column a time, of rows known at `own_s`; `slopes` are their derivatives at `own_s`, those
-/// of polynomials through five samples unless known. Every time is within the clock's own range.
-pub(super) fn at_times(
-    own_s: &[f64],
-    values: &DMatrix<f64>,
-    slopes: Option<&DMatrix<f64>>,
-    times_s: &[f64],
-    between: Between,
-) -> DMatrix<f64> {
-    let derived;
-    let slopes = match slopes {
-        Some(slopes) => slopes,
-        None => {
-            derived = slopes_of(own_s, values);
-            &derived
-        }
-    };
+/// Values at `times_s`, one column a time, of rows known at `own_s`, with these derivatives or [`slopes_of`] them.
+fn at_times(own: &Signal, slopes: Option<&Rows>, times_s: &[f64], between: Between) -> Rows {
+    let (own_s, values) = (&own.times_s, &own.values);
+    let slopes = slopes.map_or_else(|| Cow::Owned(slopes_of(own_s, values)), Cow::Borrowed);
     let mut out = DMatrix::zeros(values.nrows(), times_s.len());
     for (column, &time) in times_s.iter().enumerate() {
         let (left, share) = place(own_s, time);
@@ -440,17 +401,13 @@ fn slopes_of(own_s: &[f64], values: &DMatrix<f64>) -> DMatrix<f64> {
     for sample in 0..n {
         let first = sample.saturating_sub(STENCIL / 2).min(n - STENCIL);
         let times = &own_s[first..first + STENCIL];
-        let steps = times.windows(2).map(|pair| pair[1] - pair[0]);
-        let (least, most) = steps.fold((f64::INFINITY, 0.0_f64), |(least, most), step| {
-            (least.min(step), most.max(step))
-        });
-        if most > UNEVEN * least {
+        let steps = || times.windows(2).map(|pair| pair[1] - pair[0]);
+        if steps().fold(0.0, f64::max) > UNEVEN * steps().fold(f64::INFINITY, f64::min) {
             continue;
         }
-        let weights = slope_weights(times, sample - first);
         let mut slope = slopes.column_mut(sample);
         slope.fill(0.0);
-        for (k, weight) in weights.into_iter().enumerate() {
+        for (k, weight) in slope_weights(times, sample - first).into_iter().enumerate() {
             slope.axpy(weight, &values.column(first + k), 1.0);
         }
     }
@@ -468,41 +425,4 @@ fn slope_weights(times: &[f64], at: usize) -> [f64; STENCIL] {
         let below: f64 = others(j).map(|k| times[j] - times[k]).product();
         above / below
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn slopes_are_those_of_a_quartic_at_uneven_times_and_differences_where_they_swing() {
-        let own = [0.0, 0.011, 0.019, 0.032, 0.04, 0.049, 0.062];
-        let quartic = |t: f64| ((3.0 * t - 2.0) * t + 1.0) * t * t - t;
-        let slope = |t: f64| ((12.0 * t - 6.0) * t + 2.0) * t - 1.0;
-        let values = DMatrix::from_fn(1, own.len(), |_, i| quartic(own[i]));
-        let found = slopes_of(&own, &values);
-        for (i, time) in own.into_iter().enumerate() {
-            assert!(
-                (found[i] - slope(time)).abs() < 1e-12,
-                "{time}: {}",
-                found[i]
-            );
-        }
-        let bursts = [0.0, 0.001, 0.01, 0.011, 0.02, 0.021];
-        let values = DMatrix::from_fn(1, bursts.len(), |_, i| quartic(bursts[i]));
-        assert_eq!(slopes_of(&bursts, &values), differences(&bursts, &values));
-        let few = DMatrix::from_fn(1, 3, |_, i| quartic(own[i]));
-        assert_eq!(slopes_of(&own[..3], &few), differences(&own[..3], &few));
-    }
-
-    #[test]
-    fn at_times_of_the_own_clock_are_the_samples_themselves() {
-        let own = [0.0, 0.1, 0.25, 0.3];
-        let values = DMatrix::from_row_slice(1, 4, &[1.0, -2.0, 7.0, 0.5]);
-        for between in [Between::Smooth, Between::Straight, Between::Nearest] {
-            assert_eq!(at_times(&own, &values, None, &own, between), values);
-        }
-        let found = at_times(&own, &values, None, &[0.14], Between::Nearest);
-        assert_eq!(found[0], -2.0);
-    }
 }

@@ -1,15 +1,15 @@
-//! The quantities of a recording, the names of their elements in romc's order, and units with their factors to SI.
-//!
-//! Quaternions to roll, pitch and yaw; angular velocities to the rates of these angles.
+//! The quantities of a recording, the names of their elements in romc's order, and units with their factors to SI;
+//! quaternions to roll, pitch and yaw, angular velocities to the rates of these angles.
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3};
 
 use super::map::Frame;
 use crate::recording::reader::Column;
+use crate::recording::segment::Rows;
 use crate::robot::input_rule::rotation;
-use crate::robot::{JOINT_DIM, JOINT_NAMES, STATE_DIM};
+use crate::robot::{JOINT_DIM as BODY, JOINT_NAMES};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Quantity {
@@ -30,7 +30,6 @@ pub(super) enum Quantity {
 }
 
 impl Quantity {
-    /// In the order of a map.
     pub(crate) const ALL: [Self; 11] = [
         Self::JointPosition,
         Self::JointVelocity,
@@ -53,11 +52,10 @@ impl Quantity {
     ];
 
     /// Its table in a map, what its units measure, the recording's columns, and the first of them.
-    const fn facts(self) -> (&'static str, Dimension, fn(usize) -> Column, usize) {
+    fn facts(self) -> (&'static str, Dimension, fn(usize) -> Column, usize) {
         use Column::{Acceleration, Foot, Position, Velocity};
         use Dimension::{Angle, Force, Length, Torque};
-        const BODY: usize = JOINT_DIM;
-        const TURN: usize = JOINT_DIM + 3;
+        const TURN: usize = BODY + 3;
         match self {
             Self::JointPosition => ("joint.position", Angle, Position, 0),
             Self::JointVelocity => ("joint.velocity", Angle, Velocity, 0),
@@ -73,8 +71,7 @@ impl Quantity {
         }
     }
 
-    /// Its table in a map.
-    pub(crate) const fn key(self) -> &'static str {
+    pub(crate) fn key(self) -> &'static str {
         self.facts().0
     }
 
@@ -82,14 +79,12 @@ impl Quantity {
         format!("{}.{key}", self.key())
     }
 
-    /// What its units measure.
-    pub(crate) const fn dimension(self) -> Dimension {
+    pub(crate) fn dimension(self) -> Dimension {
         self.facts().1
     }
 
     pub(crate) fn column(self, element: usize) -> Column {
         let (_, _, column, first) = self.facts();
-        debug_assert!(first + element < STATE_DIM, "w of a quaternion");
         column(first + element)
     }
 
@@ -119,9 +114,8 @@ impl Quantity {
 /// Elements of a quaternion, the real part first.
 pub(super) const QUATERNION: [&str; 4] = ["w", "x", "y", "z"];
 
-/// The elements that the words of an order name, in that order: single names, names with `*` for every leg or joint
-/// (`*.hx`, `fl.*`), a word of single letters (`wxyz`, `rpy`, `xyz`).
-pub(super) fn ordered(words: &[String], elements: &[&str]) -> Result<Vec<usize>, String> {
+/// The elements that words name: names, names with `*` (`*.hx`, `fl.*`), or single letters (`wxyz`, `rpy`, `xyz`).
+pub(super) fn ordered(words: &[&str], elements: &[&str]) -> Result<Vec<usize>, String> {
     let mut out = Vec::new();
     for word in words {
         let found = named(word, elements);
@@ -144,16 +138,15 @@ pub(super) fn named(word: &str, elements: &[&str]) -> Vec<usize> {
         Some((start, end)) => element.starts_with(start) && element.ends_with(end),
         None => element == word,
     };
-    let found = (0..elements.len()).filter(|i| matches(elements[*i]));
-    let found: Vec<usize> = found.collect();
+    let found = Vec::from_iter((0..elements.len()).filter(|i| matches(elements[*i])));
     // Letters: `wxyz`, or the first letters of roll, pitch and yaw.
     let has_letters = ["x", "roll"].iter().any(|axis| elements.contains(axis));
     if !found.is_empty() || !word.is_ascii() || !has_letters {
         return found;
     }
     let of_letter = |letter: char| elements.iter().position(|e| e.starts_with(letter));
-    let letters = word.chars().map(of_letter);
-    letters.collect::<Option<Vec<usize>>>().unwrap_or_default()
+    let letters: Option<_> = word.chars().map(of_letter).collect();
+    letters.unwrap_or_default()
 }
 
 /// What a unit measures; rates and accelerations are the same per s and s^2.
@@ -202,11 +195,8 @@ impl Dimension {
     pub(crate) fn factor(self, text: &str) -> Option<f64> {
         let is_said = |c: &char| !c.is_whitespace() && !matches!(c, '*' | '.' | '·');
         let folded = text.chars().filter(is_said).flat_map(char::to_lowercase);
-        let folded: String = folded.collect();
-        let base = match self {
-            Dimension::Time => &folded[..],
-            _ => folded.split('/').next().unwrap_or_default(),
-        };
+        let is_base = |c: &char| self == Dimension::Time || *c != '/';
+        let base: String = folded.take_while(is_base).collect();
         let known = self.units().iter().find(|(name, _)| *name == base);
         known.map(|(_, factor)| *factor)
     }
@@ -220,7 +210,7 @@ impl Dimension {
 const UPRIGHT: f64 = 1e-6; // cosine of the pitch below which roll and yaw cannot be told apart
 
 /// Roll, pitch and yaw of quaternions (w, x, y, z), R = Rz Ry Rx; the length of a quaternion does not matter.
-pub(in crate::recording) fn angles_of_quaternions(quaternions: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn angles_of_quaternions(quaternions: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(3, quaternions.ncols());
     for (mut angles, q) in out.column_iter_mut().zip(quaternions.column_iter()) {
         let norm = q.norm();
@@ -262,80 +252,29 @@ pub(super) fn in_world(angles: &DMatrix<f64>, velocities: &DMatrix<f64>) -> DMat
     out
 }
 
-/// Rates of roll, pitch and yaw from an angular velocity about the body's or the world's axes, or from themselves. An
-/// error is the first sample at which the trunk points straight up or down.
-pub(super) fn angle_rates(
-    angles: &DMatrix<f64>,
-    angular: &DMatrix<f64>,
-    frame: Frame,
-) -> Result<DMatrix<f64>, usize> {
-    let mut out = DMatrix::zeros(3, angular.ncols());
-    for i in 0..angular.ncols() {
-        let [roll, pitch, yaw] = [angles[(0, i)], angles[(1, i)], angles[(2, i)]];
-        let omega = Vector3::new(angular[(0, i)], angular[(1, i)], angular[(2, i)]);
-        let (s_p, c_p) = pitch.sin_cos();
+/// Rates of roll, pitch and yaw from an angular velocity; an error is the first sample with the trunk upright.
+pub(super) fn angle_rates(angles: &Rows, angular: &Rows, frame: Frame) -> Result<Rows, usize> {
+    let mut out = angular.clone();
+    for (i, mut rates) in out.column_iter_mut().enumerate() {
+        let [(s_r, c_r), (s_p, c_p), (s_y, c_y)] = [0, 1, 2].map(|row| angles[(row, i)].sin_cos());
         if c_p.abs() < UPRIGHT {
             return Err(i);
         }
         // Columns of the matrices one below the other.
         let map = match frame {
-            Frame::Body => {
-                let (s_r, c_r) = roll.sin_cos();
-                let tangent = s_p / c_p;
-                Matrix3::from([
-                    [1.0, 0.0, 0.0],
-                    [s_r * tangent, c_r, s_r / c_p],
-                    [c_r * tangent, -s_r, c_r / c_p],
-                ])
-            }
-            Frame::World => {
-                let (s_y, c_y) = yaw.sin_cos();
-                Matrix3::from([
-                    [c_y / c_p, -s_y, c_y * s_p / c_p],
-                    [s_y / c_p, c_y, s_y * s_p / c_p],
-                    [0.0, 0.0, 1.0],
-                ])
-            }
-            Frame::Angles => return Ok(angular.clone()),
+            Frame::Body => Matrix3::from([
+                [1.0, 0.0, 0.0],
+                [s_r * (s_p / c_p), c_r, s_r / c_p],
+                [c_r * (s_p / c_p), -s_r, c_r / c_p],
+            ]),
+            Frame::World => Matrix3::from([
+                [c_y / c_p, -s_y, c_y * s_p / c_p],
+                [s_y / c_p, c_y, s_y * s_p / c_p],
+                [0.0, 0.0, 1.0],
+            ]),
+            Frame::Angles => break,
         };
-        out.set_column(i, &(map * omega));
+        rates.copy_from(&(map * angular.fixed_view::<3, 1>(0, i)));
     }
     Ok(out)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ATTITUDES: [[f64; 3]; 4] = [
-        [0.1, -0.2, 0.3],
-        [-1.0, 1.2, -3.0],
-        [0.0, -1.5, 2.0],
-        [3.0, 0.4, 0.0],
-    ];
-
-    #[test]
-    fn angle_rates_agree_with_the_derivative_of_the_rotation() {
-        let rates = [0.7, -1.1, 0.4];
-        for angles in ATTITUDES {
-            let turned = |h: f64| rotation(std::array::from_fn(|i| angles[i] + h * rates[i]));
-            let (h, r) = (1e-6, rotation(angles));
-            let derivative = (turned(h) - turned(-h)) / (2.0 * h);
-            for (frame, spin) in [
-                (Frame::Body, r.transpose() * derivative),
-                (Frame::World, derivative * r.transpose()),
-            ] {
-                let omega = [spin[(2, 1)], spin[(0, 2)], spin[(1, 0)]];
-                let column = |values: &[f64; 3]| DMatrix::from_column_slice(3, 1, values);
-                let found = angle_rates(&column(&angles), &column(&omega), frame).unwrap();
-                let error = (&found - column(&rates)).amax();
-                assert!(error < 1e-8, "{frame:?} {angles:?}: {found}");
-            }
-        }
-        let upright = DMatrix::from_column_slice(3, 1, &[0.0, PI / 2.0, 0.0]);
-        assert_eq!(
-            angle_rates(&upright, &DMatrix::zeros(3, 1), Frame::Body),
-            Err(0)
-        );
-    }
 }

@@ -19,9 +19,9 @@ use serde::Deserialize;
 
 use super::elements::Quantity;
 use crate::files::read_toml;
-use crate::recording::error::{RecordingError, RecordingFault};
+use crate::recording::error::{Outcome, RecordingError, io_fault, text, unexpected};
 
-const MAX_COLUMNS: usize = 10_000; // most columns that a range stands for
+const MOST: usize = 10_000; // most columns that a range stands for
 
 /// A map as its file states it.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
@@ -42,12 +42,11 @@ pub struct ColumnMap {
 /// How text files are laid out; what is absent is found from the file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub(in crate::recording) struct TextFormat {
+pub(crate) struct TextFormat {
     pub delimiter: Option<Delimiter>,
     pub header: Option<bool>,
     pub skip: usize,
-    /// Empty cells and NaN are samples that a quantity does not have, where topics share one table.
-    pub blank: bool,
+    pub blank: bool, // empty cells and NaN are samples that a quantity does not have, where topics share one table
     pub rows: Option<[usize; 2]>, // first and last sample to keep, counted from 1
     /// romc's own columns: none is left to guess, and each cell that is read has a finite number.
     #[serde(skip)]
@@ -56,7 +55,7 @@ pub(in crate::recording) struct TextFormat {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(in crate::recording) enum Delimiter {
+pub(crate) enum Delimiter {
     Tab,
     Blank,
     Comma,
@@ -109,16 +108,14 @@ pub(super) struct Table {
     pub order: Option<List<String>>,
     pub frame: Option<Frame>,
     pub origin: Option<Origin>,
-    /// Force from which a foot is on the ground, in the table's unit; absent for flags.
-    pub threshold: Option<f64>,
-    /// Force below which it is in the air again [default: the threshold].
-    pub release: Option<f64>,
+    pub threshold: Option<f64>, // force from which a foot is on the ground, in the table's unit; absent for flags
+    pub release: Option<f64>,   // force below which it is in the air again [default: the threshold]
 }
 
 /// A column: its name, or its number from 1.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(untagged)]
-pub(super) enum Name {
+pub(crate) enum Name {
     Number(usize),
     Text(String),
 }
@@ -168,11 +165,9 @@ impl ColumnMap {
     /// Reads a map.
     ///
     /// # Errors
-    /// [`RecordingFault::Text`] with line, key and what was expected; [`RecordingFault::Unexpected`] for a key that
-    /// does not apply to its table.
+    /// [`RecordingError`] with line or key, and what was expected.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
-        let text = read_toml(path)
-            .map_err(|source| RecordingFault::unreadable("read", source).of(path))?;
+        let text = read_toml(path).map_err(|source| io_fault("read", source).of(path))?;
         Self::parse(&path.display().to_string(), &text)
     }
 
@@ -180,11 +175,10 @@ impl ColumnMap {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn parse(file: &str, text: &str) -> Result<Self, RecordingError> {
-        let mut map: Self = toml::from_str(text).map_err(|error| {
+    pub fn parse(file: &str, toml: &str) -> Result<Self, RecordingError> {
+        let mut map: Self = toml::from_str(toml).map_err(|error| {
             let message = error.to_string();
-            let message = message.trim_end();
-            RecordingFault::Text(format!("no map of columns: {message}")).of(Path::new(file))
+            text(format!("no map of columns: {}", message.trim_end())).of(Path::new(file))
         })?;
         map.file = file.to_owned();
         map.require_applicable()?;
@@ -218,8 +212,8 @@ impl ColumnMap {
         found: impl Into<String>,
         expected: impl Into<String>,
     ) -> RecordingError {
-        let fault = RecordingFault::unexpected(found, expected);
-        RecordingError::new(&self.file, format!("`{key}`").into(), fault)
+        let place = format!("`{key}`").into();
+        RecordingError::new(&self.file, place, unexpected(found, expected))
     }
 }
 
@@ -227,41 +221,38 @@ impl Table {
     /// Its columns, patterns and ranges written out.
     pub(super) fn columns(&self, names: &Names, quantity: Quantity) -> Vec<Name> {
         let written_out = |entry: &Name| -> Vec<Name> {
-            let Name::Text(text) = entry else {
-                return vec![entry.clone()];
-            };
-            let of_pattern = || pattern(text, names, quantity).into_iter().map(Name::Text);
-            let numbers = range(text).map(|all| all.map(Name::Number).collect());
-            numbers.unwrap_or_else(|| of_pattern().collect())
+            match entry {
+                Name::Number(number) => vec![Name::Number(*number)],
+                Name::Text(text) => match range(text) {
+                    Some(numbers) => numbers.map(Name::Number).collect(),
+                    None => pattern(text, names, quantity),
+                },
+            }
         };
-        (self.columns.entries().iter())
-            .flat_map(written_out)
-            .collect()
+        let entries = self.columns.entries().iter();
+        entries.flat_map(written_out).collect()
     }
 
     /// A key that does not apply to the table of this quantity, and what may be there.
     fn misplaced(&self, quantity: Quantity) -> Option<(&'static str, &'static str)> {
+        let (frame, threshold, release) = (self.frame, self.threshold, self.release);
         let angular = quantity == Quantity::AngularVelocity;
-        let is_velocity = angular || quantity == Quantity::BodyVelocity;
-        match self {
-            _ if self.frame.is_some() && !is_velocity => {
-                Some(("frame", "none: only velocities of the body have one"))
-            }
-            _ if self.frame == Some(Frame::Angles) && !angular => {
-                Some(("frame", "`world` or `body`"))
-            }
-            _ if self.origin.is_some() && quantity != Quantity::BodyPosition => {
-                Some(("origin", "none: only `body.position` has one"))
-            }
-            _ if self.release.is_some() && self.threshold.is_none() => {
-                Some(("release", "a `threshold` beside it"))
-            }
-            _ if self.threshold.is_some() && quantity != Quantity::Feet => {
-                Some(("threshold", "none: only `feet` has one"))
-            }
-            _ if self.release > self.threshold => Some(("release", "at most the `threshold`")),
-            _ => None,
-        }
+        let of_rate = angular || quantity == Quantity::BodyVelocity;
+        let shifted = self.origin.is_some() && quantity != Quantity::BodyPosition;
+        let forceless = threshold.is_some() && quantity != Quantity::Feet;
+        let turned = frame == Some(Frame::Angles) && !angular;
+        let alone = release.is_some() && threshold.is_none();
+        let no_frame = "none: only velocities of the body have one";
+        let rules = [
+            ("frame", frame.is_some() && !of_rate, no_frame),
+            ("frame", turned, "`world` or `body`"),
+            ("origin", shifted, "none: only `body.position` has one"),
+            ("release", alone, "a `threshold` beside it"),
+            ("threshold", forceless, "none: only `feet` has one"),
+            ("release", release > threshold, "at most the `threshold`"),
+        ];
+        let wrong = rules.into_iter().find(|(_, is_wrong, _)| *is_wrong);
+        wrong.map(|(key, _, expected)| (key, expected))
     }
 }
 
@@ -271,39 +262,35 @@ pub(super) fn range(text: &str) -> Option<std::ops::RangeInclusive<usize>> {
     Some(first.trim().parse().ok()?..=last.trim().parse().ok()?)
 }
 
-/// The names that a pattern stands for: `{leg}` and `{joint}`, or `{axis}` for the words of `names`, or `{0}` or `{1}`
-/// for numbers that count from 0 or 1; the name itself if it is no pattern.
-fn pattern(text: &str, names: &Names, quantity: Quantity) -> Vec<String> {
-    let numbers = |first: usize| {
+/// The names that a pattern with `{leg}` and `{joint}`, `{axis}`, or numbers from `{0}` or `{1}` on stands for.
+fn pattern(text: &str, names: &Names, quantity: Quantity) -> Vec<Name> {
+    let from = |first: usize| -> Vec<String> {
         let count = quantity.elements().len();
         (first..first + count).map(|i| i.to_string()).collect()
     };
-    let marks: [Vec<(&str, Vec<String>)>; 4] = [
-        vec![
-            ("{leg}", names.legs.to_vec()),
-            ("{joint}", names.joints.to_vec()),
-        ],
-        vec![("{axis}", names.axes.to_vec())],
-        vec![("{0}", numbers(0))],
-        vec![("{1}", numbers(1))],
+    let marks: [&[(&str, &[String])]; 4] = [
+        &[("{leg}", &names.legs), ("{joint}", &names.joints)],
+        &[("{axis}", &names.axes)],
+        &[("{0}", &from(0))],
+        &[("{1}", &from(1))],
     ];
-    let has = |(mark, _): &(&str, Vec<String>)| text.contains(mark);
-    let used = marks.into_iter().find(|marks| marks.iter().any(has));
+    let has = |mark: &&(&str, &[String])| text.contains(mark.0);
+    let used = marks.map(|marks| Vec::from_iter(marks.iter().filter(has)));
+    let used = used.into_iter().find(|marks| !marks.is_empty());
     let mut out = vec![text.to_owned()];
-    for (mark, words) in used.into_iter().flatten().filter(has) {
-        let filled = |text: &String| -> Vec<String> {
-            words.iter().map(|word| text.replace(mark, word)).collect()
-        };
-        out = out.iter().flat_map(filled).collect();
+    for (mark, words) in used.into_iter().flatten() {
+        let each =
+            |text: &String| Vec::from_iter(words.iter().map(|word| text.replace(mark, word)));
+        out = out.iter().flat_map(each).collect();
     }
-    out
+    out.into_iter().map(Name::Text).collect()
 }
 
 /// What a map may not state, whatever the log.
 impl ColumnMap {
-    pub(super) fn require_applicable(&self) -> Result<(), RecordingError> {
+    fn require_applicable(&self) -> Outcome<()> {
+        let known = Quantity::ALL.map(Quantity::key);
         for (group, tables) in [("joint", &self.joint), ("body", &self.body)] {
-            let known = Quantity::ALL.map(Quantity::key);
             let mut keys = tables.keys().map(|name| format!("{group}.{name}"));
             if let Some(key) = keys.find(|key| !known.contains(&&key[..])) {
                 return Err(self.fault(&key, "a table", format!("one of {}", known.join(", "))));
@@ -328,63 +315,60 @@ impl ColumnMap {
             let expected = "either a column or `sample_time_s`";
             return Err(self.fault("time.sample_time_s", "a column too", expected));
         }
-        for (key, value) in [
+        let steps = [
             ("time.sample_time_s", time.sample_time_s),
             ("time.resample_s", time.resample_s),
             ("time.max_gap_s", time.max_gap_s),
-        ] {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(self.fault(key, value.to_string(), "more than 0 s"));
+        ];
+        for (key, step) in steps {
+            if let Some(step) = step.filter(|step| !(step.is_finite() && *step > 0.0)) {
+                return Err(self.fault(key, step.to_string(), "more than 0 s"));
             }
         }
         Ok(())
     }
 
-    fn require_finite(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
-        let wrong = |factors: &Option<Factors>| match factors.as_ref()? {
-            Factors::All(value) => Some(*value).filter(|value| !value.is_finite()),
-            Factors::Each(values) => values.iter().find(|value| !value.is_finite()).copied(),
-            Factors::Named(values) => values.values().find(|value| !value.is_finite()).copied(),
+    fn require_finite(&self, quantity: Quantity, table: &Table) -> Outcome<()> {
+        let one = |value: Option<f64>| value.into_iter().collect();
+        let all = |factors: &Option<Factors>| match factors {
+            None => Vec::new(),
+            Some(Factors::All(value)) => vec![*value],
+            Some(Factors::Each(values)) => values.clone(),
+            Some(Factors::Named(values)) => values.values().copied().collect(),
         };
-        let one = |value: Option<f64>| wrong(&value.map(Factors::All));
-        let found = [
-            ("time_offset_s", one(Some(table.time_offset_s))),
+        let numbers: [(&str, Vec<f64>); 5] = [
+            ("time_offset_s", vec![table.time_offset_s]),
             ("threshold", one(table.threshold)),
             ("release", one(table.release)),
-            ("sign", wrong(&table.sign)),
-            ("offset", wrong(&table.offset)),
+            ("sign", all(&table.sign)),
+            ("offset", all(&table.offset)),
         ];
-        match found
-            .into_iter()
-            .find_map(|(key, value)| Some((key, value?)))
-        {
-            None => Ok(()),
-            Some((key, value)) => {
-                Err(self.fault(&quantity.at(key), value.to_string(), "a finite number"))
+        for (key, values) in numbers {
+            if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+                return Err(self.fault(&quantity.at(key), value.to_string(), "a finite number"));
             }
         }
+        Ok(())
     }
 
     /// No column of a table twice, and no range that no log could have.
-    fn require_distinct(&self, quantity: Quantity, table: &Table) -> Result<(), RecordingError> {
+    fn require_distinct(&self, quantity: Quantity, table: &Table) -> Outcome<()> {
         let refuse = |found: String, expected: &str| {
             Err(self.fault(&quantity.at("columns"), found, expected))
         };
         for entry in table.columns.entries() {
-            let Name::Text(text) = entry else { continue };
-            if range(text).is_some_and(|all| all.end().saturating_sub(*all.start()) >= MAX_COLUMNS)
+            if let Name::Text(text) = entry
+                && range(text).is_some_and(|all| all.end().saturating_sub(*all.start()) >= MOST)
             {
-                let expected = format!("at most {MAX_COLUMNS} columns");
-                return refuse(format!("{text:?}"), &expected);
+                return refuse(format!("{text:?}"), &format!("at most {MOST} columns"));
             }
         }
         let columns = table.columns(&self.names, quantity);
         let repeated = (1..columns.len()).find(|at| columns[..*at].contains(&columns[*at]));
-        let name = match repeated.map(|at| &columns[at]) {
-            None => return Ok(()),
-            Some(Name::Text(name)) => format!("{name:?}"),
-            Some(Name::Number(number)) => number.to_string(),
-        };
-        refuse(format!("{name} twice"), "each column once")
+        match repeated.map(|at| &columns[at]) {
+            None => Ok(()),
+            Some(Name::Text(name)) => refuse(format!("{name:?} twice"), "each column once"),
+            Some(Name::Number(number)) => refuse(format!("{number} twice"), "each column once"),
+        }
     }
 }

@@ -1,12 +1,11 @@
 //! MCAP files as logs, one log per topic and set of names; the only file that reads with the `mcap` crate.
 //!
-//! Records are read one by one and chunks unpacked one at a time. Checksums that are there are compared. A file that
-//! ends early, as after a loss of power, gives what its whole records and chunks hold. Folders of ROS 2 bags have the
-//! MCAP files that one recording was split into.
+//! Records are read one by one and chunks unpacked one at a time. A file that ends early gives what its whole records
+//! and chunks hold. Folders of ROS 2 bags have the MCAP files that one recording was split into.
 
 use std::borrow::Cow;
 use std::fs::{self, File};
-use std::io::{self, BufReader, Read};
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use flate2::Crc;
@@ -18,34 +17,31 @@ use super::signal::Log;
 use super::topics::Topics;
 use crate::files::magic::{MAGIC_BYTES, MCAP, recognised};
 use crate::files::size::{Capped, Format, read_text_capped};
-use crate::recording::error::{RecordingError, RecordingFault};
+use crate::recording::error::{Checked, Outcome, RecordingFault, io_fault, text, unexpected};
 
 const RECORD_HEADER: usize = 9; // bytes of a record before its contents: its kind and their length
 const LEAST_WINDOW: u64 = 1 << 23; // window of a zstd frame that every chunk may have, in bytes
 
-/// Whether a file is an MCAP log, by its name or its first bytes, or a folder with those of a bag. Pipes are not read
-/// from to find out.
-pub(in crate::recording) fn is_mcap(path: &Path) -> bool {
-    let has_ending = || {
-        path.extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
-    };
+/// Whether a file is an MCAP log, by its name or its first bytes, which are not read of a pipe, or a bag's folder.
+pub(crate) fn is_mcap(path: &Path) -> bool {
+    let ending = path.extension();
     let begins = || {
         let mut start = Vec::new();
         let file = File::open(path).map(|file| file.take(MCAP.len() as u64));
         let read = file.and_then(|mut file| file.read_to_end(&mut start));
         read.is_ok() && start == MCAP
     };
-    is_bag(path) || has_ending() || (path.is_file() && begins())
+    is_bag(path)
+        || ending.is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
+        || (path.is_file() && begins())
 }
 
 /// Reads every topic whose messages are numbers; others have their fault.
-pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, RecordingError> {
+pub(crate) fn read_mcap(path: &Path) -> Outcome<Vec<Log>> {
     let mut topics = Topics::default();
     let (files, mut notes) = files(path)?;
     for file in files {
-        let open = File::open(&file);
-        let open = open.map_err(|source| RecordingFault::unreadable("read", source).of(&file))?;
+        let open = File::open(&file).map_err(|source| io_fault("read", source).of(&file))?;
         topics.begin_file();
         let mut scan = Scan {
             source: BufReader::new(open),
@@ -61,7 +57,7 @@ pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, Recording
         };
         // Nothing of a recording's last file may have come to the disk.
         if topics.messages == 0 {
-            return Err(RecordingFault::Mcap(early).of(&file));
+            return Err(RecordingFault::mcap(early).of(&file));
         }
         notes.push(match path == file {
             true => early,
@@ -76,6 +72,9 @@ pub(in crate::recording) fn read_mcap(path: &Path) -> Result<Vec<Log>, Recording
     Ok(logs)
 }
 
+/// Kind and contents of a record, and its first byte in the file.
+type Raw = (u64, Vec<u8>, Vec<u8>);
+
 struct Scan<'a, R> {
     source: R,
     topics: &'a mut Topics,
@@ -88,17 +87,26 @@ struct Scan<'a, R> {
 
 impl<R: Read> Scan<'_, R> {
     /// Reads all records; words for a file that ends before its end.
-    fn whole(&mut self, path: &Path) -> Result<Option<String>, RecordingFault> {
+    fn whole(&mut self, path: &Path) -> Checked<Option<String>> {
         let before = self.topics.messages;
-        let mut next = match self.magic(path)? {
-            true => self.next()?,
-            false => None,
-        };
-        while let Some((at, header, body)) = next {
-            if self.take(&header, &body, at)? {
-                return Ok(None);
+        if self.magic(path)? {
+            while let Some((at, header, body)) = self.next()? {
+                let damaged = |words| damaged(&format!("the record at byte {at}"), words);
+                match parsed(header[0], &body).map_err(damaged)? {
+                    Some(Record::Chunk { header: own, data }) => {
+                        self.section.update(&header);
+                        self.section.update(&body);
+                        self.chunk(&own, data, at)?;
+                    }
+                    record => {
+                        let is_last = matches!(record, Some(Record::Footer(_)));
+                        self.take(&header, &body, record).map_err(damaged)?;
+                        if is_last {
+                            return Ok(None);
+                        }
+                    }
+                }
             }
-            next = self.next()?;
         }
         let messages = self.topics.messages - before;
         let (offset, chunks) = (self.offset, self.chunks);
@@ -111,26 +119,25 @@ impl<R: Read> Scan<'_, R> {
     }
 
     /// The first bytes of the file; none if it ends within them or holds zeros alone.
-    fn magic(&mut self, path: &Path) -> Result<bool, RecordingFault> {
+    fn magic(&mut self, path: &Path) -> Checked<bool> {
         let mut start = self.bytes(MCAP.len() as u64)?;
         if start == MCAP {
             self.section.update(&start);
             return Ok(true);
         }
-        if MCAP.starts_with(&start)
-            || (start.iter().all(|byte| *byte == 0) && self.is_zero_to_the_end()?)
-        {
+        let is_zero = start.iter().all(|byte| *byte == 0);
+        if MCAP.starts_with(&start) || (is_zero && self.is_zero_to_the_end()?) {
             return Ok(false);
         }
         start.extend(self.bytes((MAGIC_BYTES - MCAP.len()) as u64)?);
         Err(match recognised(path, &start) {
             Some(format) => RecordingFault::other_format(&format),
-            None => RecordingFault::Mcap("it begins with other bytes".to_owned()),
+            None => RecordingFault::mcap("it begins with other bytes"),
         })
     }
 
     /// The next record: its place, header and contents; none where the file ends before that.
-    fn next(&mut self) -> Result<Option<(u64, Vec<u8>, Vec<u8>)>, RecordingFault> {
+    fn next(&mut self) -> Checked<Option<Raw>> {
         let at = self.offset;
         let header = self.bytes(RECORD_HEADER as u64)?;
         let Some(length) = header.get(1..).and_then(|length| length.try_into().ok()) else {
@@ -156,11 +163,8 @@ impl<R: Read> Scan<'_, R> {
         }
     }
 
-    /// Adds a record that begins at this byte; whether it is the last.
-    fn take(&mut self, header: &[u8], body: &[u8], at: u64) -> Result<bool, RecordingFault> {
-        let damaged = |words: String| damaged(&format!("the record at byte {at}"), words);
-        let record = parsed(header[0], body).map_err(damaged)?;
-        let is_last = matches!(record, Some(Record::Footer(_)));
+    /// Adds a record of the file that is no chunk.
+    fn take(&mut self, header: &[u8], body: &[u8], record: Option<Record>) -> Result<(), String> {
         // How much of a record that ends a section its checksum covers, and that checksum.
         let end = match &record {
             Some(Record::DataEnd(end)) => Some((0, end.data_section_crc)),
@@ -173,79 +177,69 @@ impl<R: Read> Scan<'_, R> {
             self.section.update(&body[..covered]);
         }
         if let Some((_, stated)) = end {
-            let found = std::mem::take(&mut self.section).sum();
-            same_checksum(stated, found).map_err(damaged)?;
+            same_checksum(stated, std::mem::take(&mut self.section).sum())?;
         }
-        match record {
-            Some(Record::Chunk { header, data }) => self.chunk(&header, data, at)?,
-            Some(record) => add(self.topics, record).map_err(damaged)?,
-            None => {}
-        }
-        Ok(is_last)
+        record.map_or(Ok(()), |record| add(self.topics, record))
     }
 
     /// Up to so many bytes: fewer at the end of the file.
-    fn bytes(&mut self, count: u64) -> Result<Vec<u8>, RecordingFault> {
+    fn bytes(&mut self, count: u64) -> Checked<Vec<u8>> {
         let mut bytes = Vec::new();
         let read = (&mut self.source).take(count).read_to_end(&mut bytes);
-        read.map_err(|source| RecordingFault::io("read", source))?;
+        read.map_err(|source| io_fault("read", source))?;
         self.offset += bytes.len() as u64;
         Ok(bytes)
     }
 
     /// Whether nothing but zeros follow, as a file system may leave them.
-    fn is_zero_to_the_end(&mut self) -> Result<bool, RecordingFault> {
+    fn is_zero_to_the_end(&mut self) -> Checked<bool> {
         loop {
             let bytes = self.bytes(1 << 16)?;
-            if bytes.is_empty() {
-                return Ok(true);
-            }
-            if bytes.iter().any(|byte| *byte != 0) {
-                return Ok(false);
+            if bytes.is_empty() || bytes.iter().any(|byte| *byte != 0) {
+                return Ok(bytes.is_empty());
             }
         }
     }
 
-    fn chunk(
-        &mut self,
-        header: &ChunkHeader,
-        data: Cow<'_, [u8]>,
-        at: u64,
-    ) -> Result<(), RecordingFault> {
+    fn chunk(&mut self, header: &ChunkHeader, data: Cow<[u8]>, at: u64) -> Checked<()> {
         self.chunks += 1;
-        let damaged =
-            |words: String| damaged(&format!("chunk {} at byte {at}", self.chunks), words);
         self.packed += data.len() as u64;
+        let place = format!("chunk {} at byte {at}", self.chunks);
+        let read = self.records(header, data);
+        read.map_err(|words| damaged(&place, words))
+    }
+
+    fn records(&mut self, header: &ChunkHeader, data: Cow<[u8]>) -> Result<(), String> {
         let most = Format::Chunk.most_unpacked(self.packed);
-        let left = most.saturating_sub(self.unpacked);
-        let bytes = unpacked(header, data, left).map_err(damaged)?;
+        let bytes = unpacked(header, data, most.saturating_sub(self.unpacked))?;
         self.unpacked += bytes.len() as u64;
         if header.uncompressed_crc != 0 {
-            let mut crc = Crc::new();
-            crc.update(&bytes);
-            same_checksum(header.uncompressed_crc, crc.sum()).map_err(damaged)?;
+            same_checksum(header.uncompressed_crc, checksum(&bytes))?;
         }
-        let split = |rest: &'_ [u8]| -> Option<(u8, usize)> {
+        let split = |rest: &[u8]| -> Option<(u8, usize)> {
             let (header, rest) = rest.split_first_chunk::<RECORD_HEADER>()?;
             let length = usize::try_from(u64::from_le_bytes(*header.last_chunk()?)).ok()?;
             (length <= rest.len()).then_some((header[0], length))
         };
         let mut rest = &bytes[..];
         while !rest.is_empty() {
-            let cut = || damaged("it ends within a record".to_owned());
-            let (kind, length) = split(rest).ok_or_else(cut)?;
+            let (kind, length) = split(rest).ok_or("it ends within a record")?;
             let (body, behind) = rest[RECORD_HEADER..].split_at(length);
-            match parsed(kind, body).map_err(damaged)? {
-                Some(Record::Chunk { .. }) => {
-                    return Err(damaged("a chunk within a chunk".to_owned()));
-                }
-                Some(record) => add(self.topics, record).map_err(damaged)?,
+            match parsed(kind, body)? {
+                Some(Record::Chunk { .. }) => return Err("a chunk within a chunk".to_owned()),
+                Some(record) => add(self.topics, record)?,
                 None => {}
             }
             rest = behind;
         }
         Ok(())
     }
+}
+
+fn checksum(bytes: &[u8]) -> u32 {
+    let mut crc = Crc::new();
+    crc.update(bytes);
+    crc.sum()
 }
 
 /// A record; none for an attachment, whose checksum is compared.
@@ -256,9 +250,7 @@ fn parsed(kind: u8, body: &[u8]) -> Result<Option<Record<'_>>, String> {
     }
     let ends = "an attachment without checksum";
     let (contents, stated) = body.split_last_chunk::<4>().ok_or(ends)?;
-    let mut crc = Crc::new();
-    crc.update(contents);
-    same_checksum(u32::from_le_bytes(*stated), crc.sum())?;
+    same_checksum(u32::from_le_bytes(*stated), checksum(contents))?;
     Ok(None)
 }
 
@@ -266,7 +258,7 @@ fn parsed(kind: u8, body: &[u8]) -> Result<Option<Record<'_>>, String> {
 fn add(topics: &mut Topics, record: Record<'_>) -> Result<(), String> {
     match record {
         Record::Schema { header, data } => topics.schema(header, data.into_owned()),
-        Record::Channel(channel) => topics.channel(&channel)?,
+        Record::Channel(channel) => topics.channel(channel)?,
         Record::Message { header, data } => {
             topics.message(header.channel_id, header.log_time, &data)?;
         }
@@ -276,7 +268,7 @@ fn add(topics: &mut Topics, record: Record<'_>) -> Result<(), String> {
 }
 
 fn damaged(place: &str, words: String) -> RecordingFault {
-    RecordingFault::Mcap(format!("{place}: {words}"))
+    RecordingFault::mcap(format!("{place}: {words}"))
 }
 
 /// Compares checksums; a stated one of 0 is absent.
@@ -290,11 +282,9 @@ fn same_checksum(stated: u32, found: u32) -> Result<(), String> {
     }
 }
 
-fn unpacked<'a>(
-    header: &ChunkHeader,
-    data: Cow<'a, [u8]>,
-    left: u64,
-) -> Result<Cow<'a, [u8]>, String> {
+type Bytes<'a> = Cow<'a, [u8]>;
+
+fn unpacked<'a>(header: &ChunkHeader, data: Bytes<'a>, left: u64) -> Result<Bytes<'a>, String> {
     let size = header.uncompressed_size;
     if size > left {
         let packed = format!("{} bytes that unpack to {size}", data.len());
@@ -303,8 +293,8 @@ fn unpacked<'a>(
     let mut out = Vec::new();
     let mut read =
         |source: &mut dyn Read| Capped::new(source, Format::Chunk, size).read_to_end(&mut out);
-    let read: io::Result<usize> = match &header.compression[..] {
-        "" => return exact(data, size),
+    let read = match &header.compression[..] {
+        "" => Ok(0),
         "zstd" => {
             let mut frame = FrameDecoder::new();
             frame.set_max_window_size(size.next_power_of_two().max(LEAST_WINDOW));
@@ -315,10 +305,8 @@ fn unpacked<'a>(
         other => return Err(format!("packed by `{other}`, expected zstd, lz4 or none")),
     };
     read.map_err(|error| format!("{}: {error}", header.compression))?;
-    exact(Cow::Owned(out), size)
-}
-
-fn exact(bytes: Cow<'_, [u8]>, size: u64) -> Result<Cow<'_, [u8]>, String> {
+    let is_plain = header.compression.is_empty();
+    let bytes = if is_plain { data } else { out.into() };
     match bytes.len() as u64 == size {
         true => Ok(bytes),
         false => Err(format!("{} bytes, expected {size}", bytes.len())),
@@ -326,21 +314,21 @@ fn exact(bytes: Cow<'_, [u8]>, size: u64) -> Result<Cow<'_, [u8]>, String> {
 }
 
 const METADATA: &str = "metadata.yaml"; // the list of files in a bag's folder
-/// Endings of files that bags are made of.
-const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".mcap.zst"];
+const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".mcap.zst"]; // endings of files that bags are made of
 
 fn is_bag(path: &Path) -> bool {
     path.is_dir() && (path.join(METADATA).is_file() || !parts(path).is_empty())
 }
 
 /// The files of a log: the path itself, or those of the bag that the folder is; and notes on files that are left out.
-fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), RecordingError> {
+fn files(path: &Path) -> Outcome<(Vec<PathBuf>, Vec<String>)> {
     if !path.is_dir() {
         return Ok((vec![path.to_owned()], Vec::new()));
     }
     let listed = listed(path)?;
+    let missing = |file: &Path| Err(text("no such file").of(file));
     if let Some(absent) = listed.iter().find(|file| !file.is_file()) {
-        return Err(RecordingFault::Missing.of(absent));
+        return missing(absent);
     }
     let is_listed = !listed.is_empty();
     let mut files = parts(path);
@@ -368,7 +356,7 @@ fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), RecordingError> {
             files.len()
         );
         let expected = "the parts of one bag; give separate recordings one by one: FOLDER/*.mcap";
-        return Err(RecordingFault::unexpected(found, expected).of(path));
+        return Err(unexpected(found, expected).of(path));
     }
     // Without a list, a number that is left out is a file that is lost.
     let lost = files.windows(2).filter(|_| !is_listed).find_map(|pair| {
@@ -377,19 +365,16 @@ fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), RecordingError> {
         let ending = file.strip_prefix(&format!("{name}_{one}"))?;
         (other > one + 1).then(|| path.join(format!("{name}_{}{ending}", one + 1)))
     });
-    match lost {
-        Some(lost) => Err(RecordingFault::Missing.of(&lost)),
-        None => Ok((files, unlisted)),
-    }
+    lost.map_or(Ok((files, unlisted)), |lost| missing(&lost))
 }
 
-fn listed(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+fn listed(folder: &Path) -> Outcome<Vec<PathBuf>> {
     let path = folder.join(METADATA);
     if !path.is_file() {
         return Ok(Vec::new());
     }
-    let text = read_text_capped(&path, Format::Settings)
-        .map_err(|source| RecordingFault::unreadable("read", source).of(&path))?;
+    let text = read_text_capped(&path, Format::Settings);
+    let text = text.map_err(|source| io_fault("read", source).of(&path))?;
     let mut lines = text.lines().map(str::trim);
     let Some(first) = lines.find_map(|line| line.strip_prefix("relative_file_paths:")) else {
         return Ok(Vec::new());

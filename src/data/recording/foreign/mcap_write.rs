@@ -11,36 +11,36 @@ use crate::recording::segment::Segment;
 use crate::robot::input_rule::rotation;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, Robot};
 
-const HEADER: &str = "================================================================================\n\
-MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
-================================================================================\n\
-MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
-const JOINT_STATE: &str = "std_msgs/Header header\n\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
+const JOINT_STATE: &str = "std_msgs/Header header\n
+string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
 const ODOMETRY: &str = "std_msgs/Header header\nstring child_frame_id\n\
 geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n";
-const GEOMETRY: &str = "================================================================================\n\
-MSG: geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance\n\
-================================================================================\n\
-MSG: geometry_msgs/Pose\nPoint position\nQuaternion orientation\n\
-================================================================================\n\
-MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n\
-================================================================================\n\
-MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n\
-================================================================================\n\
-MSG: geometry_msgs/TwistWithCovariance\nTwist twist\nfloat64[36] covariance\n\
-================================================================================\n\
-MSG: geometry_msgs/Twist\nVector3 linear\nVector3 angular\n\
-================================================================================\n\
-MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n";
+/// Parts of messages: the name, then the fields.
+const HEADER: [&str; 2] = [
+    "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id",
+    "builtin_interfaces/Time\nint32 sec\nuint32 nanosec",
+];
+const GEOMETRY: [&str; 7] = [
+    "geometry_msgs/PoseWithCovariance\nPose pose\nfloat64[36] covariance",
+    "geometry_msgs/Pose\nPoint position\nQuaternion orientation",
+    "geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z",
+    "geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w",
+    "geometry_msgs/TwistWithCovariance\nTwist twist\nfloat64[36] covariance",
+    "geometry_msgs/Twist\nVector3 linear\nVector3 angular",
+    "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z",
+];
+
+/// The definition of a message with those of its parts.
+fn definition(own: &str, parts: &[&str]) -> String {
+    let part = |part: &&str| format!("{:=<80}\nMSG: {part}\n", "");
+    own.to_owned() + &parts.iter().map(part).collect::<String>()
+}
 
 /// Topic of joint angles, velocities and torques.
 pub const JOINT_TOPIC: &str = "/joint_states";
-/// Topic of the trunk's pose in the world and its velocities in its own axes.
-const BODY_TOPIC: &str = "/odom";
-/// Topic of contact, 1 or 0 for each foot.
-const FEET_TOPIC: &str = "/foot_contacts";
-/// Topic of the inputs of a model.
-const INPUT_TOPIC: &str = "/inputs";
+const BODY_TOPIC: &str = "/odom"; // pose of the trunk in the world, its velocities in its own axes
+const FEET_TOPIC: &str = "/foot_contacts"; // contact, 1 or 0 for each foot
+const INPUT_TOPIC: &str = "/inputs"; // inputs of a model
 
 /// Writes a segment and, if given, its inputs (18 x samples) as messages; chunks are not packed.
 ///
@@ -51,22 +51,18 @@ pub fn write_mcap(
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,
 ) -> Result<(), mcap::McapError> {
-    let options = WriteOptions::new()
-        .compression(None)
-        .profile("ros2")
-        .library(concat!("romc ", env!("CARGO_PKG_VERSION")));
+    const LIBRARY: &str = concat!("romc ", env!("CARGO_PKG_VERSION"));
+    let options = WriteOptions::new().compression(None).profile("ros2");
+    let options = options.library(LIBRARY);
     let mut writer = Writer::with_options(destination, options)?;
-    let joint_text = format!("{JOINT_STATE}{HEADER}");
-    let body_text = format!("{ODOMETRY}{GEOMETRY}{HEADER}");
+    let joint_text = definition(JOINT_STATE, &HEADER);
+    let body_text = definition(ODOMETRY, &[&GEOMETRY[..], &HEADER].concat());
     let mut schema = |name, text: String| writer.add_schema(name, "ros2msg", text.as_bytes());
     let joint = schema("sensor_msgs/msg/JointState", joint_text)?;
     let body = schema("nav_msgs/msg/Odometry", body_text)?;
     let mut topic = |schema, topic| writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
-    let [joints, odom, contacts] = [
-        topic(joint, JOINT_TOPIC)?,
-        topic(body, BODY_TOPIC)?,
-        topic(joint, FEET_TOPIC)?,
-    ];
+    let (joints, odom) = (topic(joint, JOINT_TOPIC)?, topic(body, BODY_TOPIC)?);
+    let contacts = topic(joint, FEET_TOPIC)?;
     let with_topic = |inputs| Ok::<_, mcap::McapError>((topic(joint, INPUT_TOPIC)?, inputs));
     let inputs = inputs.map(with_topic).transpose()?;
     let names = JOINT_NAMES.map(str::to_owned);
@@ -123,12 +119,10 @@ fn odometry(segment: &Segment, sample: usize, time_ns: i64) -> Message {
     ];
     let mut message = Message::stamped(time_ns);
     message.text("base");
-    message.numbers(of(&segment.x, BODY).as_slice());
-    message.numbers(&[q.i, q.j, q.k, q.w]);
-    message.numbers(&[0.0; 36]);
-    message.numbers(velocity.as_slice());
-    message.numbers(&angular);
-    message.numbers(&[0.0; 36]);
+    let (place, attitude) = (of(&segment.x, BODY), [q.i, q.j, q.k, q.w]);
+    let pose = [place.as_slice(), &attitude, &[0.0; 36]];
+    let twist = [velocity.as_slice(), &angular, &[0.0; 36]];
+    (pose.iter().chain(&twist)).for_each(|values| message.numbers(values));
     message
 }
 
@@ -147,7 +141,6 @@ impl Message {
         message
     }
 
-    /// Position, velocity and effort of joints.
     fn joint_state(mut self, names: &[String], lists: [&[f64]; 3]) -> Self {
         self.length(names.len());
         names.iter().for_each(|name| self.text(name));
@@ -172,7 +165,6 @@ impl Message {
         (values.iter()).for_each(|value| self.put(8, &value.to_le_bytes()));
     }
 
-    /// Appends at a multiple of `align` bytes after the header.
     fn put(&mut self, align: usize, bytes: &[u8]) {
         let body = self.0.len() - 4;
         self.0.resize(4 + body.next_multiple_of(align), 0);

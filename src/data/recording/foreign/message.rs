@@ -1,12 +1,10 @@
-//! Messages of ROS 1 and 2 as numbers with names, by the definition that a log carries. Faults are words: a topic that
-//! cannot be read is listed with its fault.
+//! Messages of ROS 1 and 2 as numbers with names, by the definition that a log carries. Faults are words.
 
 use std::collections::BTreeMap;
 
 const MOST_ENTRIES: usize = 64; // longest array whose entries become columns: an image is no column
 const MOST_NUMBERS: usize = 4096; // most numbers of a message
-/// Most fields of a message without bytes of their own: empty messages.
-const MOST_EMPTY: usize = 100_000;
+const MOST_EMPTY: usize = 100_000; // most fields of a message without bytes of their own: empty messages
 const MOST_LEVELS: usize = 16; // deepest nesting of messages
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +38,9 @@ struct Field {
     count: Count,
 }
 
+/// A fault is words.
+type Told<T> = Result<T, String>;
+
 /// A message type with all that it is made of; the first is the message's own.
 #[derive(Debug, Clone)]
 pub(super) struct Definition {
@@ -60,10 +61,12 @@ pub(super) struct Numbers {
     pub lists: Vec<u8>,
 }
 
+type Texts<'a> = BTreeMap<String, Vec<&'a str>>;
+
 impl Definition {
     /// Reads a definition and those of its parts, as `ros2 bag` and `rosbag` store them.
     pub(crate) fn parse(name: &str, text: &str) -> Result<Self, String> {
-        let mut texts: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+        let mut texts = Texts::new();
         let mut current = short(name);
         for line in text.lines() {
             let line = line.split('#').next().unwrap_or_default().trim();
@@ -78,12 +81,7 @@ impl Definition {
         Ok(definition)
     }
 
-    fn add(
-        &mut self,
-        name: &str,
-        texts: &BTreeMap<String, Vec<&str>>,
-        level: usize,
-    ) -> Result<usize, String> {
+    fn add(&mut self, name: &str, texts: &Texts, level: usize) -> Result<usize, String> {
         if let Some(index) = self.types.iter().position(|(known, _)| known == name) {
             return Ok(index);
         }
@@ -108,10 +106,9 @@ impl Definition {
                 _ if base.contains('/') => short(base),
                 _ => format!("{package}/{base}"),
             };
-            let kind = match (primitive(base), &full[..]) {
-                (Some(kind), _) => kind,
-                (_, "builtin_interfaces/Time" | "builtin_interfaces/Duration") => Kind::Time,
-                (None, _) => Kind::Message(self.add(&full, texts, level + 1)?),
+            let kind = match primitive(base).or_else(|| primitive(&full)) {
+                Some(kind) => kind,
+                None => Kind::Message(self.add(&full, texts, level + 1)?),
             };
             let name = field.to_owned();
             self.types[index].1.push(Field { name, kind, count });
@@ -119,16 +116,9 @@ impl Definition {
         Ok(index)
     }
 
-    /// The names of a message's numbers, if `named`, and the numbers: `pose.position.x`, `motor_state[3].q`, and
-    /// `position[FR_hip_joint]` where a list of names goes with a list of numbers.
-    pub(crate) fn values(
-        &self,
-        layout: Layout,
-        bytes: &[u8],
-        named: bool,
-    ) -> Result<Numbers, String> {
-        let mut cursor = Cursor::new(layout, bytes)?;
-        cursor.named = named;
+    /// The numbers and, if `named`, their names: `motor_state[3].q`, `position[FR_hip_joint]` of lists with names.
+    pub(crate) fn values(&self, layout: Layout, bytes: &[u8], named: bool) -> Told<Numbers> {
+        let mut cursor = Cursor::new(layout, bytes, named)?;
         cursor.message(self, 0, true)?;
         Ok(cursor.out)
     }
@@ -186,6 +176,7 @@ fn primitive(name: &str) -> Option<Kind> {
         "float64" => Kind::Float(8),
         "string" => Kind::Text,
         "time" | "duration" => Kind::Time,
+        "builtin_interfaces/Time" | "builtin_interfaces/Duration" => Kind::Time,
         _ => return None,
     })
 }
@@ -205,7 +196,7 @@ struct Cursor<'a> {
 
 impl<'a> Cursor<'a> {
     /// Behind CDR's header, which tells byte order and alignment.
-    fn new(layout: Layout, bytes: &'a [u8]) -> Result<Self, String> {
+    fn new(layout: Layout, bytes: &'a [u8], named: bool) -> Result<Self, String> {
         let (bytes, big_endian, align) = match (layout, bytes) {
             (Layout::Ros1, bytes) => (bytes, false, 1),
             (Layout::Ros2, [0, kind @ (0 | 1), _, _, rest @ ..]) => (rest, *kind == 0, 8),
@@ -222,7 +213,7 @@ impl<'a> Cursor<'a> {
             big_endian,
             align,
             fields: 0,
-            named: false,
+            named,
             path: String::new(),
             out: Numbers::default(),
         })
@@ -243,10 +234,8 @@ impl<'a> Cursor<'a> {
                 let count = count.min(MOST_ENTRIES + 1) as u32;
                 self.out.lists.extend(count.to_le_bytes());
             }
-            if field.kind == Kind::Text
-                && field.count != Count::One
-                && field.name.starts_with("name")
-            {
+            let is_list = field.count != Count::One;
+            if field.kind == Kind::Text && is_list && field.name.starts_with("name") {
                 let read = (0..count).map(|_| self.text());
                 names = read.collect::<Result<_, _>>()?;
                 if kept {
@@ -256,14 +245,13 @@ impl<'a> Cursor<'a> {
                 continue;
             }
             let is_named = field.count == Count::Any && !matches!(field.kind, Kind::Message(_));
-            let others = ![0, names.len()].contains(&count) && !names.is_empty();
+            let (known, name) = (names.len(), &field.name);
+            let others = ![0, known].contains(&count) && known > 0;
             if is_named && others && of_type.ends_with("/JointState") {
-                let (names, field) = (names.len(), &field.name);
-                return Err(format!(
-                    "message: {names} names and {count} values of `{field}`"
-                ));
+                let found = format!("{known} names and {count} values of `{name}`");
+                return Err(format!("message: {found}"));
             }
-            let has_names = is_named && names.len() == count;
+            let has_names = is_named && known == count;
             for entry in 0..count {
                 self.count_field()?;
                 if self.named {
@@ -271,12 +259,10 @@ impl<'a> Cursor<'a> {
                     self.append(field, entry, has_names.then(|| &names[entry][..]));
                 }
                 let kept = kept && count <= MOST_ENTRIES;
-                match field.kind {
-                    Kind::Message(part) => self.message(of, part, kept)?,
-                    kind => {
-                        let value = self.value(kind)?;
-                        (value.filter(|_| kept)).map_or(Ok(()), |value| self.keep(value))?;
-                    }
+                if let Kind::Message(part) = field.kind {
+                    self.message(of, part, kept)?;
+                } else if let Some(value) = self.value(field.kind)?.filter(|_| kept) {
+                    self.keep(value)?;
                 }
             }
         }
@@ -284,16 +270,14 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    /// Appends a field to the path of its message, of a list with the entry.
     fn append(&mut self, field: &Field, entry: usize, name: Option<&str>) {
         if !self.path.is_empty() {
             self.path.push('.');
         }
         self.path.push_str(&field.name);
-        match name {
-            _ if field.count == Count::One => {}
-            Some(name) => self.path.push_str(&format!("[{name}]")),
-            None => self.path.push_str(&format!("[{entry}]")),
+        if field.count != Count::One {
+            let entry = name.map_or_else(|| entry.to_string(), str::to_owned);
+            self.path.push_str(&format!("[{entry}]"));
         }
     }
 
@@ -309,10 +293,11 @@ impl<'a> Cursor<'a> {
     /// Counts a field: each has a byte at least, but for empty messages.
     fn count_field(&mut self) -> Result<(), String> {
         self.fields += 1;
-        match self.fields <= self.bytes.len() + MOST_EMPTY {
-            true => Ok(()),
-            false => Err(ends_early(self.bytes)),
-        }
+        self.require(self.fields <= self.bytes.len() + MOST_EMPTY)
+    }
+
+    fn require(&self, is_there: bool) -> Result<(), String> {
+        is_there.then_some(()).ok_or_else(|| ends_early(self.bytes))
     }
 
     fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
@@ -338,7 +323,6 @@ impl<'a> Cursor<'a> {
         Ok((self.unsigned(size)? << unused) as i64 >> unused)
     }
 
-    /// The next number; none of a text.
     fn value(&mut self, kind: Kind) -> Result<Option<Value>, String> {
         let number = match kind {
             Kind::Text | Kind::Message(_) => {
@@ -346,8 +330,8 @@ impl<'a> Cursor<'a> {
                 return Ok(None);
             }
             Kind::Time => {
-                let time = Value::Time(self.signed(4)?, self.unsigned(4)? as u32);
-                return Ok(Some(time));
+                let (seconds, rest) = (self.signed(4)?, self.unsigned(4)?);
+                return Ok(Some(Value::Time(seconds, rest as u32)));
             }
             Kind::Bool => f64::from(u8::from(self.unsigned(1)? != 0)),
             Kind::Unsigned(size) => self.unsigned(size)? as f64,
@@ -361,35 +345,16 @@ impl<'a> Cursor<'a> {
     fn length(&mut self) -> Result<usize, String> {
         let length = self.unsigned(4)? as usize;
         // Every entry has a byte at least.
-        match length <= self.bytes.len() {
-            true => Ok(length),
-            false => Err(ends_early(self.bytes)),
-        }
+        self.require(length <= self.bytes.len()).map(|()| length)
     }
 
     fn text(&mut self) -> Result<String, String> {
         let length = self.length()?;
         let bytes = self.take(length)?;
-        let bytes = match self.layout {
+        let ended = match self.layout {
             Layout::Ros1 => bytes,
             Layout::Ros2 => bytes.strip_suffix(&[0]).unwrap_or(bytes),
         };
-        Ok(String::from_utf8_lossy(bytes).into_owned())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_of_whole_numbers_have_their_signs() {
-        let definition = Definition::parse("a/B", "bool on\nint8 a\nint64 b\nint16 c\n").unwrap();
-        let (long, short) = ((-9_i64).to_le_bytes(), (-300_i16).to_le_bytes());
-        let bytes = [&[1, 0xff][..], &long, &short].concat();
-        let found = definition.values(Layout::Ros1, &bytes, true).unwrap();
-        assert_eq!(found.names, ["on", "a", "b", "c"]);
-        let values = [1.0, -1.0, -9.0, -300.0].map(Value::Number);
-        assert_eq!(found.values, values);
+        Ok(String::from_utf8_lossy(ended).into_owned())
     }
 }

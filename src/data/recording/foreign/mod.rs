@@ -1,10 +1,8 @@
 //! Logs of other programs: columns and topics of any name, unit, order and clock become a recording.
 //!
-//! `map` is the file that says what stands where, `elements` the words in it; `log` holds what was read, `text` reads
-//! it from text files, `mcap` from MCAP files and folders of them by the definitions of their messages (`message`), one
-//! table per topic and set of names (`topics`), `mcap_write` writes those; `signal` takes a quantity from it;
-//! `assemble` brings all quantities to one clock, turns quaternions and rates of the body's own axes into roll, pitch,
-//! yaw and their rates (`attitude`), and makes segments; `guess` writes a first map.
+//! `map` says what stands where, `elements` has the words in it; `text` reads text files, `mcap` MCAP files and folders
+//! of them by the definitions of their messages (`message`), one table per topic and set of names (`topics`); `signal`
+//! takes a quantity from a log; `assemble` brings all to one clock and makes segments; `guess` writes a first map.
 
 mod assemble;
 mod elements;

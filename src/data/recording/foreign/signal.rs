@@ -1,6 +1,4 @@
-//! One quantity taken from a log: its values in SI units and romc's order, and their times.
-//!
-//! A log as it was read: named columns of numbers, before anyone says what they are.
+//! A log as it was read: named columns of numbers; and one quantity taken from it, in SI units and romc's order.
 
 use std::path::PathBuf;
 
@@ -9,7 +7,7 @@ use nalgebra::DMatrix;
 use super::elements::{Dimension, QUATERNION, Quantity, named, ordered};
 use super::map::{ColumnMap, Factors, List, Name, Table};
 use crate::recording::clock::Instant;
-use crate::recording::error::{RecordingError, RecordingFault};
+use crate::recording::error::{Outcome, RecordingError, RecordingFault};
 use crate::recording::reader::folded;
 
 #[derive(Debug, Clone)]
@@ -24,7 +22,7 @@ pub(super) struct Source<'a> {
     map: &'a ColumnMap,
     quantity: Quantity,
     table: &'a Table,
-    log: &'a Log,
+    pub log: &'a Log,
 }
 
 impl<'a> Source<'a> {
@@ -33,7 +31,7 @@ impl<'a> Source<'a> {
         logs: &'a [Log],
         map: &'a ColumnMap,
         quantity: Quantity,
-    ) -> Result<Option<Self>, RecordingError> {
+    ) -> Outcome<Option<Self>> {
         let Some(table) = map.table(quantity) else {
             return Ok(None);
         };
@@ -54,39 +52,33 @@ impl<'a> Source<'a> {
             let found = format!("`{name}`, which cannot be read ({fault})");
             return Err(map.fault(&quantity.at("topic"), found, "a topic of numbers"));
         }
-        Ok(Some(Self {
+        let source = Self {
             map,
             quantity,
             table,
             log,
-        }))
-    }
-
-    pub(crate) fn log(&self) -> &'a Log {
-        self.log
+        };
+        Ok(Some(source))
     }
 
     /// The quantity, its times in s from `epoch_s`, the whole seconds that all clocks count from.
-    pub(crate) fn take(&self, epoch_s: i64) -> Result<Signal, RecordingError> {
+    pub(crate) fn take(&self, epoch_s: i64) -> Outcome<Signal> {
         let columns = self.columns()?;
         let elements = match self.is_quaternion(columns.len()) {
             true => &QUATERNION,
             false => self.quantity.elements(),
         };
         let order = self.order(elements, columns.len())?;
-        let dimension = self.quantity.dimension();
-        let key = self.quantity.at("unit");
-        let factor = self.factor(&key, dimension, self.table.unit.as_ref())?;
+        let unit = self.table.unit.as_ref();
+        let factor = self.factor(&self.quantity.at("unit"), self.quantity.dimension(), unit)?;
         let signs = self.numbers(&self.table.sign, "sign", elements, &order, 1.0)?;
         let offsets = self.numbers(&self.table.offset, "offset", elements, &order, 0.0)?;
         if let Some(wrong) = signs.iter().find(|sign| sign.abs() != 1.0) {
             return Err(self.fault("sign", wrong.to_string(), "1 or -1"));
         }
         let times = self.times()?;
-        let kept = self.kept(&columns, times.column);
-        for column in columns.iter().copied().chain(times.column) {
-            self.require_numbers(column, &kept)?;
-        }
+        let used: Vec<usize> = columns.iter().copied().chain(times.column).collect();
+        let kept = self.kept(&used)?;
         let mut values = DMatrix::zeros(elements.len(), kept.len());
         for (place, &column) in columns.iter().enumerate() {
             let (scale, offset) = (signs[place] * factor, offsets[place]);
@@ -103,19 +95,14 @@ impl<'a> Source<'a> {
     }
 
     /// First instant of the clock where that counts from an epoch, in whole seconds.
-    pub(crate) fn epoch_s(&self) -> Result<Option<i64>, RecordingError> {
+    pub(crate) fn epoch_s(&self) -> Outcome<Option<i64>> {
         let times = self.times()?;
         let instants = times.channel.and_then(|channel| channel.instants.as_ref());
         let first = instants.and_then(|instants| instants.first());
         Ok(first.map(|instant| instant.whole.div_euclid(times.per_second)))
     }
 
-    fn fault(
-        &self,
-        key: &str,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-    ) -> RecordingError {
+    fn fault(&self, key: &str, found: String, expected: impl Into<String>) -> RecordingError {
         self.map.fault(&self.quantity.at(key), found, expected)
     }
 
@@ -123,23 +110,22 @@ impl<'a> Source<'a> {
         self.quantity == Quantity::Orientation && columns == QUATERNION.len()
     }
 
-    fn columns(&self) -> Result<Vec<usize>, RecordingError> {
+    fn columns(&self) -> Outcome<Vec<usize>> {
         let names = self.table.columns(&self.map.names, self.quantity);
         let key = self.quantity.at("columns");
         let columns = names.iter().map(|name| self.column(&key, name));
-        let columns = columns.collect::<Result<Vec<_>, _>>()?;
-        let expected = self.quantity.elements().len();
-        if columns.len() == expected || self.is_quaternion(columns.len()) {
-            return Ok(columns);
-        }
-        let expected = match self.quantity {
-            Quantity::Orientation => "3 (angles) or 4 (a quaternion)".to_owned(),
-            _ => expected.to_string(),
+        let columns = columns.collect::<Outcome<Vec<_>>>()?;
+        let expected = match self.quantity.elements().len() {
+            count if columns.len() == count || self.is_quaternion(columns.len()) => {
+                return Ok(columns);
+            }
+            _ if self.quantity == Quantity::Orientation => "3 (angles) or 4 (a quaternion)".into(),
+            count => count.to_string(),
         };
         Err(self.fault("columns", format!("{} columns", columns.len()), expected))
     }
 
-    fn column(&self, key: &str, name: &Name) -> Result<usize, RecordingError> {
+    fn column(&self, key: &str, name: &Name) -> Outcome<usize> {
         let log = self.log;
         log.column(name).ok_or_else(|| {
             let found = match name {
@@ -155,36 +141,31 @@ impl<'a> Source<'a> {
         })
     }
 
-    fn order(&self, elements: &[&str], columns: usize) -> Result<Vec<usize>, RecordingError> {
-        let words = match &self.table.order {
+    fn order(&self, elements: &[&str], columns: usize) -> Outcome<Vec<usize>> {
+        let words: Vec<&str> = match &self.table.order {
             None if self.is_quaternion(columns) => {
-                let found = "a quaternion without order";
+                let found = "a quaternion without order".to_owned();
                 return Err(self.fault("order", found, "`wxyz` or `xyzw`"));
             }
             None => return Ok((0..columns).collect()),
-            Some(List::One(text)) => text.split_whitespace().map(str::to_owned).collect(),
-            Some(List::Many(words)) => words.clone(),
+            Some(List::One(text)) => text.split_whitespace().collect(),
+            Some(List::Many(words)) => words.iter().map(String::as_str).collect(),
         };
-        let order = ordered(&words, elements).and_then(|order| match order.len() == columns {
-            true => Ok(order),
-            false => Err(format!("{} names", order.len())),
-        });
-        let expected = || format!("each of {} once", elements.join(" "));
-        order.map_err(|found| self.fault("order", found, expected()))
+        let found = match ordered(&words, elements) {
+            Ok(order) if order.len() == columns => return Ok(order),
+            Ok(order) => format!("{} names", order.len()),
+            Err(found) => found,
+        };
+        let expected = format!("each of {} once", elements.join(" "));
+        Err(self.fault("order", found, expected))
     }
 
     /// The factor to SI of a unit that stands under this key; 1 without one.
-    fn factor(
-        &self,
-        key: &str,
-        dimension: Dimension,
-        unit: Option<&String>,
-    ) -> Result<f64, RecordingError> {
+    fn factor(&self, key: &str, dimension: Dimension, unit: Option<&String>) -> Outcome<f64> {
         let Some(unit) = unit else { return Ok(1.0) };
-        dimension.factor(unit).ok_or_else(|| {
-            let expected = format!("one of {}", dimension.names());
-            self.map.fault(key, format!("`{unit}`"), expected)
-        })
+        let expected = || format!("one of {}", dimension.names());
+        let refused = || self.map.fault(key, format!("`{unit}`"), expected());
+        dimension.factor(unit).ok_or_else(refused)
     }
 
     fn numbers(
@@ -194,74 +175,67 @@ impl<'a> Source<'a> {
         elements: &[&str],
         order: &[usize],
         default: f64,
-    ) -> Result<Vec<f64>, RecordingError> {
+    ) -> Outcome<Vec<f64>> {
         let count = order.len();
-        match factors {
-            None => Ok(vec![default; count]),
-            Some(Factors::All(value)) => Ok(vec![*value; count]),
-            Some(Factors::Each(values)) if values.len() == count => Ok(values.clone()),
+        let named_values = match factors {
+            None => return Ok(vec![default; count]),
+            Some(Factors::All(value)) => return Ok(vec![*value; count]),
+            Some(Factors::Each(values)) if values.len() == count => return Ok(values.clone()),
             Some(Factors::Each(values)) => {
-                Err(self.fault(key, format!("{} numbers", values.len()), count.to_string()))
+                let found = format!("{} numbers", values.len());
+                return Err(self.fault(key, found, count.to_string()));
             }
-            Some(Factors::Named(named_values)) => {
-                let mut of_element = vec![default; elements.len()];
-                for (word, value) in named_values {
-                    let found = named(word, elements);
-                    if found.is_empty() {
-                        let expected = format!("one of {}", elements.join(" "));
-                        return Err(self.fault(key, format!("`{word}`"), expected));
-                    }
-                    for element in found {
-                        of_element[element] = *value;
-                    }
-                }
-                Ok(order.iter().map(|element| of_element[*element]).collect())
+            Some(Factors::Named(named_values)) => named_values,
+        };
+        let mut of_element = vec![default; elements.len()];
+        for (word, value) in named_values {
+            let found = named(word, elements);
+            if found.is_empty() {
+                let expected = format!("one of {}", elements.join(" "));
+                return Err(self.fault(key, format!("`{word}`"), expected));
+            }
+            for element in found {
+                of_element[element] = *value;
             }
         }
+        Ok(order.iter().map(|element| of_element[*element]).collect())
     }
 
-    /// The samples that a quantity has: all, or those without blanks where the map allows blanks.
-    fn kept(&self, columns: &[usize], time: Option<usize>) -> Vec<usize> {
-        let blank = |row: usize| {
-            let mut used = columns.iter().copied().chain(time);
-            used.any(|column| self.log.columns[column].values[row].is_nan())
-        };
-        let all = 0..self.log.len();
-        all.filter(|row| !self.map.text.blank || !blank(*row))
-            .collect()
-    }
-
-    fn require_numbers(&self, column: usize, kept: &[usize]) -> Result<(), RecordingError> {
+    /// The samples of these columns: all, or those without blanks where the map allows blanks; each a number.
+    fn kept(&self, columns: &[usize]) -> Outcome<Vec<usize>> {
         let log = self.log;
-        let channel: &Channel = &log.columns[column];
-        let name = match channel.name.is_empty() {
-            true => (column + 1).to_string(),
-            false => channel.name.clone(),
-        };
-        if kept.is_empty() {
-            let fault = RecordingFault::HeaderOnly(log.columns.len());
-            return Err(fault.in_cell(&log.path, log.first_row, &name));
+        let is_blank =
+            |row: &usize| (columns.iter()).any(|at| log.columns[*at].values[*row].is_nan());
+        let mut kept = Vec::from_iter(0..log.len());
+        kept.retain(|row| !self.map.text.blank || !is_blank(row));
+        for &column in columns {
+            let channel = &log.columns[column];
+            let fault = match kept.iter().find(|row| !channel.values[**row].is_finite()) {
+                Some(&row) => {
+                    let found = match &channel.refused {
+                        Some((sample, text)) if *sample == row => text,
+                        _ => &channel.values[row].to_string(),
+                    };
+                    let expected = "a finite number (for cells left empty on purpose: `blank = true` in `[text]`)";
+                    (row, RecordingFault::number(found, expected))
+                }
+                None if kept.is_empty() => (0, RecordingFault::header_only(log.columns.len())),
+                None => continue,
+            };
+            let name = match channel.name.is_empty() {
+                true => &(column + 1).to_string(),
+                false => &channel.name,
+            };
+            return Err(fault.1.in_cell(&log.path, log.first_row + fault.0, name));
         }
-        let wrong = kept.iter().find(|row| !channel.values[**row].is_finite());
-        let Some(&row) = wrong else { return Ok(()) };
-        let found = match &channel.refused {
-            Some((sample, text)) if *sample == row => text.clone(),
-            Some(_) | None => channel.values[row].to_string(),
-        };
-        let expected =
-            "a finite number (for cells left empty on purpose: `blank = true` in `[text]`)";
-        let fault = RecordingFault::number(&found, expected);
-        Err(fault.in_cell(&log.path, log.first_row + row, &name))
+        Ok(kept)
     }
 
-    fn times(&self) -> Result<Times<'a>, RecordingError> {
+    fn times(&self) -> Outcome<Times<'a>> {
         let (time, table) = (&self.map.time, self.table);
         let (key, name, own_unit) = match &table.time {
-            Some(name) => {
-                let key = self.quantity.at("time");
-                (key, Some(name), table.time_unit.as_ref())
-            }
-            None => ("time.column".to_owned(), time.column.as_ref(), None),
+            Some(name) => (self.quantity.at("time"), Some(name), &table.time_unit),
+            None => ("time.column".to_owned(), time.column.as_ref(), &None),
         };
         let (column, step_s) = match (name, self.log.clock, time.sample_time_s) {
             (Some(name), _, _) => (Some(self.column(&key, name)?), 1.0),
@@ -272,7 +246,8 @@ impl<'a> Source<'a> {
                 return Err(self.map.fault("time", "no clock", expected));
             }
         };
-        let unit = own_unit.or(time.unit.as_ref()).filter(|_| name.is_some());
+        let unit = own_unit.as_ref().or(time.unit.as_ref());
+        let unit = unit.filter(|_| name.is_some());
         let factor = self.factor("time.unit", Dimension::Time, unit)?;
         Ok(Times {
             column,
@@ -293,31 +268,25 @@ struct Times<'a> {
 }
 
 impl Times<'_> {
-    /// Time of a row, in s from the common epoch.
     fn at(&self, row: usize, epoch_s: i64) -> f64 {
-        let time = match self.channel {
-            None => row as f64,
-            Some(Channel {
-                instants: Some(instants),
-                ..
-            }) => {
+        let instants = self.channel.and_then(|channel| channel.instants.as_ref());
+        let time = match (instants, self.channel) {
+            (Some(instants), _) => {
                 let whole = epoch_s.saturating_mul(self.per_second);
                 instants[row].since(Instant { whole, rest: 0.0 })
             }
-            Some(channel) => channel.values[row],
+            (None, Some(channel)) => channel.values[row],
+            (None, None) => row as f64,
         };
         time * self.factor + self.offset_s
     }
 }
 
-/// One file or topic.
 #[derive(Debug, Clone, Default)]
-pub(in crate::recording) struct Log {
+pub(crate) struct Log {
     pub path: PathBuf,
-    /// Name of the file in a map, or of the topic; empty for the only file.
-    pub name: String,
-    /// Column of the clock, in s, that every message of a topic has.
-    pub clock: Option<usize>,
+    pub name: String, // name of the file in a map, or of the topic; empty for the only file
+    pub clock: Option<usize>, // column of the clock, in s, that every message of a topic has
     pub columns: Vec<Channel>,
     pub is_named: bool,
     pub first_row: usize, // line of the first sample, 1 for the first message of a topic
@@ -326,21 +295,19 @@ pub(in crate::recording) struct Log {
 }
 
 #[derive(Debug, Clone, Default)]
-pub(in crate::recording) struct Channel {
+pub(crate) struct Channel {
     pub name: String,     // its name; empty without a header
     pub values: Vec<f64>, // its values; NaN where a cell is empty or no number
     /// The same as times, where the column holds times that one number does not hold.
     pub instants: Option<Vec<Instant>>,
-    /// The first cell that is no number: its sample and text.
-    pub refused: Option<(usize, String)>,
+    pub refused: Option<(usize, String)>, // the first cell that is no number: its sample and text
 }
 
 impl Channel {
     pub(crate) fn named(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            ..Self::default()
-        }
+        let name = name.to_owned();
+        let other = Self::default();
+        Self { name, ..other }
     }
 
     /// Its values as times, from the first on where one number does not hold them.
@@ -354,11 +321,10 @@ impl Channel {
 
 impl Log {
     pub(crate) fn names(&self) -> Vec<String> {
-        let names = self.columns.iter().map(|channel| channel.name.clone());
-        names.collect()
+        let columns = self.columns.iter();
+        columns.map(|channel| channel.name.clone()).collect()
     }
 
-    /// Number of samples.
     pub(crate) fn len(&self) -> usize {
         (self.columns.first()).map_or(0, |channel| channel.values.len())
     }
@@ -372,7 +338,6 @@ impl Log {
         }
     }
 
-    /// Sorts the rows by these times of theirs; those of one time keep their order.
     pub(crate) fn sort_by(&mut self, times: &[f64]) {
         let mut order = Vec::from_iter(0..times.len());
         order.sort_by(|one, other| times[*one].total_cmp(&times[*other]));
@@ -380,7 +345,7 @@ impl Log {
     }
 
     /// The column of a name or number: an exact name before one that differs in case and blanks.
-    pub(in crate::recording::foreign) fn column(&self, name: &Name) -> Option<usize> {
+    pub(crate) fn column(&self, name: &Name) -> Option<usize> {
         match name {
             Name::Number(number) => number.checked_sub(1).filter(|i| *i < self.columns.len()),
             Name::Text(text) => {

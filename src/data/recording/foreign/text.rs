@@ -1,60 +1,48 @@
-//! Text files as logs: any separator, with or without header; or romc's own format, in which every cell that has a
-//! meaning is a finite number.
+//! Text files as logs: any separator, with or without header; or romc's own format.
 
 use std::path::Path;
 
 use super::map::{ColumnMap, Delimiter, TextFormat};
 use super::signal::{Channel, Log};
 use crate::recording::clock::Instant;
-use crate::recording::error::{RecordingError, RecordingFault, shortened};
+use crate::recording::error::{
+    Checked, Outcome, RecordingError, RecordingFault, shortened, text, unexpected,
+};
 use crate::recording::lines::{self, Lines, MAX_ROWS, NumberReader};
 use crate::recording::reader::Column;
 
-/// Numbers from which a column is kept as times: beyond, one number does not hold a microsecond.
-const LARGE: f64 = 1e8;
+const LARGE: f64 = 1e8; // numbers from which a column is kept as times: beyond, one number does not hold a microsecond
 
-/// Reads the files of a recording: `path` itself, or those that the map names, in the folder `path` or beside it.
-///
-/// In a file's name `{}` stands for the name of `path` without its ending.
-pub(in crate::recording) fn read_texts(
-    path: &Path,
-    map: &ColumnMap,
-) -> Result<Vec<Log>, RecordingError> {
-    let named = map.files();
-    if path.is_dir() && named.is_empty() {
+/// Reads the files of a recording: `path` itself, or those that the map names, in the folder `path` or beside it; `{}`
+/// stands for the name of `path` without its ending.
+pub(crate) fn read_texts(path: &Path, map: &ColumnMap) -> Outcome<Vec<Log>> {
+    let (named, is_folder) = (map.files(), path.is_dir());
+    if is_folder && named.is_empty() {
         let expected = format!("a file, or the names of its files in {}", map.file);
-        return Err(RecordingFault::unexpected("a folder", expected).of(path));
+        return Err(unexpected("a folder", expected).of(path));
     }
     let mut logs = Vec::new();
-    if !path.is_dir() {
+    if !is_folder {
         logs.push(read_text(path, &map.text)?);
     }
     let stem = path.file_stem().unwrap_or_default().to_string_lossy(); // what has no name cannot be opened
     for name in named {
-        let file = match path.is_dir() {
+        let file = match is_folder {
             true => path.join(name),
             false => path.with_file_name(name.replace("{}", stem.trim_end_matches(".csv"))),
         };
-        logs.push(Log {
-            name: name.to_owned(),
-            ..read_text(&file, &map.text)?
-        });
+        let log = read_text(&file, &map.text)?;
+        let name = name.to_owned();
+        logs.push(Log { name, ..log });
     }
     Ok(logs)
 }
 
-pub(in crate::recording) fn read_text(
-    path: &Path,
-    format: &TextFormat,
-) -> Result<Log, RecordingError> {
+pub(crate) fn read_text(path: &Path, format: &TextFormat) -> Outcome<Log> {
     read_lines(path, Lines::open(path)?, format)
 }
 
-pub(in crate::recording) fn read_lines(
-    path: &Path,
-    mut lines: Lines<'_>,
-    format: &TextFormat,
-) -> Result<Log, RecordingError> {
+pub(crate) fn read_lines(path: &Path, mut lines: Lines, format: &TextFormat) -> Outcome<Log> {
     let mut sheet: Option<Sheet> = None;
     let mut blank = None;
     while let Some((row, line)) = lines.next_row()? {
@@ -74,9 +62,10 @@ pub(in crate::recording) fn read_lines(
             (Some(sheet), None) => sheet.push(row, line)?,
         }
     }
-    let sheet = sheet.ok_or_else(|| RecordingFault::Empty.of(path))?;
+    let empty = || text("empty file, expected a header and at least two samples").of(path);
+    let sheet = sheet.ok_or_else(empty)?;
     match sheet.count {
-        0 => Err(RecordingFault::HeaderOnly(sheet.log.columns.len()).of(path)),
+        0 => Err(RecordingFault::header_only(sheet.log.columns.len()).of(path)),
         _ => Ok(sheet.log),
     }
 }
@@ -91,12 +80,7 @@ struct Sheet {
 
 impl Sheet {
     /// From the first line: names, or already numbers.
-    fn begin(
-        path: &Path,
-        row: usize,
-        line: &str,
-        format: &TextFormat,
-    ) -> Result<Self, RecordingError> {
+    fn begin(path: &Path, row: usize, line: &str, format: &TextFormat) -> Outcome<Self> {
         // NumPy and MATLAB write headers as comments.
         let header = match format.own {
             true => line,
@@ -120,7 +104,7 @@ impl Sheet {
             path: path.to_owned(),
             columns: cells.iter().map(named).collect(),
             is_named,
-            first_row: if is_named { row + 1 } else { row },
+            first_row: row + usize::from(is_named),
             ..Log::default()
         };
         let own = format.own.then(|| Column::arranged(path, &log.names()));
@@ -137,15 +121,13 @@ impl Sheet {
         Ok(sheet)
     }
 
-    fn push(&mut self, row: usize, line: &str) -> Result<(), RecordingError> {
+    fn push(&mut self, row: usize, line: &str) -> Outcome<()> {
         if self.count == MAX_ROWS {
             let found = format!("more than {MAX_ROWS} samples");
-            let fault = RecordingFault::unexpected(found, "shorter recordings");
-            return Err(fault.at(&self.log.path, row));
+            return Err(unexpected(found, "shorter recordings").at(&self.log.path, row));
         }
         let mut cells = cells(line, self.delimiter);
-        let expected = self.log.columns.len();
-        let is_own = self.own.is_some();
+        let (expected, is_own) = (self.log.columns.len(), self.own.is_some());
         // A separator at the end of each line is no column.
         if !is_own && cells.len() == expected + 1 && cells.last().is_some_and(|c| c.is_empty()) {
             cells.pop();
@@ -166,11 +148,10 @@ impl Sheet {
         self.push_cells(row, cells)
     }
 
-    fn push_cells(&mut self, row: usize, cells: Vec<&str>) -> Result<(), RecordingError> {
-        let own = self.own.as_deref();
+    fn push_cells(&mut self, row: usize, cells: Vec<&str>) -> Outcome<()> {
         for (place, cell) in cells.into_iter().enumerate() {
             let channel = &mut self.log.columns[place];
-            match own.map(|columns| columns[place]) {
+            match self.own.as_deref().map(|columns| columns[place]) {
                 None => channel.push(cell, &mut self.numbers),
                 Some(None) => {}
                 Some(Some(column)) => (channel.push_own(column, cell, &mut self.numbers))
@@ -182,10 +163,10 @@ impl Sheet {
     }
 
     fn length_fault(&self, row: usize, found: usize) -> RecordingError {
-        let columns = &self.log.columns;
-        let is_own = self.own.is_some();
+        let (columns, is_own) = (&self.log.columns, self.own.is_some());
+        let expected = columns.len();
         let hint = match self.delimiter {
-            Delimiter::Comma if is_own && found > columns.len() => {
+            Delimiter::Comma if is_own && found > expected => {
                 "; where numbers have decimal commas, cells are separated by `;`"
             }
             _ if !is_own && self.count == 0 && self.log.is_named => {
@@ -198,7 +179,7 @@ impl Sheet {
         let name = (columns.get(found).or(last)).map_or("", |column| &column.name);
         let fault = RecordingFault::RowLength {
             found,
-            expected: columns.len(),
+            expected,
             hint,
         };
         fault.in_cell(&self.log.path, row, name)
@@ -212,14 +193,14 @@ impl Channel {
             None if cell.is_empty() => f64::NAN,
             None if cell.eq_ignore_ascii_case("true") => 1.0,
             None if cell.eq_ignore_ascii_case("false") => 0.0,
-            None => {
-                if let Some(instant) = Instant::from_iso(cell) {
-                    return self.push_instant(instant);
+            None => match Instant::from_iso(cell) {
+                Some(instant) => return self.push_instant(instant),
+                None => {
+                    let sample = self.values.len();
+                    (self.refused).get_or_insert_with(|| (sample, shortened(cell)));
+                    f64::NAN
                 }
-                let sample = self.values.len();
-                (self.refused).get_or_insert_with(|| (sample, shortened(cell)));
-                f64::NAN
-            }
+            },
         };
         if self.instants.is_some() || value.abs() >= LARGE {
             let exact = Instant::from_decimal(cell).or_else(|| Instant::of(value));
@@ -239,13 +220,8 @@ impl Channel {
     }
 
     /// Adds a cell of romc's own format: a date, 0 or 1 of a foot, or a finite number.
-    fn push_own(
-        &mut self,
-        column: Column,
-        cell: &str,
-        numbers: &mut NumberReader,
-    ) -> Result<(), RecordingFault> {
-        let is_foot = matches!(column, Column::Foot(_));
+    fn push_own(&mut self, column: Column, cell: &str, numbers: &mut NumberReader) -> Checked<()> {
+        let (is_foot, finite) = (matches!(column, Column::Foot(_)), "a finite number");
         if column == Column::Time
             && let Some(date) = Instant::from_iso(cell)
         {
@@ -257,18 +233,17 @@ impl Channel {
             "False" | "false" | "FALSE" if is_foot => Some(0.0),
             _ => numbers.parse(cell),
         };
-        let expected = match value {
-            Some(value) if is_foot && value.is_finite() && value != 0.0 && value != 1.0 => {
-                return Err(RecordingFault::contact(value));
+        match value {
+            None => Err(RecordingFault::number(cell, numbers.expected())),
+            Some(value) if !value.is_finite() => Err(RecordingFault::number(cell, finite)),
+            Some(value) if is_foot && ![0.0, 1.0].contains(&value) => {
+                Err(RecordingFault::contact(value))
             }
-            Some(value) if value.is_finite() => {
+            Some(value) => {
                 self.push_value(value);
-                return Ok(());
+                Ok(())
             }
-            Some(_) => "a finite number",
-            None => numbers.expected(),
-        };
-        Err(RecordingFault::number(cell, expected))
+        }
     }
 
     /// Adds a time; earlier values become times as well.
@@ -281,12 +256,10 @@ impl Channel {
 }
 
 fn delimiter_of(line: &str) -> Delimiter {
-    match line {
-        _ if line.contains('\t') => Delimiter::Tab,
-        _ if line.contains(';') => Delimiter::Semicolon,
-        _ if line.contains(',') => Delimiter::Comma,
-        _ => Delimiter::Blank,
-    }
+    use Delimiter::{Blank, Comma, Semicolon, Tab};
+    let mut known = [Tab, Semicolon, Comma].into_iter();
+    let found = known.find(|delimiter| line.contains(character(*delimiter)));
+    found.unwrap_or(Blank)
 }
 
 fn character(delimiter: Delimiter) -> char {

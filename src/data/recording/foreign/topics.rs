@@ -1,8 +1,7 @@
 //! Topics of an MCAP log as tables: numbers by the names that each message gives them, rows in order of time.
 //!
-//! A message whose lists have the names of an earlier one in another order belongs to the same table; one with other
-//! names, or lists of other lengths, to another table of the topic. Rows are sorted by the time of recording, late
-//! stamps into their place, and exact repeats are dropped; a note says so.
+//! Messages whose lists have other names or lengths belong to another table of the topic. Rows are sorted by the time of
+//! recording, late stamps into their place, and exact repeats are dropped; a note says so.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +10,12 @@ use mcap::records::{Channel as Declared, SchemaHeader};
 use super::message::{Definition, Layout, Value, undefined, unknown_encoding};
 use super::signal::{Channel, Log};
 use crate::recording::clock::Instant;
-use crate::recording::error::RecordingFault;
+use crate::recording::error::{RecordingFault, text};
 use crate::recording::lines::MAX_ROWS;
 
 const MOST_TABLES: usize = 16; // most tables of a topic
 const MOST_ARRANGEMENTS: usize = 64; // most arrangements of lists that are kept in mind
-/// Most messages in a row with earlier stamps than one before them, for which they count as late; more are another run
-/// of a simulator.
+/// Most messages in a row with stamps before an earlier one that are late; more are another run of a simulator.
 const MOST_LATE: usize = 20;
 
 #[derive(Default)]
@@ -28,12 +26,11 @@ pub(super) struct Topics {
     pub messages: usize,
 }
 
-/// Encoding, name and text of a definition.
 type Schema = (String, String, Vec<u8>);
 
 struct Topic {
     name: String,
-    definition: Result<(Layout, Definition), String>,
+    definition: Defined,
     declared: (String, Option<Schema>), // encoding of the messages, and their schema
     tables: Vec<Table>,
     /// By lists of a message: its table, and the columns of its numbers.
@@ -60,40 +57,35 @@ impl Topics {
         self.schemas.insert(header.id, schema);
     }
 
-    pub(crate) fn channel(&mut self, channel: &Declared) -> Result<(), String> {
-        let (id, other) = (channel.id, &channel.topic);
+    pub(crate) fn channel(&mut self, channel: Declared) -> Result<(), String> {
+        let (id, name) = (channel.id, channel.topic);
         let schema = self.schemas.get(&channel.schema_id).cloned();
-        let declared = (channel.message_encoding.clone(), schema);
-        let same = |topic: &Topic| topic.name == *other && topic.declared == declared;
-        let index = (self.topics.iter().position(same)).unwrap_or_else(|| {
+        let declared = (channel.message_encoding, schema);
+        let same = |topic: &Topic| topic.name == name && topic.declared == declared;
+        let index = self.topics.iter().position(same);
+        let index = index.unwrap_or(self.topics.len());
+        let known = self.channels.insert(id, index);
+        if let Some(known) = known.filter(|known| *known != index) {
+            let one = &self.topics[known].name;
+            return Err(format!("channel {id} is of `{one}` and of `{name}`"));
+        }
+        if index == self.topics.len() {
             self.topics.push(Topic {
-                name: other.clone(),
-                definition: definition(other, &declared.0, declared.1.as_ref()),
+                definition: definition(&name, &declared.0, declared.1.as_ref()),
+                name,
                 declared,
                 tables: Vec::new(),
                 arrangements: BTreeMap::new(),
                 arrived: 0,
                 fault: None,
             });
-            self.topics.len() - 1
-        });
-        match *self.channels.entry(id).or_insert(index) {
-            known if known == index => Ok(()),
-            known => {
-                let one = &self.topics[known].name;
-                Err(format!("channel {id} is of `{one}` and of `{other}`"))
-            }
         }
+        Ok(())
     }
 
-    pub(crate) fn message(
-        &mut self,
-        channel: u16,
-        time_ns: u64,
-        bytes: &[u8],
-    ) -> Result<(), String> {
-        let undeclared = || format!("a message of channel {channel}, which is not declared");
-        let index = self.channels.get(&channel).ok_or_else(undeclared)?;
+    pub(crate) fn message(&mut self, id: u16, time_ns: u64, bytes: &[u8]) -> Result<(), String> {
+        let undeclared = || format!("a message of channel {id}, which is not declared");
+        let index = self.channels.get(&id).ok_or_else(undeclared)?;
         let topic = &mut self.topics[*index];
         self.messages += 1;
         if topic.fault.is_none()
@@ -105,7 +97,6 @@ impl Topics {
         Ok(())
     }
 
-    /// The tables, and topics that are none, each with its fault.
     pub(crate) fn logs(self) -> Result<Vec<Log>, RecordingFault> {
         let mut logs = Vec::new();
         for mut topic in self.topics {
@@ -137,18 +128,17 @@ impl Topics {
         if logs.iter().all(|log| log.fault.is_some()) {
             let refused = (logs.iter()).find_map(|log| Some((&log.name, log.fault.as_ref()?)));
             let why = refused.map(|(topic, fault)| format!(" (`{topic}`: {fault})"));
-            let text = "found no topic of ROS messages with numbers".to_owned();
-            return Err(RecordingFault::Text(text + &why.unwrap_or_default()));
+            let why = why.unwrap_or_default();
+            let found = "found no topic of ROS messages with numbers";
+            return Err(text(format!("{found}{why}")));
         }
         Ok(logs)
     }
 }
 
-fn definition(
-    topic: &str,
-    message: &str,
-    schema: Option<&Schema>,
-) -> Result<(Layout, Definition), String> {
+type Defined = Result<(Layout, Definition), String>;
+
+fn definition(topic: &str, message: &str, schema: Option<&Schema>) -> Defined {
     let encoding = schema.map_or("", |(encoding, ..)| encoding);
     let layout = match (message, encoding) {
         ("cdr", "ros2msg") => Layout::Ros2,
@@ -181,13 +171,15 @@ impl Topic {
         table.arrivals.push(self.arrived);
         self.arrived += 1;
         let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
-        let columns = &mut table.log.columns;
-        columns[0].push_instant(instant(seconds as i64, rest as u32));
-        for (column, value) in order.iter().zip(found.values) {
+        let recorded = Value::Time(seconds as i64, rest as u32);
+        let values = [(0, recorded)].into_iter();
+        for (column, value) in values.chain(order.iter().copied().zip(found.values)) {
+            let column = &mut table.log.columns[column];
             match value {
-                Value::Number(value) => columns[*column].values.push(value),
-                Value::Time(seconds, nanoseconds) => {
-                    columns[*column].push_instant(instant(seconds, nanoseconds));
+                Value::Number(value) => column.values.push(value),
+                Value::Time(whole, nanoseconds) => {
+                    let rest = 1e-9 * f64::from(nanoseconds);
+                    column.push_instant(Instant { whole, rest });
                 }
             }
         }
@@ -203,10 +195,9 @@ impl Topic {
         }
         let columns_in = |table: &Table| {
             let columns = table.log.columns.iter().zip(0..).skip(1);
-            let places: BTreeMap<&String, usize> =
-                columns.map(|(column, i)| (&column.name, i)).collect();
+            let places = BTreeMap::from_iter(columns.map(|(column, i)| (&column.name, i)));
             let found = names.iter().map(|name| places.get(name).copied());
-            let found = found.collect::<Option<Vec<usize>>>();
+            let found: Option<Vec<usize>> = found.collect();
             found.filter(|found| found.len() == places.len())
         };
         let mut known = self.tables.iter().enumerate();
@@ -214,8 +205,9 @@ impl Topic {
             return Ok(found);
         }
         if self.tables.len() == MOST_TABLES {
-            let most = format!("messages of more than {MOST_TABLES} lengths or sets of names");
-            return Err(most + ", expected tables");
+            return Err(format!(
+                "messages of more than {MOST_TABLES} lengths or sets of names, expected tables"
+            ));
         }
         let order = (1..=names.len()).collect();
         let columns = ["log_time".to_owned()].into_iter().chain(names);
@@ -232,13 +224,6 @@ impl Topic {
             is_part: false,
         });
         Ok((self.tables.len() - 1, order))
-    }
-}
-
-fn instant(seconds: i64, nanoseconds: u32) -> Instant {
-    Instant {
-        whole: seconds,
-        rest: 1e-9 * f64::from(nanoseconds),
     }
 }
 
@@ -269,17 +254,13 @@ impl Table {
     /// The table by the stamps of its messages, or the time of recording if they have none, with rows in order.
     fn finished(self) -> Log {
         let mut log = self.log;
-        let (name, total) = (log.name.clone(), log.len());
-        let say = |log: &mut Log, count: usize, what: &str| {
-            let note = format!("`{name}`: {count} of {total} messages {what}");
-            log.notes.push(note);
-        };
+        let (total, mut counts) = (log.len(), Vec::new());
         let recorded = log.columns[0].times();
         let (early, _) = late(&recorded);
         if early > 0 {
             log.sort_by(&recorded);
             let what = "were out of order and are sorted by their time of recording";
-            say(&mut log, early, what);
+            counts.push((early, what));
         }
         let has_times = |channel: &Channel| channel.values.iter().any(|time| *time != 0.0);
         let is_stamp = |channel: &Channel| channel.name == "header.stamp" && has_times(channel);
@@ -289,14 +270,17 @@ impl Table {
         let (count, longest) = late(&stamps);
         if count > 0 && longest <= MOST_LATE {
             log.sort_by(&stamps);
-            say(&mut log, count, "had late stamps and are sorted by these");
+            counts.push((count, "had late stamps and are sorted by these"));
         }
         let kept = distinct(&log, clock);
-        let repeated = log.len() - kept.len();
-        if repeated > 0 {
+        if kept.len() < total {
             log.choose(&kept);
-            say(&mut log, repeated, "were exact repeats and are left out");
+            counts.push((total - kept.len(), "were exact repeats and are left out"));
         }
+        let name = &log.name;
+        let notes = counts.iter();
+        let note = |(count, what): &_| format!("`{name}`: {count} of {total} messages {what}");
+        log.notes = notes.map(note).collect();
         log
     }
 }

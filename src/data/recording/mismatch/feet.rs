@@ -19,12 +19,10 @@ pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Mismatch> 
     let orders = orders();
     let mut sums = vec![0.0; orders.len()];
     for segment in &recording.segments {
-        let heights = heights(segment, robot);
-        for (feet, height) in segment.feet.iter().zip(&heights) {
+        for (feet, height) in segment.feet.iter().zip(&heights(segment, robot)) {
             if feet.contains(&true) && feet.contains(&false) {
-                for (sum, order) in sums.iter_mut().zip(&orders) {
-                    *sum += higher_m(feet, height, order);
-                }
+                let sums = sums.iter_mut().zip(&orders);
+                sums.for_each(|(sum, order)| *sum += higher_m(feet, height, order));
             }
         }
     }
@@ -63,7 +61,6 @@ pub(super) fn floor(value: f64) -> Option<Mismatch> {
     mismatch("floor", breach, words)
 }
 
-/// Median height of the feet that are on the ground, m.
 pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
     let mut heights = Vec::new();
     for segment in &recording.segments {
@@ -76,8 +73,7 @@ pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
     median(heights.into_iter())
 }
 
-/// Lowest height of the trunk's origin over the floor, m, and largest angle of its z axis to the vertical while feet
-/// are on the ground, rad.
+/// Lowest height of the trunk over the floor, m, and largest tilt, rad, while feet are on the ground.
 const TRUNK: (f64, f64) = (0.05, 1.6);
 const LIES_S: f64 = 0.1; // shortest time that it lies, s
 

@@ -15,6 +15,8 @@ use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{BODY_NAMES, BODY_Z, FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 
+type State = [f64; STATE_DIM];
+
 const LEAST_STANCE_S: f64 = 0.05; // shortest stance that counts, s
 /// Time at both ends of a stance that does not count, s: touchdown and lift-off; at most an eighth of the stance.
 const EDGE_S: f64 = 0.02;
@@ -22,90 +24,66 @@ const EDGE_S: f64 = 0.02;
 const FOOT_RADIUS_M: f64 = 0.022;
 const LEAST_SAMPLES: usize = 50; // fewest samples of feet on the ground that say anything
 
-/// A way in which columns of joints and body are easily recorded, in words, and what it makes of a state.
-type Reading = (&'static str, fn(&mut [f64; STATE_DIM]));
+/// A way in which columns are easily recorded: words, body x and y exchanged, other signs, order of the quaternion.
+pub(super) type Reading = (&'static str, bool, &'static [usize], Option<[usize; 4]>);
 
 const BODY: usize = JOINT_DIM;
-const AS_RECORDED: Reading = ("as recorded", |_| {});
+const AS_RECORDED: Reading = ("as recorded", false, &[], None);
 
+const ABDUCTION: &str = "with hip abduction of the other sign";
 const SIGNS: [Reading; 4] = [
-    ("with roll of the other sign", |x| negate(x, &[BODY + 3])),
-    ("with pitch of the other sign", |x| negate(x, &[BODY + 4])),
-    ("with yaw of the other sign", |x| negate(x, &[BODY + 5])),
-    ("with hip abduction of the other sign", |x| {
-        negate(x, &[0, 3, 6, 9]);
-    }),
+    ("with roll of the other sign", false, &[BODY + 3], None),
+    ("with pitch of the other sign", false, &[BODY + 4], None),
+    ("with yaw of the other sign", false, &[BODY + 5], None),
+    (ABDUCTION, false, &[0, 3, 6, 9], None),
 ];
 
 const RIGHT_ANGLE: &str = "with body x and y turned by a right angle";
-/// Places of the body, its attitude being right.
-const PLACES: [Reading; 6] = [
-    ("with body x of the other sign", |x| negate(x, &[BODY])),
-    ("with body y of the other sign", |x| negate(x, &[BODY + 1])),
-    ("with body x and y exchanged", |x| x.swap(BODY, BODY + 1)),
-    ("with body x and y of the other sign", |x| {
-        negate(x, &[BODY, BODY + 1]);
-    }),
-    (RIGHT_ANGLE, |x| {
-        x.swap(BODY, BODY + 1);
-        negate(x, &[BODY + 1]);
-    }),
-    (RIGHT_ANGLE, |x| {
-        x.swap(BODY, BODY + 1);
-        negate(x, &[BODY]);
-    }),
-];
-
+const BOTH: &str = "with body x and y of the other sign";
 const XYZW: &str = "with the quaternion in the order xyzw instead of wxyz";
 const WXYZ: &str = "with the quaternion in the order wxyz instead of xyzw";
-const QUATERNIONS: [Reading; 2] = [
-    (XYZW, |x| reorder_quaternion(x, [3, 0, 1, 2])),
-    (WXYZ, |x| reorder_quaternion(x, [1, 2, 3, 0])),
+/// Places of the body, its attitude being right, and attitudes.
+const PLACES: [Reading; 8] = [
+    ("with body x of the other sign", false, &[BODY], None),
+    ("with body y of the other sign", false, &[BODY + 1], None),
+    ("with body x and y exchanged", true, &[], None),
+    (BOTH, false, &[BODY, BODY + 1], None),
+    (RIGHT_ANGLE, true, &[BODY + 1], None),
+    (RIGHT_ANGLE, true, &[BODY], None),
+    (XYZW, false, &[], Some([3, 0, 1, 2])),
+    (WXYZ, false, &[], Some([1, 2, 3, 0])),
 ];
 
-fn negate(x: &mut [f64; STATE_DIM], coordinates: &[usize]) {
-    coordinates.iter().for_each(|&i| x[i] = -x[i]);
+fn read_otherwise(x: &mut State, (_, exchanged, negated, elements): Reading) {
+    if exchanged {
+        x.swap(BODY, BODY + 1);
+    }
+    negated.iter().for_each(|&i| x[i] = -x[i]);
+    if let Some(elements) = elements {
+        let about =
+            |axis: usize| UnitQuaternion::from_scaled_axis(Vector3::ith(axis, x[BODY + 3 + axis]));
+        let read = about(2) * about(1) * about(0);
+        let read = [read.w, read.i, read.j, read.k];
+        let meant = DMatrix::from_iterator(4, 1, elements.map(|element| read[element]));
+        x[BODY + 3..].copy_from_slice(angles_of_quaternions(&meant).as_slice());
+    }
 }
 
-/// The attitude whose quaternion has these elements of the one as read.
-fn reorder_quaternion(x: &mut [f64; STATE_DIM], elements: [usize; 4]) {
-    let about = |axis: usize| {
-        let angle = x[BODY + 3 + axis];
-        UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angle))
-    };
-    let read = about(2) * about(1) * about(0);
-    let read = [read.w, read.i, read.j, read.k];
-    let meant = DMatrix::from_iterator(4, 1, elements.map(|element| read[element]));
-    let angles = angles_of_quaternions(&meant);
-    x[BODY + 3..].copy_from_slice(angles.as_slice());
+/// The other reading of the body's place or attitude under which feet stay best, m, and whether of the attitude.
+pub(super) fn best_other_place(recording: &Recording, robot: &Robot) -> Option<(f64, Reading)> {
+    let judged = PLACES.map(|reading| (Slip::read(recording, robot, reading).rms_m(), reading));
+    best(judged.into_iter())
 }
 
-/// The reading of the body's place or attitude under which feet on the ground stay best where they are, their root mean
-/// square then, m, and whether it is one of the attitude.
-pub(super) fn best_other_place(
-    recording: &Recording,
-    robot: &Robot,
-) -> Option<(f64, &'static str, bool)> {
-    let places = PLACES.into_iter().map(|reading| (reading, false));
-    let all = places.chain(QUATERNIONS.map(|reading| (reading, true)));
-    let judged = all.map(|(reading, is_attitude)| {
-        let slip = Slip::read(recording, robot, reading).rms_m();
-        (slip, (reading.0, is_attitude))
-    });
-    best(judged).map(|(rms_m, (words, is_attitude))| (rms_m, words, is_attitude))
-}
-
-/// The reading under which feet on the ground stay best in place against each other, and their root mean square then,
-/// m: of all orders of the legs but the recorded one, and of the other signs of [`SIGNS`].
+/// The other order of legs or sign under which feet stay best in place against each other, and their slip, m.
 pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option<(f64, String)> {
     let of_segment = |segment| Stances::of(segment, robot, AS_RECORDED, &Leg::ALL);
     let all: Vec<Stances> = recording.segments.iter().map(of_segment).collect();
     let orders = orders().into_iter().filter(|order| *order != Leg::ALL);
     let of_orders = orders.map(|order| {
         let mut slip = Slip::default();
-        for stances in &all {
-            stances.add_to(&mut slip, &order);
-        }
+        all.iter()
+            .for_each(|stances| stances.add_to(&mut slip, &order));
         let names = order.map(Leg::short_name).join(", ");
         let words = format!("with the joints of fr, fl, rr, rl taken from {names}");
         (slip.relative_rms_m(), words)
@@ -118,8 +96,9 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
 }
 
 fn best<T>(judged: impl Iterator<Item = (Option<f64>, T)>) -> Option<(f64, T)> {
-    let known = judged.filter_map(|(rms_m, reading)| Some((rms_m?, reading)));
-    let finite = known.filter(|(rms_m, _)| rms_m.is_finite());
+    let finite =
+        |(rms_m, reading): (Option<f64>, T)| Some((rms_m.filter(|m| m.is_finite())?, reading));
+    let finite = judged.filter_map(finite);
     finite.min_by(|one, other| one.0.total_cmp(&other.0))
 }
 
@@ -132,12 +111,7 @@ pub(super) fn orders() -> Vec<[Leg; FOOT_DIM]> {
 }
 
 /// Place of a leg's foot in the world, m, in a state `x`; `rolled` without what the foot's sphere has rolled.
-pub(in crate::recording) fn foot_place(
-    robot: &Robot,
-    leg: Leg,
-    x: &[f64; STATE_DIM],
-    rolled: bool,
-) -> Vector3<f64> {
+pub(crate) fn foot_place(robot: &Robot, leg: Leg, x: &State, rolled: bool) -> Vector3<f64> {
     let place = robot.foot_in_world(leg, x);
     if !rolled {
         return place;
@@ -148,14 +122,14 @@ pub(in crate::recording) fn foot_place(
     place - FOOT_RADIUS_M * inclination * Vector3::new(yaw.cos(), yaw.sin(), 0.0)
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// Squares of distances of feet from where they stand, of each foot and against each other, and their number.
+#[derive(Default)]
 pub(super) struct Slip {
     absolute: (f64, usize),
     relative: (f64, usize),
 }
 
 impl Slip {
-    /// Over all segments of a recording.
     pub(crate) fn of(recording: &Recording, robot: &Robot) -> Self {
         Self::read(recording, robot, AS_RECORDED)
     }
@@ -174,7 +148,6 @@ impl Slip {
         root_mean(self.absolute)
     }
 
-    /// The same of what feet that stand together do not have in common, m.
     pub(crate) fn relative_rms_m(&self) -> Option<f64> {
         root_mean(self.relative)
     }
@@ -192,7 +165,7 @@ impl Stances {
             for from in std::iter::once(leg).chain(others) {
                 let place = |sample: usize| {
                     let mut x = segment.state(sample);
-                    (reading.1)(&mut x);
+                    read_otherwise(&mut x, reading);
                     let q = from.of_joints(&std::array::from_fn(|joint| x[joint]));
                     x[3 * leg.index()..][..3].copy_from_slice(&q);
                     foot_place(robot, leg, &x, true)
@@ -208,9 +181,8 @@ impl Stances {
     }
 
     fn add_to(&self, slip: &mut Slip, order: &[Leg; FOOT_DIM]) {
-        let of_sample = self.0.chunk_by(|one, other| one.0 == other.0);
         let mut standing = Vec::with_capacity(FOOT_DIM);
-        for feet in of_sample {
+        for feet in self.0.chunk_by(|one, other| one.0 == other.0) {
             standing.clear();
             let chosen = (feet.iter()).filter(|(_, leg, from, _)| order[leg.index()] == *from);
             standing.extend(chosen.map(|(.., place)| *place));
@@ -227,7 +199,7 @@ impl Stances {
     }
 }
 
-pub(in crate::recording) fn median_place(places: &[Vector3<f64>]) -> Vector3<f64> {
+pub(crate) fn median_place(places: &[Vector3<f64>]) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| median(places.iter().map(|place| place[axis])))
 }
 
@@ -236,7 +208,7 @@ fn root_mean((sum, count): (f64, usize)) -> Option<f64> {
 }
 
 /// Each foot's times on the ground without their edges.
-pub(in crate::recording) fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
+pub(crate) fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
     let step_s = segment.mean_step_s();
     if step_s <= 0.0 {
         return Vec::new();
@@ -256,9 +228,7 @@ pub(in crate::recording) fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>
     out
 }
 
-const HEIGHT: usize = BODY_Z;
-/// Shortest flight, and shortest time on the ground in all, that counts, s.
-const LEAST_S: f64 = 0.04;
+const LEAST_S: f64 = 0.04; // shortest flight, and shortest time on the ground in all, that counts, s
 /// Least force of a foot that counts where a hip's torque is compared with it, as a share of the weight.
 const LEAST_FORCE: f64 = 0.02;
 
@@ -272,15 +242,14 @@ pub struct Balance {
     pub fall_by_height_m_s2: Option<f64>,
     /// Impulse of the feet over what the robot's weight and change of velocity need.
     pub weight_share: Option<f64>,
-    /// Slope of each hip's abduction torque over its lever times the force along the leg; 1 for a force in the plane of
-    /// the leg.
+    /// Slope of each hip's torque over its lever times the force along the leg; 1 for a force in the leg's plane.
     pub hip_share: [Option<f64>; FOOT_DIM],
     /// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2, after its axis.
     #[serde(serialize_with = "without_axis")]
     pub acceleration_offset_m_s2: Option<(&'static str, f64)>,
 }
 
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Default)]
 struct Sums {
     flight: (f64, f64),           // change of velocity and time in flight
     ground: (f64, f64, f64),      // impulse of the feet, impulse that is needed, time
@@ -298,12 +267,12 @@ impl Balance {
         }
         let (dv, flight_s) = sums.flight;
         let (impulse, needed, ground_s) = sums.ground;
+        let share = |(product, square): (f64, f64)| (square > 0.0).then(|| product / square);
         Self {
             fall_m_s2: (flight_s >= LEAST_S).then(|| dv / flight_s),
             fall_by_height_m_s2: (!falls.is_empty()).then(|| median(falls.into_iter())),
             weight_share: (ground_s >= LEAST_S && needed > 0.0).then(|| impulse / needed),
-            hip_share: (sums.hips)
-                .map(|(product, square)| (square > 0.0).then(|| product / square)),
+            hip_share: sums.hips.map(share),
             acceleration_offset_m_s2: acceleration_offset(recording),
         }
     }
@@ -312,18 +281,16 @@ impl Balance {
 impl Sums {
     fn add(&mut self, segment: &Segment, robot: &Robot) {
         let samples = 0..segment.len();
-        let forces = samples.map(|sample| self.add_forces(segment, robot, sample));
-        let forces: Vec<Vector3<f64>> = forces.collect();
+        let upwards = samples.map(|sample| self.add_forces(segment, robot, sample).z);
+        let upwards: Vec<f64> = upwards.collect();
+        let time_s = &segment.time_s;
         for (run, is_grounded) in segment.contacts() {
             let (start, end) = (run.start, run.end - 1);
-            let time_s = segment.time_s[end] - segment.time_s[start];
-            let dv = segment.dx[(HEIGHT, end)] - segment.dx[(HEIGHT, start)];
+            let dv = segment.dx[(BODY_Z, end)] - segment.dx[(BODY_Z, start)];
+            let impulse = |s| 0.5 * (time_s[s + 1] - time_s[s]) * (upwards[s] + upwards[s + 1]);
+            let time_s = time_s[end] - time_s[start];
             if is_grounded {
-                let between = (start..end).map(|s| {
-                    let step_s = segment.time_s[s + 1] - segment.time_s[s];
-                    0.5 * step_s * (forces[s].z + forces[s + 1].z)
-                });
-                self.ground.0 += between.sum::<f64>();
+                self.ground.0 += (start..end).map(impulse).sum::<f64>();
                 self.ground.1 += weight_n(robot.mass_kg()) * time_s + robot.mass_kg() * dv;
                 self.ground.2 += time_s;
             } else if time_s >= LEAST_S {
@@ -362,14 +329,8 @@ impl Sums {
     }
 }
 
-/// Torque of a hip's abduction that holds the part of a foot's force (body axes, N) in the plane of the leg: its lever
-/// is the distance of the plane from the axis of abduction.
-pub(in crate::recording) fn hip_torque(
-    robot: &Robot,
-    leg: Leg,
-    q: &[f64; 3],
-    force: &Vector3<f64>,
-) -> f64 {
+/// Torque of a hip's abduction that holds the part of a foot's force (body axes, N) in the plane of the leg.
+pub(crate) fn hip_torque(robot: &Robot, leg: Leg, q: &[f64; 3], force: &Vector3<f64>) -> f64 {
     let links = robot.geometry(leg).links();
     let axis = Unit::new_normalize(links.abduction);
     let normal = Rotation3::from_axis_angle(&axis, q[0]) * links.flexion;
@@ -380,15 +341,15 @@ pub(in crate::recording) fn hip_torque(
 /// Vertical acceleration of each flight by a parabola through its heights.
 fn falls_of(segment: &Segment) -> Vec<f64> {
     let flights = (segment.contacts().into_iter()).filter(|(_, is_grounded)| !is_grounded);
-    let fall = |(run, _): (std::ops::Range<usize>, bool)| {
-        let middle = 0.5 * (segment.time_s[run.start] + segment.time_s[run.end - 1]);
-        let length = segment.time_s[run.end - 1] - segment.time_s[run.start];
+    let fall = |(run, _): (Range<usize>, bool)| {
+        let (start, end) = (segment.time_s[run.start], segment.time_s[run.end - 1]);
+        let (middle, length) = (0.5 * (start + end), end - start);
         let (mut matrix, mut side) = (Matrix3::zeros(), Vector3::zeros());
         for sample in run {
             let t = segment.time_s[sample] - middle;
             let powers = Vector3::new(1.0, t, 0.5 * t * t);
             matrix += powers * powers.transpose();
-            side += powers * segment.x[(HEIGHT, sample)];
+            side += powers * segment.x[(BODY_Z, sample)];
         }
         let solved = (length >= LEAST_S).then(|| matrix.lu().solve(&side));
         solved.flatten().map(|solution| solution[2])
@@ -402,16 +363,13 @@ fn without_axis<S: Serializer>(offset: &Option<(&str, f64)>, out: S) -> Result<S
 
 fn acceleration_offset(recording: &Recording) -> Option<(&'static str, f64)> {
     let segments = recording.segments.iter();
-    let slopes = segments.map(|segment| differences(&segment.time_s, &segment.dx));
-    let slopes: Vec<_> = slopes.collect();
+    let off = segments.map(|segment| &segment.ddx - differences(&segment.time_s, &segment.dx));
+    let off: Vec<DMatrix<f64>> = off.collect();
     let of_axis = |axis: usize| {
-        let row = JOINT_DIM + axis;
-        let pairs = recording.segments.iter().zip(&slopes);
-        median(pairs.flat_map(|(segment, slopes)| {
-            (0..segment.len()).map(move |s| segment.ddx[(row, s)] - slopes[(row, s)])
-        }))
+        let rows = off.iter().map(|off| off.row(JOINT_DIM + axis));
+        let values = rows.flat_map(|row| row.into_iter().copied());
+        (BODY_NAMES[axis], median(values))
     };
-    (0..3)
-        .map(|axis| (BODY_NAMES[axis], of_axis(axis)))
-        .max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()))
+    let axes = (0..3).map(of_axis);
+    axes.max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()))
 }

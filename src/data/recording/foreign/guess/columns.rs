@@ -6,7 +6,7 @@ use super::super::elements::{Dimension, QUATERNION, Quantity};
 use super::super::signal::{Channel, Log};
 use super::names::{Reading, is_quantity, is_time, is_wanted, read, unit};
 use crate::recording::preprocess::median;
-use crate::robot::{JOINT_DIM, Robot};
+use crate::robot::Robot;
 
 #[derive(Debug, Clone)]
 pub(super) struct Group {
@@ -16,8 +16,7 @@ pub(super) struct Group {
     pub is_quaternion: bool,
     pub is_counted: bool,
     pub others: Vec<String>,
-    /// Whether one of these fits no less than the columns, which are only the first.
-    pub is_tie: bool,
+    pub is_tie: bool, // whether one of these fits no less than the columns, which are only the first
     is_wanted: bool,
     family: Vec<String>,
 }
@@ -28,8 +27,7 @@ impl Group {
         self.family.iter().filter(|word| !is_quantity(word))
     }
 
-    /// Whether its legs are only counted, as an arm's twelve joints are among others; a low-level state of Unitree's
-    /// counts legs in romc's order.
+    /// Whether its legs are only counted, as an arm's joints may be; Unitree's low-level state counts in romc's order.
     pub(super) fn is_unnamed(&self, logs: &[Log]) -> bool {
         let is_motor = |channel: &Channel| {
             let name = &channel.name;
@@ -46,11 +44,10 @@ pub(super) struct Clock {
     pub unit: &'static str,
 }
 
-/// The quantities that the names say: of several complete families of columns those that were measured, of the log and
-/// the words of the others, sampled most often.
+/// The quantities that the names say, of several families the measured one that fits the others and is sampled most.
 pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
     let rates: Vec<Option<i32>> = logs.iter().map(rate_class).collect();
-    let all = complete(&families(logs, robot));
+    let all = complete(logs, robot);
     let of = |quantity: Quantity| all.iter().filter(move |group| group.quantity == quantity);
     // Quantities of joints, or of the body, in the same words: of `q_sim`, `q` and `tau` the last two belong together.
     let fellows = |one: &Group| -> usize {
@@ -64,13 +61,8 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
     let rate = |group: &Group| Reverse(rates[group.log].unwrap_or_default());
     let preference = |group: &&Group| {
         let (fellows, words) = (Reverse(fellows(group)), group.family.len());
-        (
-            group.is_wanted,
-            group.is_unnamed(logs),
-            rate(group),
-            fellows,
-            words,
-        )
+        let is_unnamed = group.is_unnamed(logs);
+        (group.is_wanted, is_unnamed, rate(group), fellows, words)
     };
     let first = |quantity| of(quantity).min_by_key(preference);
     let [joints, body] = [Quantity::JointPosition, Quantity::BodyPosition].map(first);
@@ -79,39 +71,32 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
             true => joints.or(body),
             false => body.or(joints),
         };
-        let alike = |group: &Group| {
-            base.map_or((true, 0), |base| {
-                (base.log == group.log, shared(base, group))
-            })
-        };
-        let rank_by = |group: &Group, (same_log, words): (bool, usize)| {
+        let is_base = |group: &Group| base.is_some_and(|base| std::ptr::eq(base, group));
+        // The base is alike to nothing but itself.
+        let rank = |group: &Group, base: Option<&Group>| {
+            let same_log = base.is_some_and(|base| base.log == group.log);
+            let words = base.map_or(0, |base| shared(base, group));
             let plain = (group.is_quaternion, group.family.len());
             let (log, words) = (Reverse(same_log), Reverse(words));
             (group.is_unnamed(logs), log, rate(group), words, plain)
         };
-        let best = of(quantity).min_by_key(|group| {
-            let is_first = base.is_some_and(|base| std::ptr::eq(base, *group));
-            (!is_first, group.is_wanted, rank_by(group, alike(group)))
-        })?;
-        let others = of(quantity).filter(|group| !std::ptr::eq(*group, best));
-        let is_of_kind = |group: &&Group| {
-            (group.is_wanted, group.is_quaternion) == (best.is_wanted, best.is_quaternion)
+        let preference = |group: &&Group| (!is_base(group), group.is_wanted, rank(group, base));
+        let best = of(quantity).min_by_key(preference)?;
+        let is_other = |group: &&Group| {
+            let kind = |group: &Group| (group.is_wanted, group.is_quaternion);
+            !std::ptr::eq(*group, best) && kind(group) == kind(best)
         };
-        let others: Vec<&Group> = others.filter(is_of_kind).collect();
-        // The base is alike to nothing but itself.
-        let rank = |group: &Group| match std::ptr::eq(best, base.unwrap_or(group)) {
-            true => rank_by(group, (false, 0)),
-            false => rank_by(group, alike(group)),
-        };
+        let others: Vec<&Group> = of(quantity).filter(is_other).collect();
+        let base = base.filter(|base| !std::ptr::eq(*base, best));
         // Tables of one topic hold the same messages.
         let is_apart =
             |other: &Group| other.log == best.log || logs[other.log].name != logs[best.log].name;
         let ties = |other: &&Group| {
-            is_apart(other) && rank(other) == rank(best) && differ(logs, best, other)
+            is_apart(other) && rank(other, base) == rank(best, base) && differ(logs, best, other)
         };
         Some(Group {
             is_tie: others.iter().any(ties),
-            others: others.iter().map(|other| in_words(logs, other)).collect(),
+            others: others.iter().map(|own| in_words(logs, own)).collect(),
             ..best.clone()
         })
     });
@@ -141,8 +126,8 @@ fn rate_class(log: &Log) -> Option<i32> {
 }
 
 fn shared(one: &Group, other: &Group) -> usize {
-    let shared = one.family.iter().filter(|word| other.family.contains(word));
-    shared.count()
+    let words = one.family.iter();
+    words.filter(|word| other.family.contains(word)).count()
 }
 
 fn differ(logs: &[Log], one: &Group, other: &Group) -> bool {
@@ -150,10 +135,10 @@ fn differ(logs: &[Log], one: &Group, other: &Group) -> bool {
     (0..one.columns.len()).any(|at| values(one, at) != values(other, at))
 }
 
-type Families = Vec<(usize, Vec<(usize, Reading)>)>;
+type Family = (usize, Vec<(usize, Reading)>);
 
-fn families(logs: &[Log], robot: &Robot) -> Families {
-    let mut families: Families = Vec::new();
+fn complete(logs: &[Log], robot: &Robot) -> Vec<Group> {
+    let mut families: Vec<Family> = Vec::new();
     for (index, log) in logs.iter().enumerate() {
         for (column, channel) in log.columns.iter().enumerate() {
             // What a column alone does not say its topic may: `/foot_contacts` of `position[fr]`.
@@ -164,7 +149,7 @@ fn families(logs: &[Log], robot: &Robot) -> Families {
                 continue;
             };
             reading.is_wanted |= is_wanted(&log.name);
-            let same = |(own, members): &&mut (usize, Vec<(usize, Reading)>)| {
+            let same = |(own, members): &&mut Family| {
                 let of = |one: &Reading| (one.quantity, one.is_quaternion);
                 let first = &members[0].1;
                 *own == index && of(first) == of(&reading) && first.family == reading.family
@@ -175,49 +160,23 @@ fn families(logs: &[Log], robot: &Robot) -> Families {
             }
         }
     }
-    for (_, members) in &mut families {
-        from_zero(members);
-        lists_of_three(members);
-        bare_hips(members);
-    }
-    families
-}
-
-fn of_robot(name: &str, robot: &Robot) -> Option<Reading> {
-    let low = name.to_lowercase();
-    let names = robot.joint_names().iter().map(|joint| joint.to_lowercase());
-    let names = names.enumerate();
-    let found = names.filter(|(_, joint)| !joint.is_empty() && low.contains(&joint[..]));
-    // `joint_11` contains `joint_1`.
-    let (element, joint) = found.max_by_key(|(_, joint)| joint.len())?;
-    let rest = low.replacen(&joint[..], " ", 1);
-    let is_cut = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
-    let at = low.find(&joint[..])?;
-    if is_cut(low[..at].chars().next_back()) || is_cut(low[at + joint.len()..].chars().next()) {
-        return None;
-    }
-    // The rest of the name as it would be of a joint that is known.
-    let reading = read(&format!("fr {rest} hx"))?;
-    let is_joint = reading.quantity.elements().len() == JOINT_DIM;
-    is_joint.then_some(Reading { element, ..reading })
-}
-
-fn complete(families: &Families) -> Vec<Group> {
-    let complete = families.iter().filter_map(|(log, members)| {
+    let group = |(log, mut members): Family| {
+        from_zero(&mut members);
+        lists_of_three(&mut members);
+        bare_hips(&mut members);
         let first = &members[0].1;
         let count = match first.is_quaternion {
             true => QUATERNION.len(),
             false => first.quantity.elements().len(),
         };
         let column = |element| {
-            let mut found = members.iter().filter(|(_, own)| own.element == element);
-            found.next().map(|(column, _)| *column)
+            let found = members.iter().find(|(_, own)| own.element == element);
+            found.map(|(column, _)| *column)
         };
-        let columns: Option<Vec<usize>> = (0..count).map(column).collect();
         Some(Group {
             quantity: first.quantity,
-            log: *log,
-            columns: columns?,
+            log,
+            columns: (0..count).map(column).collect::<Option<_>>()?,
             is_quaternion: first.is_quaternion,
             is_counted: members.iter().any(|(_, reading)| reading.is_counted),
             others: Vec::new(),
@@ -225,22 +184,37 @@ fn complete(families: &Families) -> Vec<Group> {
             is_wanted: first.is_wanted,
             family: first.family.split_whitespace().map(str::to_owned).collect(),
         })
-    });
-    complete.collect()
+    };
+    families.into_iter().filter_map(group).collect()
+}
+
+fn of_robot(name: &str, robot: &Robot) -> Option<Reading> {
+    let low = name.to_lowercase();
+    let names = robot.joint_names().iter().map(|joint| joint.to_lowercase());
+    let found = (names.enumerate()).filter(|(_, joint)| !joint.is_empty() && low.contains(joint));
+    // `joint_11` contains `joint_1`.
+    let (element, joint) = found.max_by_key(|(_, joint)| joint.len())?;
+    let (before, after) = low.split_once(&joint)?;
+    let is_cut = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
+    if is_cut(before.chars().next_back()) || is_cut(after.chars().next()) {
+        return None;
+    }
+    // The rest of the name as it would be of a joint that is known.
+    let reading = read(&format!("fr {before} {after} hx"))?;
+    (reading.quantity.is_of_joints()).then_some(Reading { element, ..reading })
 }
 
 /// Hips without a word for which one are the second joints where the first have another name: `abad hip knee`.
 fn bare_hips(members: &mut [(usize, Reading)]) {
-    let is_first = |reading: &Reading| reading.element.is_multiple_of(3);
-    let is_joint = members[0].1.quantity.elements().len() == JOINT_DIM;
-    let another = |(_, reading): &(usize, Reading)| is_first(reading) && !reading.is_bare_hip;
+    let is_joint = members[0].1.quantity.is_of_joints();
+    let another =
+        |(_, reading): &(usize, Reading)| reading.element.is_multiple_of(3) && !reading.is_bare_hip;
     if is_joint && members.iter().any(another) {
         let hips = (members.iter_mut()).filter(|(_, reading)| reading.is_bare_hip);
         hips.for_each(|(_, reading)| reading.element += 1);
     }
 }
 
-/// What is counted from 1 is counted from 0.
 fn from_zero(members: &mut [(usize, Reading)]) {
     let last = members[0].1.quantity.elements().len();
     let counted = members.iter_mut().map(|(_, reading)| reading);
@@ -269,10 +243,8 @@ pub(super) fn clock(logs: &[Log], groups: &[Group]) -> Option<Clock> {
     let base = groups.first()?;
     let log = &logs[base.log];
     if let Some(column) = log.clock {
-        return Some(Clock {
-            name: log.columns[column].name.clone(),
-            unit: "s",
-        });
+        let name = log.columns[column].name.clone();
+        return Some(Clock { name, unit: "s" });
     }
     let counts = |channel: &&Channel| mean_step(channel).is_some();
     let candidates = || log.columns.iter().filter(counts);
@@ -283,21 +255,21 @@ pub(super) fn clock(logs: &[Log], groups: &[Group]) -> Option<Clock> {
     // Samples further apart show no jump.
     let step = mean_step(channel)?;
     let is_possible = |unit: &&str| {
-        (Dimension::Time.factor(unit)).is_some_and(|factor| (2e-4..0.06).contains(&(factor * step)))
+        let factor = Dimension::Time.factor(unit);
+        factor.is_some_and(|factor| (2e-4..0.06).contains(&(factor * step)))
     };
-    Some(Clock {
-        name: channel.name.clone(),
-        unit: told.into_iter().chain(UNITS).find(is_possible)?,
-    })
+    let unit = told.into_iter().chain(UNITS).find(is_possible)?;
+    let name = channel.name.clone();
+    Some(Clock { name, unit })
 }
 
 /// Typical distance of samples in a column that counts upwards, else nothing.
 fn mean_step(channel: &Channel) -> Option<f64> {
     let times = channel.times();
-    let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let forward: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let count = steps.len();
+    steps.retain(|step| *step > 0.0);
     // Several jumps in a file let time jump back now and then.
-    let back = steps.len() - forward.len();
-    let counts = !forward.is_empty() && back * 50 <= steps.len();
-    counts.then(|| median(forward.into_iter()))
+    let counts = !steps.is_empty() && (count - steps.len()) * 50 <= count;
+    counts.then(|| median(steps.into_iter()))
 }

@@ -4,15 +4,12 @@ use nalgebra::DMatrix;
 
 /// Share of the way from no force to the largest at which a foot counts as down; half of it for up.
 const SHARE: f64 = 0.1;
-/// Times the deviation of a sensor in the air that a foot on the ground shows at least.
-const DEVIATIONS: f64 = 4.0;
+const DEVIATIONS: f64 = 4.0; // times the deviation of a sensor in the air that a foot on the ground shows at least
 const BINS: usize = 64; // bins over the range of a sensor
-/// Share of the samples within a bin of where two groups are divided, at most.
-const VALLEY: f64 = 0.02;
+const VALLEY: f64 = 0.02; // share of the samples within a bin of where two groups are divided, at most
 const APART: f64 = 0.1; // least distance of two groups, as a share of the range
 const SPREAD: f64 = 0.35; // largest spread of a sensor in the air, as a share of what loads it
-/// Least difference of two sensors in the air that matters, as a share of the range.
-const ALIKE: f64 = 0.05;
+const ALIKE: f64 = 0.05; // least difference of two sensors in the air that matters, as a share of the range
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Rest {
@@ -21,12 +18,11 @@ struct Rest {
 }
 
 /// The lines of a map for these values of four sensors, one per row, and a note where no foot is ever in the air.
-pub(super) fn force_lines(values: &DMatrix<f64>) -> (Vec<String>, Option<String>) {
+pub(super) fn force_lines(mut values: DMatrix<f64>) -> (Vec<String>, Option<String>) {
     let mut lines = Vec::new();
     if values.iter().all(|value| *value == 0.0 || *value == 1.0) {
         return (lines, None);
     }
-    let mut values = values.clone();
     let ends = |values: &DMatrix<f64>| {
         let sorted = sorted(values.iter().copied());
         (at_share(&sorted, 0.005), at_share(&sorted, 0.99))
@@ -38,16 +34,13 @@ pub(super) fn force_lines(values: &DMatrix<f64>) -> (Vec<String>, Option<String>
     }
     let (low, high) = ends(&values);
     let range = high - low;
-    let rests = (values.row_iter()).map(|row| resting(row.iter().copied().collect(), range));
+    let rests = (values.row_iter()).map(|row| resting(row.iter().copied(), range));
     let rests: Vec<Option<Rest>> = rests.collect();
     let known: Vec<Rest> = rests.iter().flatten().copied().collect();
     if known.is_empty() {
         let least = sorted(values.iter().copied())[0];
-        let threshold = if least > 0.0 {
-            0.5 * least
-        } else {
-            SHARE * high
-        };
+        let half = (least > 0.0).then_some(0.5 * least);
+        let threshold = half.unwrap_or(SHARE * high);
         let why = "   # no foot is in the air by its force";
         lines.push(format!("threshold = {threshold:.3}{why}"));
         let note = "feet: by their forces all feet are on the ground throughout";
@@ -55,16 +48,14 @@ pub(super) fn force_lines(values: &DMatrix<f64>) -> (Vec<String>, Option<String>
     }
     let level = known.iter().map(|rest| rest.level).sum::<f64>() / known.len() as f64;
     let deviation = known.iter().map(|rest| rest.deviation).fold(0.0, f64::max);
-    let of_rest = |rest: &Option<Rest>| rest.map_or(level, |rest| rest.level);
-    let levels = || rests.iter().map(of_rest);
+    let levels = || (rests.iter()).map(|rest| rest.map_or(level, |rest| rest.level));
     let (mut rest, mut span) = (level, high - level);
     if levels().any(|own| (own - level).abs() > ALIKE * range) {
         (rest, span) = (0.0, range);
-        let offsets = levels().map(|level| format!("{:.3}", -level));
-        let offsets = offsets.collect::<Vec<_>>().join(", ");
-        lines.push(format!(
-            "offset = [{offsets}]   # what each sensor shows in the air"
-        ));
+        let offsets: Vec<String> = levels().map(|level| format!("{:.3}", -level)).collect();
+        let offsets = offsets.join(", ");
+        let why = "what each sensor shows in the air";
+        lines.push(format!("offset = [{offsets}]   # {why}"));
     }
     let least = DEVIATIONS * deviation;
     let threshold = rest + least.max(SHARE * span);
@@ -77,8 +68,8 @@ pub(super) fn force_lines(values: &DMatrix<f64>) -> (Vec<String>, Option<String>
 }
 
 /// What a sensor shows in the air: the lowest group of its values, if they fall into groups.
-fn resting(values: Vec<f64>, range: f64) -> Option<Rest> {
-    let mut group = sorted(values.into_iter());
+fn resting(values: impl Iterator<Item = f64>, range: f64) -> Option<Rest> {
+    let mut group = sorted(values);
     let mut loaded = None;
     while let Some(count) = divided(&group, range) {
         loaded = Some(at_share(&group[count..], 0.5));
@@ -95,8 +86,7 @@ fn resting(values: Vec<f64>, range: f64) -> Option<Rest> {
     Some(Rest { level, deviation })
 }
 
-/// How many of the values are in the lower of two groups with few values between them (Otsu's division of square roots,
-/// as impacts are far above what a standing foot bears).
+/// How many values are in the lower of two groups with few between them (Otsu's division of square roots).
 fn divided(sorted: &[f64], range: f64) -> Option<usize> {
     let (low, high) = (sorted.first()?, at_share(sorted, 0.99));
     if high - low < APART * range || range <= 0.0 {

@@ -11,8 +11,7 @@ const LEGS: [&str; 4] = [
     "rr hr rh br rb rearright hindright backright rightrear righthind",
     "rl hl lh bl lb rearleft hindleft backleft leftrear lefthind",
 ];
-/// Words for joints, in romc's order; a bare `hip` is the first, unless `y`, `pitch` or `flexion` is beside it or
-/// another joint of the leg is.
+/// Words for joints, in romc's order; a bare `hip` is the first, unless `y`, `pitch` or `flexion` is beside it.
 const JOINTS: [&str; 3] = [
     "hx haa abad abduction hipx hipaa",
     "hy hfe thigh upper flexion hipy hipfe",
@@ -33,11 +32,11 @@ const WANTED: &str = "des desired ref reference references cmd cmds command comm
      setpoints goal raw lost temperature mode covariance ff kp kd";
 const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date";
 
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// What a name says of its column. A quaternion and angles are both orientations.
+#[derive(Debug, Clone)]
 pub(super) struct Reading {
-    pub quantity: Quantity, // the quantity; a quaternion and angles are both orientations
-    /// The element, in romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from
-    /// 1.
+    pub quantity: Quantity,
+    /// In romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from 1.
     pub element: usize,
     pub is_quaternion: bool,
     pub is_counted: bool,
@@ -47,7 +46,7 @@ pub(super) struct Reading {
 }
 
 /// Words of a name: lower case, apart at signs, capitals and digits; `FRHip` is `fr hip`.
-pub(super) fn words(name: &str) -> Vec<String> {
+fn words(name: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     let (mut last, mut capitals) = (' ', 0);
     for c in name.chars() {
@@ -62,11 +61,10 @@ pub(super) fn words(name: &str) -> Vec<String> {
             || (last.is_lowercase() && c.is_uppercase())
             || (last.is_ascii_digit() != c.is_ascii_digit());
         if c.is_alphanumeric() {
-            let low = c.to_lowercase();
-            match out.last_mut() {
-                Some(word) if !starts => word.extend(low),
-                Some(_) | None => out.push(low.collect()),
+            if starts || out.is_empty() {
+                out.push(String::new());
             }
+            out.last_mut().expect("a word").extend(c.to_lowercase());
         }
         last = c;
     }
@@ -109,15 +107,14 @@ type Meaning = (Quantity, usize, bool, bool);
 pub(super) fn read(name: &str) -> Option<Reading> {
     let words = Name::of(name);
     let (quantity, element, is_quaternion, is_counted) = words.meaning()?;
-    let has = |known| words.has(known);
     Some(Reading {
         quantity,
         element,
         is_quaternion,
         is_counted,
         family: words.family(),
-        is_wanted: has(WANTED),
-        is_bare_hip: words.joint() == Some(0) && has("hip") && !has("x roll aa"),
+        is_wanted: words.has(WANTED),
+        is_bare_hip: words.joint() == Some(0) && words.has("hip") && !words.has("x roll aa"),
     })
 }
 
@@ -125,18 +122,29 @@ struct Name(Vec<String>);
 
 impl Name {
     fn of(name: &str) -> Self {
-        let mut words = words(name);
-        join_pairs(&mut words);
-        split_compact(&mut words);
-        greek_angles(&mut words);
+        let mut words = joined_pairs(words(name));
+        words = words.iter().flat_map(|word| parts(word)).collect();
+        if Self::number_of(&words).is_none() {
+            // Phi, theta and psi, where they are not counted.
+            let angle = |word: String| match &word[..] {
+                "phi" => "roll".to_owned(),
+                "theta" => "pitch".to_owned(),
+                "psi" => "yaw".to_owned(),
+                _ => word,
+            };
+            words = words.into_iter().map(angle).collect();
+        }
         Self(words)
+    }
+
+    fn number_of(words: &[String]) -> Option<usize> {
+        (words.iter().rev()).find_map(|word| word.parse().ok())
     }
 
     fn has(&self, known: &str) -> bool {
         self.0.iter().any(|word| is_one(word, known))
     }
 
-    /// The place in a table of words of the first word that is in it.
     fn place(&self, table: &[&str]) -> Option<usize> {
         let of = |word: &String| table.iter().position(|known| is_one(word, known));
         self.0.iter().find_map(of)
@@ -145,11 +153,6 @@ impl Name {
     fn after(&self, known: &str) -> Option<usize> {
         let pair = self.0.windows(2).find(|pair| is_one(&pair[0], known))?;
         pair[1].parse().ok()
-    }
-
-    fn number(&self) -> Option<usize> {
-        let words = self.0.iter().rev();
-        words.filter_map(|word| word.parse().ok()).next()
     }
 
     fn axis(&self) -> Option<usize> {
@@ -164,14 +167,13 @@ impl Name {
     }
 
     fn family(&self) -> String {
-        let names_element = |word: &&str| {
+        let names_element = |word: &String| {
             LEGS.iter().chain(&JOINTS).any(|known| is_one(word, known))
                 || is_one(word, "x y z w roll pitch yaw hip")
                 || word.parse::<usize>().is_ok()
         };
-        let words = self.0.iter().map(String::as_str);
-        let family: Vec<&str> = words.filter(|word| !names_element(word)).collect();
-        family.join(" ")
+        let family = self.0.iter().filter(|word| !names_element(word));
+        family.cloned().collect::<Vec<_>>().join(" ")
     }
 
     fn meaning(&self) -> Option<Meaning> {
@@ -180,14 +182,13 @@ impl Name {
             return None;
         }
         let (leg, joint) = (self.place(&LEGS), self.joint());
-        let (axis, number) = (self.axis(), self.number());
-        let kinds = [
-            (TORQUE, Quantity::JointTorque),
-            (ACCELERATION, Quantity::JointAcceleration),
-            (VELOCITY, Quantity::JointVelocity),
-        ];
-        let kind = kinds.into_iter().find(|(known, _)| has(known));
-        let kind = kind.map_or(Quantity::JointPosition, |(_, kind)| kind);
+        let (axis, number) = (self.axis(), Self::number_of(&self.0));
+        let kind = match () {
+            () if has(TORQUE) => Quantity::JointTorque,
+            () if has(ACCELERATION) => Quantity::JointAcceleration,
+            () if has(VELOCITY) => Quantity::JointVelocity,
+            () => Quantity::JointPosition,
+        };
         if let (Some(number), [list, _]) = (number, &self.0[..])
             && let Some(found) = in_list(list, number)
         {
@@ -214,26 +215,24 @@ impl Name {
         let in_array = axis.is_none() && !of_body && !of_axes && has(JOINT_ARRAYS);
         match number.filter(|number| in_array && *number <= 12) {
             Some(number) => Some((kind, number, false, true)),
-            None => self.of_trunk(kind),
+            None => self.of_trunk(kind, [axis, number]),
         }
     }
 
     /// An element of a quantity of the trunk, whose names are those of a joint's quantity of this kind.
-    fn of_trunk(&self, kind: Quantity) -> Option<Meaning> {
+    fn of_trunk(&self, kind: Quantity, [axis, number]: [Option<usize>; 2]) -> Option<Meaning> {
         let has = |known| self.has(known);
-        let (axis, number) = (self.axis(), self.number());
         let by_angle = has("roll pitch yaw rpy euler");
         let counted = axis.is_none();
+        let of_quaternion = |element| Some((Quantity::Orientation, element, true, counted));
         if has("w") && has(QUATERNION) && !by_angle {
             return Some((Quantity::Orientation, 0, true, false));
         }
         if has("quat quaternion") {
             let element = axis.map(|axis| axis + 1);
-            let element = element.or(number.filter(|number| *number < 4))?;
-            return Some((Quantity::Orientation, element, true, counted));
+            return of_quaternion(element.or(number.filter(|number| *number < 4))?);
         }
         let element = axis.or(number.filter(|number| *number < 3))?;
-        let of_quaternion = Some((Quantity::Orientation, element + 1, true, counted));
         let angular = by_angle || has(ANGULAR) || has(ANGULAR_VELOCITY);
         let rate = has(ANGULAR_VELOCITY) || kind == Quantity::JointVelocity;
         let quantity = match (angular, kind) {
@@ -241,12 +240,11 @@ impl Name {
             (true, Quantity::JointAcceleration) => Quantity::AngularAcceleration,
             (false, Quantity::JointAcceleration) => Quantity::BodyAcceleration,
             (true, _) if rate => Quantity::AngularVelocity,
-            (true, _) if by_angle => Quantity::Orientation,
             // `Body angular Position x`; a bare `orientation.x` is one of a quaternion.
-            (true, _) if has("position pos angle angular") => Quantity::Orientation,
-            (true, _) => return of_quaternion,
+            (true, _) if by_angle || has("position pos angle angular") => Quantity::Orientation,
             (false, _) if rate => Quantity::BodyVelocity,
-            (false, _) if has("q") => return of_quaternion,
+            (true, _) => return of_quaternion(element + 1),
+            (false, _) if has("q") => return of_quaternion(element + 1),
             (false, _) if has(PLACE) || self.0.len() == 1 => Quantity::BodyPosition,
             (false, _) => return None,
         };
@@ -269,133 +267,44 @@ fn in_list(list: &str, number: usize) -> Option<Meaning> {
 }
 
 /// Joins `front right`, `Co M`, `d Q` and the like to one word.
-fn join_pairs(words: &mut Vec<String>) {
-    let known = |pair: &str| LEGS.iter().any(|names| is_one(pair, names));
+fn joined_pairs(mut words: Vec<String>) -> Vec<String> {
+    let is_leg = |pair: &str| LEGS.iter().any(|names| is_one(pair, names));
     let mut i = 0;
     while i + 1 < words.len() {
         let pair = format!("{}{}", words[i], words[i + 1]);
-        let is_split = is_one(&pair, "com dq ddq");
-        if (pair.len() > 3 && known(&pair)) || is_split {
+        if (pair.len() > 3 && is_leg(&pair)) || is_one(&pair, "com dq ddq") {
             words[i] = pair;
             words.remove(i + 1);
         }
         i += 1;
     }
+    words
 }
+
+/// Compact names and what stands before their axis.
+const COMPACT: [(&str, &str); 5] = [
+    ("v vel dp", "velocity"),
+    ("w omega gyro", "omega"),
+    ("q quat", "quat"),
+    ("p pos com", "pos"),
+    ("a acc", "acc"),
+];
 
 /// Takes `vx`, `wz`, `qw`, `px`, `rollrate` apart.
-fn split_compact(words: &mut Vec<String>) {
-    let parts = |word: &str| -> Option<[String; 2]> {
-        for angle in ["roll", "pitch", "yaw"] {
-            let rate = word.strip_prefix(angle);
-            let is_rate = rate.is_some_and(|rate| is_one(rate, "rate speed dot vel"));
-            if is_rate || word.strip_prefix('d') == Some(angle) {
-                return Some([angle.to_owned(), "rate".to_owned()]);
-            }
-        }
-        let (what, axis) = word.split_at_checked(word.len().saturating_sub(1))?;
-        let axis_known = is_one(axis, "x y z") || (what == "q" && axis == "w");
-        let whole = match what {
-            "v" | "vel" | "dp" => "velocity",
-            "w" | "omega" | "gyro" => "omega",
-            "q" | "quat" => "quat",
-            "p" | "pos" | "com" => "pos",
-            "a" | "acc" => "acc",
-            _ => return None,
-        };
-        axis_known.then(|| [whole.to_owned(), axis.to_owned()])
-    };
-    let split = |word: &String| parts(word).map_or_else(|| vec![word.clone()], Vec::from);
-    *words = words.iter().flat_map(split).collect();
-}
-
-/// Phi, theta and psi, where they are not counted, are roll, pitch and yaw.
-fn greek_angles(words: &mut [String]) {
-    if words.iter().any(|word| word.parse::<usize>().is_ok()) {
-        return;
-    }
-    let names = [("phi", "roll"), ("theta", "pitch"), ("psi", "yaw")];
-    for word in words {
-        if let Some((_, angle)) = names.iter().find(|(greek, _)| greek == word) {
-            *word = (*angle).to_owned();
+fn parts(word: &str) -> Vec<String> {
+    let pair = |one: &str, other: &str| vec![one.to_owned(), other.to_owned()];
+    for angle in ["roll", "pitch", "yaw"] {
+        let rate = word.strip_prefix(angle);
+        let is_rate = rate.is_some_and(|rate| is_one(rate, "rate speed dot vel"));
+        if is_rate || word.strip_prefix('d') == Some(angle) {
+            return pair(angle, "rate");
         }
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn said(name: &str) -> Option<(Quantity, usize)> {
-        read(name).map(|reading| (reading.quantity, reading.element))
+    if let Some((what, axis)) = word.split_at_checked(word.len().saturating_sub(1))
+        && (is_one(axis, "x y z") || (what == "q" && axis == "w"))
+        && let Some((_, whole)) = COMPACT.iter().find(|(known, _)| is_one(what, known))
+    {
+        return pair(whole, axis);
     }
-
-    #[test]
-    fn read_names_of_many_loggers() {
-        for (quantity, names) in [
-            (
-                Quantity::JointPosition,
-                "FR_hip_joint/position = 0; position[RL_calf_joint] = 11; q_11 = 11; RearLeft thigh angle \
-                 (deg) = 10; qpos[18] = 11; FRHipPos = 0",
-            ),
-            (
-                Quantity::JointTorque,
-                "effort[LF_HFE] = 4; tau3 = 3; fl.hip_pitch.torque = 4; ctrl[4] = 4; leg1_joint2_torque = \
-                 5; tau_RR_knee [Nm] = 8",
-            ),
-            (
-                Quantity::JointVelocity,
-                "motor_state[4].dq = 4; front_right.knee.vel = 2; qvel_6 = 0; dof_vel[7] = 7; dQ_3 = 3",
-            ),
-            (
-                Quantity::BodyPosition,
-                "pose.pose.position.z = 2; com_z = 2; CoM Z = 2; p_y = 1; qpos[2] = 2",
-            ),
-            (
-                Quantity::Orientation,
-                "pose.pose.orientation.w = 0; pose.pose.orientation.z = 3; imu_state.quaternion[2] = 2; qw \
-                 = 0; qx = 1; base_pitch = 1; Body angular Position z = 2; qpos[3] = 0; theta = 1",
-            ),
-            (
-                Quantity::BodyVelocity,
-                "twist.twist.linear.y = 1; body_vx = 0; Body linear Velocity x = 0; base vx [m/s] = 0",
-            ),
-            (
-                Quantity::AngularVelocity,
-                "twist.twist.angular.y = 1; imu_state.gyroscope[0] = 0; wz = 2; yaw_rate = 2; qvel_5 = 2; \
-                 psi_dot = 2; pitch rate [deg/s] = 1",
-            ),
-            (
-                Quantity::Feet,
-                "foot_force[3] = 3; contact_RL = 3; fr Foot = 0; Fz RF = 0; F_RL [N] = 3; FL load (N) = 1; \
-                 c_2 = 2",
-            ),
-        ] {
-            for entry in names.split("; ") {
-                let (name, element) = entry.rsplit_once(" = ").expect("an element");
-                let element = element.parse().expect("a number");
-                assert_eq!(said(name), Some((quantity, element)), "{name}");
-            }
-        }
-    }
-
-    #[test]
-    fn read_other_columns_say_nothing() {
-        for name in [
-            "wireless_remote[0]",
-            "temperature",
-            "FR_foot_position_x",
-            "foot_position_body[2]",
-            "foot_speed_body[1]",
-            "battery",
-            "mode",
-            "tick",
-        ] {
-            assert_eq!(said(name), None, "{name}");
-        }
-        assert!(read("q_des_3").unwrap().is_wanted);
-        assert!(is_time("header.stamp") && is_time("Time [ms]") && !is_time("tau"));
-        assert_eq!(unit("Time [ms]", &["s", "ms"]), Some("ms"));
-        assert_eq!(unit("knee_deg", &["rad", "deg"]), Some("deg"));
-    }
+    vec![word.to_owned()]
 }

@@ -1,72 +1,68 @@
-//! What the robot's geometry says of a log: units, order and signs under which feet on the ground stay where they are,
-//! and signs and unit of torques under which the feet carry the body.
-//!
-//! Everything is tried on one recording that is read without scales; its rows are scaled here.
-//!
-//! What the numbers say: a velocity is the derivative of its position in one unit, sign and frame only.
+//! Units, order and signs under which feet on the ground stay where they are, and signs and unit of torques under which
+//! the feet carry the body, tried on one recording that is read without scales; and under which a velocity is the
+//! derivative of its position.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::super::elements::Dimension;
 use super::super::map::Frame;
 use crate::recording::check::quantile;
 use crate::recording::mismatch::{foot_place, hip_torque, median_place, stances};
 use crate::recording::preprocess::differences_within;
-use crate::recording::segment::stretches;
+use crate::recording::segment::{Rows, stretches};
 use crate::recording::{Recording, Segment};
 use crate::robot::input_rule::rotation;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 
-/// Most stances of a leg, and most samples of a stance, that are looked at.
-const MOST: (usize, usize) = (40, 24);
+const MOST: (usize, usize) = (40, 24); // most stances of a leg, and most samples of a stance, that are looked at
 /// Distance, m, that a joint outside of its limits counts as, and the same for each sign that is not the first choice.
 const OUTSIDE_M: f64 = 4e-3;
 const TURNED_M: f64 = 1e-4;
 /// Share of a figure, and its difference in m, by which another reading has to be better than a plainer one.
 const BETTER: (f64, f64) = (0.75, 5e-4);
 const LEAST_MOTION_M: f64 = 3e-3; // least movement of feet on stiff legs that shows anything, m
-/// Length of the times over which forces and changes of velocity are summed, s.
-const BLOCK_S: f64 = 0.08;
-/// Share of what torques leave unexplained by which another set of signs has to be better than one sign for all, where
-/// feet on the ground do not show the signs of flexions and knees.
+const BLOCK_S: f64 = 0.08; // length of the times over which forces and changes of velocity are summed, s
+/// Share of what torques leave unexplained by which other signs have to be better than one sign for all.
 const OTHER_SIGNS: f64 = 0.5;
-/// Share of weight and change of velocity that torques may leave unexplained.
-const UNCARRIED: f64 = 0.8;
+const UNCARRIED: f64 = 0.8; // share of weight and change of velocity that torques may leave unexplained
 /// Slope of the hips' torques over what holds the feet on their side that decides their sign.
 const HIP_SHARE: f64 = 0.3;
 const FITS_M: f64 = 0.05; // largest movement of feet on the ground in a reading that fits, m
 
 pub(super) type NamedUnit = (&'static str, f64);
+/// Sign of each joint's torque in romc's order, and their unit.
+pub(super) type Torques = ([f64; JOINT_DIM], NamedUnit);
 
-/// How columns are read: units of the trunk's position and the joints' angles, whether joints are grouped by their
-/// kind, and the sign of each joint in romc's order.
+/// How columns are read: units, whether joints are grouped by their kind, and signs in romc's order.
 #[derive(Debug, Clone)]
 pub(super) struct Reading {
     pub position: NamedUnit,
     pub joint: NamedUnit,
     pub by_kind: bool,
     pub signs: [f64; JOINT_DIM],
-    pub slip_m: f64, // how far feet on the ground move in it, root mean square, m
-    /// How far they would on stiff legs, which units that are too small make little of.
-    motion_m: f64,
+    pub slip_m: f64,  // how far feet on the ground move in it, root mean square, m
+    motion_m: f64, // how far they would on stiff legs, which units that are too small make little of
     shown: [bool; 3], // for each kind of joint whether feet on the ground show its sign
+    pub torques: Option<Torques>, // none where they carry nothing
+    pub as_well: Vec<Reading>, // others that fit as well
 }
 
 impl Reading {
-    pub(crate) fn plain(position: NamedUnit, joint: NamedUnit) -> Self {
+    pub(crate) fn plain(position: NamedUnit, joint: NamedUnit, by_kind: bool) -> Self {
         Self {
             position,
             joint,
-            by_kind: false,
+            by_kind,
             signs: [1.0; JOINT_DIM],
             slip_m: 0.0,
             motion_m: 0.0,
             shown: [false; 3],
+            torques: None,
+            as_well: Vec::new(),
         }
     }
 
-    /// Whether it is better than a plainer one by more than chance: feet move less compared with what they would on
-    /// stiff legs, whatever the units.
+    /// Whether feet move clearly less than in a plainer one, compared with what they would on stiff legs.
     pub(crate) fn beats(&self, other: &Self) -> bool {
         let figure = |reading: &Self| match reading.motion_m > LEAST_MOTION_M {
             true => reading.slip_m / reading.motion_m,
@@ -110,35 +106,26 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The best reading with one of these units and orders, the first choice of each unless another is clearly better;
-    /// none without stances. Also others that fit as well.
-    pub(crate) fn best(
-        &self,
-        positions: &[NamedUnit],
-        joints: &[NamedUnit],
-        orders: &[bool],
-    ) -> Option<(Reading, Vec<Reading>)> {
+    /// The best reading, the first choice of each unit and order unless another is clearly better; none without stances.
+    pub(crate) fn best(&self, units: [&[NamedUnit]; 2], orders: &[bool]) -> Option<Reading> {
         let mut all = Vec::new();
-        for position in positions {
-            for joint in joints {
+        for position in units[0] {
+            for joint in units[1] {
                 for by_kind in orders {
-                    all.push(self.signed(*position, *joint, *by_kind)?);
+                    all.push(self.signed(Reading::plain(*position, *joint, *by_kind))?);
                 }
             }
         }
         let better = |best: usize, at: usize| if all[at].beats(&all[best]) { at } else { best };
         let best = (0..all.len()).reduce(better)?;
-        let chosen = all.swap_remove(best);
+        let mut chosen = all.swap_remove(best);
         all.retain(|other| other.fits() && !chosen.beats(other));
-        Some((chosen, all))
+        chosen.as_well = all;
+        Some(chosen)
     }
 
-    fn signed(&self, position: NamedUnit, joint: NamedUnit, by_kind: bool) -> Option<Reading> {
-        let mut reading = Reading {
-            by_kind,
-            ..Reading::plain(position, joint)
-        };
-        let of_legs = |reading: &Reading| Leg::ALL.map(|leg| self.moved(reading, leg));
+    /// A plain reading with the signs under which feet stay best in place.
+    fn signed(&self, mut reading: Reading) -> Option<Reading> {
         let combination = |code: usize| -> [f64; 3] {
             std::array::from_fn(|kind| if code >> kind & 1 == 1 { -1.0 } else { 1.0 })
         };
@@ -146,7 +133,7 @@ impl<'a> View<'a> {
         let tried = (0..8).map(|code| {
             let signs = combination(code);
             reading.signs = std::array::from_fn(|i| signs[i % 3]);
-            of_legs(&reading)
+            Leg::ALL.map(|leg| self.moved(&reading, leg))
         });
         let tried: Vec<[(f64, usize); 4]> = tried.collect();
         let rms = |parts: &[(f64, usize)]| {
@@ -154,26 +141,26 @@ impl<'a> View<'a> {
             let (sum, count) = parts.iter().fold((0.0, 0), add);
             (count > 0).then(|| (sum / count as f64).sqrt())
         };
-        let whole = tried.iter().map(|parts| rms(parts));
-        let whole: Vec<f64> = whole.collect::<Option<_>>()?;
         let least = |figures: &[f64]| {
             let best = (0..8).min_by(|a, b| figures[*a].total_cmp(&figures[*b]));
             best.expect("invariant: eight figures")
         };
+        let whole = tried.iter().map(|parts| rms(parts));
+        let whole: Vec<f64> = whole.collect::<Option<_>>()?;
         let best = least(&whole);
-        let shown = std::array::from_fn(|kind| {
+        reading.shown = std::array::from_fn(|kind| {
             let turned = whole[best ^ (1 << kind)];
             whole[best] < BETTER.0 * turned && whole[best] + BETTER.1 < turned
         });
         // A sign that they do not show is the plain one.
-        let shown_kinds = (0..3).filter(|kind| shown[*kind]);
+        let shown_kinds = (0..3).filter(|kind| reading.shown[*kind]);
         let common = shown_kinds.fold(0, |code, kind| code | best & (1 << kind));
         let mut codes = [common; 4];
         reading.slip_m = whole[common];
         // Legs with axes of their own, where those are clearly better.
         let own = Leg::ALL.map(|leg| {
             let figures = (tried.iter()).map(|parts| rms(&parts[leg.index()..=leg.index()]));
-            let figures = figures.collect::<Option<Vec<f64>>>();
+            let figures: Option<Vec<f64>> = figures.collect();
             figures.map_or(common, |figures| least(&figures))
         });
         let parts = Leg::ALL.map(|leg| tried[own[leg.index()]][leg.index()]);
@@ -182,12 +169,10 @@ impl<'a> View<'a> {
         }
         reading.signs = std::array::from_fn(|i| combination(codes[i / 3])[i % 3]);
         reading.motion_m = self.motion_m(&reading);
-        reading.shown = shown;
         Some(reading)
     }
 
-    /// How far feet on the ground would move on legs that stay as they are at the beginning of each stance, root mean
-    /// square, m.
+    /// How far feet on the ground would move on legs that stay as at the beginning of each stance, root mean square, m.
     fn motion_m(&self, reading: &Reading) -> f64 {
         let (mut sum, mut count) = (0.0, 0);
         for (segment, leg, samples) in &self.stances {
@@ -203,7 +188,6 @@ impl<'a> View<'a> {
         (sum / count.max(1) as f64).sqrt()
     }
 
-    /// Squared distances of a leg's foot from where it stands, summed, and their number.
     fn moved(&self, reading: &Reading, leg: Leg) -> (f64, usize) {
         let (mut sum, mut count) = (0.0, 0);
         let of_leg = 3 * leg.index()..3 * leg.index() + 3;
@@ -212,9 +196,8 @@ impl<'a> View<'a> {
             let states = states(segment, samples, reading);
             let angles = (states.iter()).flat_map(|x| joints_of(leg, x).into_iter().zip(limits));
             let outside = angles.filter(|(q, (low, high))| !(low - 0.1..=high + 0.1).contains(q));
-            let outside = outside.count();
             sum += self.about_median(leg, &states);
-            sum += OUTSIDE_M * OUTSIDE_M * outside as f64;
+            sum += OUTSIDE_M * OUTSIDE_M * outside.count() as f64;
             count += samples.len();
         }
         let turned = reading.signs[of_leg].iter().filter(|sign| **sign < 0.0);
@@ -227,13 +210,12 @@ impl<'a> View<'a> {
         let places = states.iter().map(|x| foot_place(self.robot, leg, x, true));
         let places: Vec<Vector3<f64>> = places.collect();
         let stands = median_place(&places);
-        let squares = places.iter().map(|place| (place - stands).norm_squared());
-        squares.sum()
+        let square = |place: &Vector3<f64>| (place - stands).norm_squared();
+        places.iter().map(square).sum()
     }
 
-    /// Signs of the torques in romc's order and their unit: those under which feet carry the body; none where they
-    /// carry nothing. Signs of the reading that feet in place do not show become those of the torques.
-    pub(crate) fn torques(&self, reading: &mut Reading) -> Option<([f64; JOINT_DIM], NamedUnit)> {
+    /// Signs and unit of the torques under which feet carry the body; decides signs that feet in place do not show.
+    pub(crate) fn torques(&self, reading: &mut Reading) -> Option<Torques> {
         let blocks = self.blocks(reading);
         let explained = |signs: [f64; 2]| {
             let mut sums = [0.0; 3];
@@ -247,78 +229,69 @@ impl<'a> View<'a> {
             let left = 1.0 - product * product / (square * whole);
             (product > 0.0 && left < UNCARRIED).then_some((left, product / square))
         };
-        let tried = [[1.0, 1.0], [-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]];
-        let tried = tried.map(|signs| (signs, explained(signs)));
-        let best = |all: &[([f64; 2], Option<(f64, f64)>)]| {
-            let known = (all.iter()).filter_map(|(signs, found)| Some((*signs, (*found)?)));
+        let best = |all: [[f64; 2]; 2]| {
+            let known = (all.into_iter()).filter_map(|signs| Some((signs, explained(signs)?)));
             known.min_by(|one, other| one.1.0.total_cmp(&other.1.0))
         };
-        let common = best(&tried[..2]);
+        let common = best([[1.0, 1.0], [-1.0, -1.0]]);
         // Flexions alone carry so little that chance decides their sign, in short recordings above all.
         let is_shown = reading.shown[1] && reading.shown[2];
-        let other = best(&tried[2..]).filter(|_| !is_shown);
+        let other = best([[1.0, -1.0], [-1.0, 1.0]]).filter(|_| !is_shown);
         let (signs, (_, scale)) = match (common, other) {
             (Some(common), Some(other)) if other.1.0 < OTHER_SIGNS * common.1.0 => other,
-            (Some(common), _) => common,
-            (None, other) => other?,
+            (common, other) => common.or(other)?,
         };
         let hips = self.hips(reading, signs);
         let torque = std::array::from_fn(|i| {
             let of_kind = [hips[i / 3], signs[0], signs[1]];
             reading.signs[i] * of_kind[i % 3]
         });
-        // An axis that points the other way turns angles and torques; one sign of all torques is that of who pushes
-        // whom.
+        // An axis that points the other way turns angles and torques; one sign of all is that of who pushes whom.
         if !reading.shown[0] && signs[0] == signs[1] {
             for leg in 0..4 {
                 reading.signs[3 * leg] *= hips[leg] * signs[1];
             }
         }
-        const UNITS: [&str; 3] = ["N m", "N cm", "N mm"];
-        let units = UNITS.map(|unit| (unit, Dimension::Torque.factor(unit).unwrap_or(1.0)));
-        let nearest = |one: &NamedUnit, other: &NamedUnit| {
-            let off = |unit: &NamedUnit| (unit.1 / scale).ln().abs();
-            off(one).total_cmp(&off(other))
-        };
+        let units = ["N m", "N cm", "N mm"];
+        let units = units.map(|unit| (unit, Dimension::Torque.factor(unit).unwrap_or(1.0)));
+        let off = |unit: &NamedUnit| (unit.1 / scale).ln().abs();
+        let nearest = |one: &NamedUnit, other: &NamedUnit| off(one).total_cmp(&off(other));
         Some((torque, units.into_iter().min_by(nearest)?))
     }
 
-    /// Over times with feet on the ground, the impulses that flexions and knees give, and what weight and change of
-    /// velocity need, forwards and upwards.
+    /// Over times with feet on the ground, impulses of flexions and knees, and what weight and change of velocity need.
     fn blocks(&self, reading: &Reading) -> Vec<([Vector3<f64>; 2], Vector3<f64>)> {
         let mut out = Vec::new();
         let forwards_and_up = |v: Vector3<f64>| Vector3::new(v.x, 0.0, v.z);
         for segment in &self.recording.segments {
             let step_s = segment.mean_step_s();
             let length = ((BLOCK_S / step_s).round() as usize).max(2);
+            let velocity = |sample: usize| -> Vector3<f64> {
+                segment.dx.fixed_view::<3, 1>(JOINT_DIM, sample) * reading.position.1
+            };
             let contacts = (segment.contacts().into_iter()).filter(|(_, grounded)| *grounded);
-            for (run, _) in contacts {
+            let starts = contacts.flat_map(|(run, _)| {
                 let starts = run.clone().step_by(length);
-                for start in starts.filter(|start| start + length < run.end) {
-                    let mut forces = [Vector3::zeros(); 2];
-                    for sample in start..start + length {
-                        let x = state(segment, sample, reading);
-                        let turn = rotation([15, 16, 17].map(|i| x[i]));
-                        for leg in Leg::down(segment.feet[sample]) {
-                            let own = self.leg(segment, sample, leg, &x, reading);
-                            if let Some((map, tau)) = own {
-                                for kind in [1, 2] {
-                                    forces[kind - 1] +=
-                                        turn * map.column(kind) * (tau[kind] * step_s);
-                                }
+                starts.filter(move |start| start + length < run.end)
+            });
+            for start in starts {
+                let mut forces = [Vector3::zeros(); 2];
+                for sample in start..start + length {
+                    let x = state(segment, sample, reading);
+                    let turn = rotation([15, 16, 17].map(|i| x[i]));
+                    for leg in Leg::down(segment.feet[sample]) {
+                        if let Some((map, tau)) = self.leg(segment, sample, leg, &x, reading) {
+                            for kind in [1, 2] {
+                                forces[kind - 1] += turn * map.column(kind) * (tau[kind] * step_s);
                             }
                         }
                     }
-                    let velocity = |sample: usize| -> Vector3<f64> {
-                        let rates = segment.dx.fixed_view::<3, 1>(JOINT_DIM, sample);
-                        rates * reading.position.1
-                    };
-                    let time_s = segment.time_s[start + length] - segment.time_s[start];
-                    let mut needed = velocity(start + length) - velocity(start);
-                    needed.z += GRAVITY_M_S2 * time_s;
-                    let needed = forwards_and_up(self.robot.mass_kg() * needed);
-                    out.push((forces.map(forwards_and_up), needed));
                 }
+                let time_s = segment.time_s[start + length] - segment.time_s[start];
+                let mut needed = velocity(start + length) - velocity(start);
+                needed.z += GRAVITY_M_S2 * time_s;
+                let needed = forwards_and_up(self.robot.mass_kg() * needed);
+                out.push((forces.map(forwards_and_up), needed));
             }
         }
         out
@@ -332,7 +305,7 @@ impl<'a> View<'a> {
         leg: Leg,
         x: &[f64; STATE_DIM],
         reading: &Reading,
-    ) -> Option<(nalgebra::Matrix3<f64>, [f64; 3])> {
+    ) -> Option<(Matrix3<f64>, [f64; 3])> {
         let map = (self.robot.damped_force_map(leg, &joints_of(leg, x))).ok()?;
         let torque = |kind: usize| {
             let joint = 3 * leg.index() + kind;
@@ -409,21 +382,16 @@ pub(super) fn slopes(times_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     differences_within(&ranges, times_s, rows)
 }
 
-/// Unit, sign and axes in which velocities are these derivatives; of the `frames`, each with the velocities turned from
-/// it, the first that fits nearly as well as the best. `None` if none does.
-pub(super) fn scale(
-    derivative: &DMatrix<f64>,
-    frames: &[(Frame, DMatrix<f64>)],
-    units: &[NamedUnit],
-) -> Option<Scale> {
-    let whole = derivative.norm_squared().max(1e-30);
+/// Unit, sign and axes in which velocities are these derivatives: of the `frames` the first that fits nearly best.
+pub(super) fn scale(rates: &Rows, frames: &[(Frame, Rows)], units: &[NamedUnit]) -> Option<Scale> {
+    let whole = rates.norm_squared().max(1e-30);
     let best = |(frame, raw): &(Frame, DMatrix<f64>)| {
         let signed = units.iter().flat_map(|unit| [(*unit, 1.0), (*unit, -1.0)]);
         let scales = signed.map(|((unit, factor), sign)| Scale {
             unit,
             sign,
             frame: *frame,
-            left: (derivative - raw * (sign * factor)).norm_squared() / whole,
+            left: (rates - raw * (sign * factor)).norm_squared() / whole,
         });
         let best = scales.min_by(|a, b| a.left.total_cmp(&b.left));
         best.filter(|scale| scale.left < UNEXPLAINED)

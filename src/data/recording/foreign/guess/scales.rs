@@ -12,9 +12,10 @@ use super::super::elements::{
 use super::super::map::{ColumnMap, Frame};
 use super::columns::Group;
 use super::feet::force_lines;
-use super::physics::{NamedUnit, Reading, Scale, View, reach, scale, slopes};
+use super::physics::{NamedUnit, Reading, Scale, Torques, View, reach, scale, slopes};
 use super::write::{Lines, Source, unit_line};
-use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot};
+use crate::recording::Recording;
+use crate::robot::{JOINT_DIM, JOINT_NAMES};
 
 const ANGLE: [(&str, f64); 3] = [
     ("rad", 1.0),
@@ -24,52 +25,36 @@ const ANGLE: [(&str, f64); 3] = [
 const LENGTHS: [&str; 3] = ["m", "cm", "mm"];
 const PITCH_RAD: f64 = 1.6; // largest pitch for which radians are the first choice
 
-pub(super) struct Scales {
-    pub lines: Lines,
-    /// The order of the joints' columns, if they are counted and grouped by kind.
-    pub order: Option<&'static str>,
-    pub notes: Vec<String>,
-}
-
-struct Choice {
-    attitude: usize,
-    reading: Reading,
-    torques: Option<([f64; JOINT_DIM], NamedUnit)>,
-    as_well: Vec<Reading>,
-}
-
 /// A way to read the trunk's attitude: its lines, and roll, pitch and yaw.
 type Attitude = (Vec<String>, DMatrix<f64>);
 
 impl Source<'_> {
-    pub(crate) fn scales(&self, robot: &Robot, time: &str) -> Scales {
+    /// Lines of each quantity, the order of the joints' columns, if they are counted and grouped by kind, and notes.
+    pub(crate) fn scales(&self) -> (Lines, Option<&'static str>, Vec<String>) {
         let (mut lines, mut notes) = (Lines::new(), Vec::new());
         if let Some(feet) = self.group(Quantity::Feet) {
-            let (own, note) = force_lines(&self.raw(feet));
+            let (own, note) = force_lines(self.raw(feet));
             lines.insert(Quantity::Feet, own);
             notes.extend(note);
         }
-        let attitudes = self.attitudes();
-        let choice = self.choice(robot, time, &attitudes, &lines);
-        let (reading, torques) = (&choice.reading, choice.torques);
-        notes.extend(said(reading, &choice.as_well));
+        let mut attitudes = self.attitudes();
+        let (attitude, reading) = self.choice(&attitudes, &lines);
+        notes.extend(said(&reading));
         let turned = |what: &str, signs: &[f64]| {
             sign_line(signs).map(|line| format!("{what}: {line}, as the feet and the weight show"))
         };
         notes.extend(turned("joint.position", &reading.signs));
-        notes.extend(torques.and_then(|(signs, _)| turned("joint.torque", &signs)));
-        let attitude = attitudes.into_iter().nth(choice.attitude);
+        let of_torques = |(signs, _): Torques| turned("joint.torque", &signs);
+        notes.extend(reading.torques.and_then(of_torques));
+        let attitude = (attitude < attitudes.len()).then(|| attitudes.remove(attitude));
         self.trunk(attitude, reading.position, &mut lines);
-        self.joints(reading, torques, &mut lines);
-        Scales {
-            lines,
-            order: reading.by_kind.then_some("*.hx *.hy *.kn"),
-            notes,
-        }
+        self.joints(&reading, &mut lines);
+        let order = reading.by_kind.then_some("*.hx *.hy *.kn");
+        (lines, order, notes)
     }
 
     /// The reading under which feet on the ground stay best in place; by the joints' limits where no feet stand.
-    fn choice(&self, robot: &Robot, time: &str, attitudes: &[Attitude], lines: &Lines) -> Choice {
+    fn choice(&self, attitudes: &[Attitude], lines: &Lines) -> (usize, Reading) {
         let place = self.raw_of(Quantity::BodyPosition);
         let by_height = || match reach(place.row(2).iter().copied()) {
             60.0.. => "mm",
@@ -77,47 +62,32 @@ impl Source<'_> {
             _ => "m",
         };
         let positions = self.units(Quantity::BodyPosition, &["mm", "cm"], &LENGTHS, by_height);
-        let by_size = || self.angle_by_limits(robot);
+        let by_size = || self.angle_by_limits();
         let told = ["mrad", "rad", "deg"];
         let joints = self.units(Quantity::JointPosition, &told, &["rad", "deg"], by_size);
         let group = self.group(Quantity::JointPosition);
-        let orders: &[bool] = match group.is_some_and(|group| group.is_counted) {
-            true => &[false, true],
-            false => &[false],
-        };
-        let mut found: Option<Choice> = None;
+        let is_counted = group.is_some_and(|group| group.is_counted);
+        let orders: &[bool] = if is_counted { &[false, true] } else { &[false] };
+        let mut found: Option<(usize, Reading)> = None;
         for (attitude, (own, _)) in attitudes.iter().enumerate() {
-            let Some(recording) = self.without_scales(time, own, lines) else {
+            let Some(recording) = self.without_scales(own, lines) else {
                 continue;
             };
-            let view = View::of(&recording, robot);
-            let Some((mut reading, as_well)) = view.best(&positions, &joints, orders) else {
-                continue;
-            };
-            let is_best = |best: &Choice| reading.beats(&best.reading);
-            if found.as_ref().is_none_or(is_best) {
-                let torques = view.torques(&mut reading);
-                found = Some(Choice {
-                    attitude,
-                    reading,
-                    torques,
-                    as_well,
-                });
+            let view = View::of(&recording, self.robot);
+            if let Some(mut reading) = view.best([&positions, &joints], orders)
+                && (found.as_ref()).is_none_or(|(_, best)| reading.beats(best))
+            {
+                reading.torques = view.torques(&mut reading);
+                found = Some((attitude, reading));
             }
         }
-        found.unwrap_or_else(|| Choice {
-            attitude: 0,
-            reading: self.by_limits(robot, positions.first(), joints.first()),
-            torques: None,
-            as_well: Vec::new(),
-        })
+        found.unwrap_or_else(|| (0, self.by_limits(positions[0], joints[0])))
     }
 
     fn raw_of(&self, quantity: Quantity) -> DMatrix<f64> {
-        match self.group(quantity) {
-            Some(group) => self.raw(group),
-            None => DMatrix::zeros(quantity.elements().len(), 1),
-        }
+        let zeros = || DMatrix::zeros(quantity.elements().len(), 1);
+        let group = self.group(quantity);
+        group.map_or_else(zeros, |group| self.raw(group))
     }
 
     /// The units that a quantity may have, the first choice first: the one of its name, else all of `units`.
@@ -160,31 +130,25 @@ impl Source<'_> {
             let why = "   # feet on the ground stay in place";
             return orders.map(|order| attitude(order, why)).to_vec();
         }
-        let of_unit = |(unit, factor): NamedUnit| (vec![unit_line(unit, "")], &values * factor);
         let is_steep = || reach(values.row(1).iter().copied()) > PITCH_RAD;
         let first = || if is_steep() { "deg" } else { "rad" };
         let both = ["rad", "deg"];
         let units = self.units(Quantity::Orientation, &both, &both, first);
+        let of_unit = |(unit, factor): NamedUnit| (vec![unit_line(unit, "")], &values * factor);
         units.into_iter().map(of_unit).collect()
     }
 
-    /// The log read with this attitude and these lines of the feet, everything else as its numbers are; none without
-    /// what stands of feet rest on.
-    fn without_scales(
-        &self,
-        time: &str,
-        attitude: &[String],
-        lines: &Lines,
-    ) -> Option<crate::recording::Recording> {
-        let mut text = format!("[time]\n{time}\n");
-        let required = |quantity: &Quantity| quantity.is_required();
-        for quantity in Quantity::ALL.into_iter().filter(required) {
+    /// The log read with this attitude and these lines of the feet, everything else as its numbers are.
+    fn without_scales(&self, attitude: &[String], lines: &Lines) -> Option<Recording> {
+        let mut text = format!("[time]\n{}\n", self.time);
+        let has_torques = self.group(Quantity::JointTorque).is_some();
+        let is_required = |quantity: &Quantity| quantity.is_required();
+        for quantity in Quantity::ALL.into_iter().filter(is_required) {
             // Torques need not be there to see feet stand.
-            let stands_in = match quantity {
-                Quantity::JointTorque => self.group(Quantity::JointPosition),
-                _ => None,
+            let group = match quantity {
+                Quantity::JointTorque if !has_torques => self.group(Quantity::JointPosition)?,
+                _ => self.group(quantity)?,
             };
-            let group = self.group(quantity).or(stands_in)?;
             let mut own = self.columns(group);
             match quantity {
                 Quantity::Orientation => own.extend(attitude.iter().cloned()),
@@ -195,24 +159,22 @@ impl Source<'_> {
         }
         let map = ColumnMap::parse("the guessed map", &text).ok()?;
         let mut recording = assemble(self.path, self.logs, &map).ok()?.recording;
-        if self.group(Quantity::JointTorque).is_none() {
+        if !has_torques {
             let segments = recording.segments.iter_mut();
             segments.for_each(|segment| segment.torque_nm.fill(0.0));
         }
         Some(recording)
     }
 
-    /// The unit of angles in which more of them are within the joints' limits, apart from whole turns and signs; where
-    /// limits do not decide, degrees for angles beyond a turn.
-    fn angle_by_limits(&self, robot: &Robot) -> &'static str {
+    /// The unit in which more angles are within the joints' limits, apart from turns and signs; degrees beyond a turn.
+    fn angle_by_limits(&self) -> &'static str {
         let values = self.raw_of(Quantity::JointPosition);
         let inside = |factor: f64| -> usize {
-            let rows = values.row_iter().zip(robot.joint_limit_rad());
+            let rows = values.row_iter().zip(self.robot.joint_limit_rad());
             let of_row = rows.map(|(row, (low, high))| {
                 let is_inside = |angle: f64| (angle - low).rem_euclid(TAU) <= high - low;
-                let angles = row.iter().map(|value| factor * value);
-                let inside = angles.filter(|angle| is_inside(*angle) || is_inside(-angle));
-                inside.count()
+                let either = |angle: &f64| is_inside(*angle) || is_inside(-angle);
+                row.iter().map(|v| factor * v).filter(either).count()
             });
             of_row.sum()
         };
@@ -224,20 +186,13 @@ impl Source<'_> {
     }
 
     /// Signs by the limits of the joints, where nothing else shows them.
-    fn by_limits(
-        &self,
-        robot: &Robot,
-        position: Option<&NamedUnit>,
-        joint: Option<&NamedUnit>,
-    ) -> Reading {
-        let joint = joint.copied().unwrap_or(ANGLE[0]);
-        let mut reading = Reading::plain(position.copied().unwrap_or(("m", 1.0)), joint);
+    fn by_limits(&self, position: NamedUnit, joint: NamedUnit) -> Reading {
+        let mut reading = Reading::plain(position, joint, false);
         let values = self.raw_of(Quantity::JointPosition) * joint.1;
-        for (row, (low, high)) in robot.joint_limit_rad().iter().enumerate() {
+        for (row, (low, high)) in self.robot.joint_limit_rad().iter().enumerate() {
             let range = low - 0.1..=high + 0.1;
-            let values = values.row(row);
             let inside = |sign: f64| {
-                let signed = values.iter().map(|value| sign * value);
+                let signed = values.row(row).into_iter().map(|value| sign * value);
                 signed.filter(|value| range.contains(value)).count()
             };
             if inside(-1.0) > 2 * inside(1.0) {
@@ -247,12 +202,7 @@ impl Source<'_> {
         reading
     }
 
-    fn joints(
-        &self,
-        reading: &Reading,
-        torques: Option<([f64; JOINT_DIM], NamedUnit)>,
-        lines: &mut Lines,
-    ) {
+    fn joints(&self, reading: &Reading, lines: &mut Lines) {
         let Some(group) = self.group(Quantity::JointPosition) else {
             return;
         };
@@ -268,21 +218,20 @@ impl Source<'_> {
             let own = [unit_line(unit, why)].into_iter().chain(sign_line(signs));
             lines.insert(quantity, own.collect());
         };
-        let why = match self.told(group, &["mrad", "rad", "deg"]) {
-            None if reading.joint.0 != "rad" => "   # by their size and the feet",
-            Some(_) | None => "",
+        let is_told = self.told(group, &["mrad", "rad", "deg"]).is_some();
+        let why = match is_told || reading.joint.0 == "rad" {
+            true => "",
+            false => "   # by their size and the feet",
         };
         let (unit, signs) = (reading.joint.0, &reading.signs);
         put(Quantity::JointPosition, unit, why, signs);
         if let Some((velocity, times)) = self.beside(Quantity::JointVelocity, group) {
-            let velocity = in_order(velocity);
-            let rates = slopes(&times, &position);
+            let (velocity, rates) = (in_order(velocity), slopes(&times, &position));
             let mut own = reading.signs;
             let mut units = Vec::new();
             for row in 0..JOINT_DIM {
-                let rows = |m: &DMatrix<f64>| m.rows(row, 1).into_owned();
-                let velocity = [(Frame::Angles, rows(&velocity))];
-                if let Some(found) = scale(&rows(&rates), &velocity, &ANGLE) {
+                let [velocity, rate] = [&velocity, &rates].map(|m| m.rows(row, 1).into_owned());
+                if let Some(found) = scale(&rate, &[(Frame::Angles, velocity)], &ANGLE) {
                     own[row] = found.sign;
                     units.push(found.unit);
                 }
@@ -295,16 +244,10 @@ impl Source<'_> {
         }
         if let Some(group) = self.group(Quantity::JointTorque) {
             let told = self.told(group, &["nmm", "mnm", "ncm"]);
-            let (signs, unit, why) = match torques {
-                Some((signs, (unit, _))) => {
-                    let why = "   # unit and signs by the weight that the feet carry";
-                    (signs, unit, why)
-                }
-                None => {
-                    let why = "   # signs as of the angles: the torques carry nothing";
-                    (reading.signs, "N m", why)
-                }
-            };
+            let carries = "   # unit and signs by the weight that the feet carry";
+            let nothing = "   # signs as of the angles: the torques carry nothing";
+            let of_weight = (reading.torques).map(|(signs, (unit, _))| (signs, unit, carries));
+            let (signs, unit, why) = of_weight.unwrap_or((reading.signs, "N m", nothing));
             put(Quantity::JointTorque, told.unwrap_or(unit), why, &signs);
         }
     }
@@ -320,11 +263,9 @@ impl Source<'_> {
             let velocity = (Quantity::AngularVelocity, &ANGLE[..2]);
             self.velocity(velocity, of, &frames, turned, lines);
         }
-        lines.extend(
-            attitude
-                .iter()
-                .map(|(own, _)| (Quantity::Orientation, own.clone())),
-        );
+        if let Some((own, _)) = &attitude {
+            lines.insert(Quantity::Orientation, own.clone());
+        }
         let Some(group) = self.group(Quantity::BodyPosition) else {
             return;
         };
@@ -344,8 +285,7 @@ impl Source<'_> {
         self.velocity(velocity, of, &[Frame::World, Frame::Body], turned, lines);
     }
 
-    /// Lines of a velocity of the trunk, whose positions have this group and these values: unit, sign and axes, of
-    /// `frames` the first that fits nearly as well as the best.
+    /// Lines of a velocity of the trunk, whose positions have this group and these values.
     fn velocity(
         &self,
         (velocity, units): (Quantity, &[NamedUnit]),
@@ -358,10 +298,8 @@ impl Source<'_> {
             return;
         };
         // The twist of an odometry is in the body's frame unless the numbers show another.
-        let is_odometry = self.group(velocity).is_some_and(|group| {
-            let first = &self.logs[group.log].columns[group.columns[0]];
-            first.name.starts_with("twist.twist.")
-        });
+        let own = self.group(velocity);
+        let is_odometry = own.is_some_and(|own| self.first_name(own).starts_with("twist.twist."));
         let mut frames = frames.to_vec();
         frames.sort_by_key(|frame| is_odometry && *frame != Frame::Body);
         let rates = slopes(&times, positions);
@@ -371,7 +309,7 @@ impl Source<'_> {
     }
 }
 
-fn said(reading: &Reading, as_well: &[Reading]) -> Vec<String> {
+fn said(reading: &Reading) -> Vec<String> {
     let mut notes = Vec::new();
     if !reading.fits() {
         notes.push(format!(
@@ -380,63 +318,56 @@ fn said(reading: &Reading, as_well: &[Reading]) -> Vec<String> {
             1e3 * reading.slip_m
         ));
     }
-    let others = as_well.iter().map(|other| {
+    let others = reading.as_well.iter().map(|other| {
         let (position, joint) = (other.position.0, other.joint.0);
         let order = ["", ", joints grouped by kind"][usize::from(other.by_kind)];
         format!("positions in {position}, angles in {joint}{order}")
     });
     let others = others.collect::<Vec<_>>().join("; ");
     if !others.is_empty() {
-        notes.push(format!(
-            "feet on the ground stay in place as well with {others}"
-        ));
+        let found = "feet on the ground stay in place as well with";
+        notes.push(format!("{found} {others}"));
     }
     notes
 }
 
 fn sign_line(signs: &[f64]) -> Option<String> {
-    let negative: Vec<usize> = (0..signs.len()).filter(|i| signs[*i] < 0.0).collect();
-    if negative.is_empty() {
-        return None;
+    let negative = JOINT_NAMES
+        .iter()
+        .zip(signs)
+        .filter(|(_, sign)| **sign < 0.0);
+    let names = negative.map(|(name, _)| format!("\"{name}\" = -1"));
+    let names: Vec<String> = names.collect();
+    match names.len() {
+        0 => None,
+        JOINT_DIM => Some("sign = -1".to_owned()),
+        _ => Some(format!("sign = {{ {} }}", names.join(", "))),
     }
-    if negative.len() == signs.len() {
-        return Some("sign = -1".to_owned());
-    }
-    let names = (negative.iter()).map(|i| format!("\"{}\" = -1", JOINT_NAMES[*i]));
-    let names = names.collect::<Vec<_>>().join(", ");
-    Some(format!("sign = {{ {names} }}"))
 }
 
 fn velocity_lines(found: Option<Scale>, of: &str, is_odometry: bool) -> Vec<String> {
     let Some(scale) = found else {
-        let (sign, what) = match is_odometry {
-            true => ("", "an odometry's"),
-            false => ("# ", "unknown"),
-        };
+        let odometry = is_odometry.then_some(("", "an odometry's"));
+        let (sign, what) = odometry.unwrap_or(("# ", "unknown"));
         let line = format!("{sign}frame = \"body\"   # {what}: it does not follow {of}");
         return vec![line];
     };
     let why = format!("   # by the change of {of}");
     let mut lines = vec![unit_line(scale.unit, &why)];
-    if scale.sign < 0.0 {
-        lines.push("sign = -1".to_owned());
-    }
-    match scale.frame {
-        Frame::Body => lines.push("frame = \"body\"".to_owned()),
-        Frame::World if of == "the angles" => lines.push("frame = \"world\"".to_owned()),
-        Frame::World | Frame::Angles => {}
-    }
+    lines.extend((scale.sign < 0.0).then(|| "sign = -1".to_owned()));
+    let frame = match scale.frame {
+        Frame::Body => Some("body"),
+        Frame::World if of == "the angles" => Some("world"),
+        Frame::World | Frame::Angles => None,
+    };
+    lines.extend(frame.map(|frame| format!("frame = \"{frame}\"")));
     lines
 }
 
 pub(super) fn order_line(order: Option<&str>, group: &Group) -> Option<String> {
-    let (order, why) = match order {
-        Some(order) => (order, "feet on the ground stay in place"),
-        None if group.is_counted => (
-            "fr.* fl.* rr.* rl.*",
-            "assumed: the columns are only counted",
-        ),
-        None => return None,
-    };
+    let shown = order.map(|order| (order, "feet on the ground stay in place"));
+    let counted = "fr.* fl.* rr.* rl.*";
+    let why = "assumed: the columns are only counted";
+    let (order, why) = shown.or(group.is_counted.then_some((counted, why)))?;
     Some(format!("order = \"{order}\"   # {why}"))
 }

@@ -5,77 +5,85 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
+use super::super::assemble::assemble;
 use super::super::elements::{Dimension, Quantity};
-use super::super::map::{Frame, Name};
+use super::super::map::{ColumnMap, Frame, Name};
 use super::super::signal::Log;
 use super::Guess;
 use super::columns::{Clock, Group, clock, groups};
 use super::names::unit;
 use super::physics::{scale, slopes};
-use super::scales::{Scales, order_line};
+use super::scales::order_line;
+use crate::recording::segment::Rows;
 use crate::robot::Robot;
 
 pub(super) type Lines = BTreeMap<Quantity, Vec<String>>;
 
-/// The guessed map of logs; what reading by it gives is not known yet.
+/// The guessed map of logs, and what reading by it gives.
 pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
     let groups = groups(logs, robot);
     let clock = clock(logs, &groups);
+    let time = time(logs, &groups, clock.as_ref());
     let source = Source {
         path,
         logs,
+        robot,
         groups: &groups,
         clock: clock.as_ref(),
+        time: &time,
     };
-    let time = source.time();
-    let file = path
-        .file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy();
+    let file = path.file_name().unwrap_or(path.as_os_str());
     let mut text = format!(
-        "# Guessed from {file}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n"
+        "# Guessed from {}: check every line, then `romc inspect LOG --columns THIS.toml`.\n\n[time]\n{time}\n",
+        file.to_string_lossy()
     );
-    let Scales {
-        lines: mut scales,
-        order,
-        mut notes,
-    } = source.scales(robot, &time);
-    let is_sound = |group: &&Group| source.is_sound(group, &scales);
-    let sound: Vec<&Group> = groups.iter().filter(is_sound).collect();
+    let (mut lines, order, mut notes) = source.scales();
+    let sound = groups.iter().filter(|group| source.is_sound(group, &lines));
+    let sound: Vec<&Group> = sound.collect();
     let mut open = Vec::new();
     for group in &sound {
         let key = group.quantity.key();
-        let scales = scales.remove(&group.quantity).unwrap_or_default();
+        let scales = lines.remove(&group.quantity).unwrap_or_default();
         let lines = source.lines(group, order, scales).join("\n");
-        text.push_str(&format!("\n[{key}]\n{lines}\n"));
+        text += &format!("\n[{key}]\n{lines}\n");
         if !group.others.is_empty() {
             let note = format!("{key}: by their names also {}", group.others.join(", "));
             open.extend(group.is_tie.then(|| note.clone()));
             notes.push(note);
         }
         if group.is_unnamed(logs) {
-            let name = &logs[group.log].columns[group.columns[0]].name;
-            open.push(format!(
-                "{key}: columns such as `{name}`, which are only counted"
-            ));
+            let name = source.first_name(group);
+            let found = format!("columns such as `{name}`, which are only counted");
+            open.push(format!("{key}: {found}"));
         }
     }
-    let is_missing = |quantity: &Quantity| {
-        quantity.is_required() && sound.iter().all(|group| group.quantity != *quantity)
-    };
-    let missing = Quantity::ALL.into_iter().filter(is_missing);
-    let missing: Vec<&'static str> = missing.map(Quantity::key).collect();
+    let mut missing = Vec::from(Quantity::ALL);
+    missing.retain(|own| own.is_required() && sound.iter().all(|group| group.quantity != *own));
+    let missing: Vec<&'static str> = missing.into_iter().map(Quantity::key).collect();
     for key in &missing {
-        text.push_str(&format!(
-            "\n# not found, and needed:\n# [{key}]\n# columns = [ ]\n"
-        ));
+        text += &format!("\n# not found, and needed:\n# [{key}]\n# columns = [ ]\n");
     }
+    let outcome = ColumnMap::parse("the guessed map", &text)
+        .and_then(|map| assemble(path, logs, &map))
+        .map(|made| made.recording.sample_count());
     Guess {
         text,
         missing,
-        outcome: Ok(0),
+        outcome: outcome.map_err(|error| error.to_string()),
         notes,
         open,
+    }
+}
+
+/// The clock of all tables.
+fn time(logs: &[Log], groups: &[Group], clock: Option<&Clock>) -> String {
+    let step = "# sample_time_s = 0.001";
+    match clock {
+        None => format!("{step}   # no column counts time: the distance of samples"),
+        Some(_) if logs[groups[0].log].clock.is_some() => {
+            "# each topic has the time stamps of its messages".to_owned()
+        }
+        Some(Clock { name, unit }) => format!("column = {}\nunit = \"{unit}\"", quoted(name)),
     }
 }
 
@@ -87,6 +95,8 @@ fn quoted(name: &str) -> String {
 pub(super) struct Source<'a> {
     pub path: &'a Path,
     pub logs: &'a [Log],
+    pub robot: &'a Robot,
+    pub time: &'a str,
     groups: &'a [Group],
     clock: Option<&'a Clock>,
 }
@@ -100,17 +110,17 @@ impl Source<'_> {
         self.groups.iter().find(|group| group.quantity == quantity)
     }
 
+    pub(crate) fn first_name(&self, group: &Group) -> &str {
+        &self.logs[group.log].columns[group.columns[0]].name
+    }
+
+    /// The unit in the names of a group.
     pub(crate) fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
-        let columns = &self.logs[group.log].columns;
-        unit(&columns[group.columns[0]].name, units)
+        unit(self.first_name(group), units)
     }
 
     /// Values of a group and their times, if they share the log of `with`.
-    pub(crate) fn beside(
-        &self,
-        quantity: Quantity,
-        with: &Group,
-    ) -> Option<(DMatrix<f64>, Vec<f64>)> {
+    pub(crate) fn beside(&self, quantity: Quantity, with: &Group) -> Option<(Rows, Vec<f64>)> {
         let group = self.group(quantity).filter(|group| group.log == with.log)?;
         Some((self.raw(group), self.times_s(group.log)?))
     }
@@ -142,25 +152,14 @@ impl Source<'_> {
         }
         let names = group.columns.iter();
         let names: Vec<String> = names.map(|at| quoted(&log.columns[*at].name)).collect();
-        let rows = names.chunks(if names.len() == 4 { 4 } else { 3 });
-        let rows: Vec<String> = rows.map(|row| row.join(", ")).collect();
-        lines.push(match &rows[..] {
-            [row] => format!("columns = [{row}]"),
-            _ => format!("columns = [\n    {},\n]", rows.join(",\n    ")),
+        lines.push(match names.len() {
+            ..=4 => format!("columns = [{}]", names.join(", ")),
+            _ => {
+                let rows: Vec<String> = names.chunks(3).map(|row| row.join(", ")).collect();
+                format!("columns = [\n    {},\n]", rows.join(",\n    "))
+            }
         });
         lines
-    }
-
-    fn time(&self) -> String {
-        let uncounted =
-            "# sample_time_s = 0.001   # no column counts time: the distance of samples";
-        match self.clock {
-            None => uncounted.to_owned(),
-            Some(_) if self.logs[self.groups[0].log].clock.is_some() => {
-                "# each topic has the time stamps of its messages".to_owned()
-            }
-            Some(Clock { name, unit }) => format!("column = {}\nunit = \"{unit}\"", quoted(name)),
-        }
     }
 
     fn lines(&self, group: &Group, order: Option<&str>, scales: Vec<String>) -> Vec<String> {
@@ -177,8 +176,7 @@ impl Source<'_> {
         lines
     }
 
-    /// Whether a group is what it is called: an acceleration has to be the derivative of its velocity, not what an IMU
-    /// feels.
+    /// Whether an acceleration is the derivative of its velocity, not what an IMU feels.
     fn is_sound(&self, group: &Group, scales: &Lines) -> bool {
         let mut accelerations = Quantity::ACCELERATIONS.into_iter();
         let Some((_, velocity)) = accelerations.find(|(own, _)| *own == group.quantity) else {
