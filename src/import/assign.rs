@@ -1,10 +1,10 @@
 //! The use of each tensor: as mapped, else by its name.
 
-use super::ImportError;
 use super::options::{ImportOptions, PhaseRule};
 use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};
 use super::run::Chosen;
 use super::tensors::{TensorFile, TensorInfo};
+use super::{ImportError, Read};
 use crate::files::Place;
 
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ pub(super) struct Assignment<'f> {
 pub(super) fn assign<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
-) -> Result<Assignment<'f>, ImportError> {
+) -> Read<Assignment<'f>> {
     let mut used = mapped(tensors, options)?;
     used.extend(named(tensors, options, &used)?);
     used.sort_by(|a, b| a.role.cmp(&b.role));
@@ -60,7 +60,7 @@ fn named<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
     mapped: &[Assigned<'_>],
-) -> Result<Vec<Assigned<'f>>, ImportError> {
+) -> Read<Vec<Assigned<'f>>> {
     let is_settled = |role: &Role| {
         mapped.iter().any(|assigned| match (&assigned.role, role) {
             (Role::Weights(a, _), Role::Weights(b, _)) => a == b,
@@ -114,7 +114,7 @@ fn in_phase(
     info: &TensorInfo,
     role: Role,
     known: &[String],
-) -> Result<Role, ImportError> {
+) -> Read<Role> {
     let is_known = |phase: &str| known.is_empty() || known.iter().any(|name| name == phase);
     if role.phase().is_none_or(is_known) {
         return Ok(role);
@@ -138,7 +138,7 @@ fn check_layers(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
     unused: &[&TensorInfo],
-) -> Result<(), ImportError> {
+) -> Read<()> {
     let is_mapped = |part: Part| {
         let mut mapped = options.mapping.iter();
         mapped.any(|mapping| matches!(mapping.role, Role::Weights(of, _) if of == part))
@@ -158,10 +158,7 @@ fn check_layers(
     Ok(())
 }
 
-fn mapped<'f>(
-    tensors: &'f TensorFile<'_>,
-    options: &ImportOptions,
-) -> Result<Vec<Assigned<'f>>, ImportError> {
+fn mapped<'f>(tensors: &'f TensorFile<'_>, options: &ImportOptions) -> Read<Vec<Assigned<'f>>> {
     let mut used: Vec<Assigned<'f>> = Vec::new();
     for mapping in &options.mapping {
         let (role, tensor) = (&mapping.role, &mapping.tensor);
@@ -185,7 +182,7 @@ fn phases(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
     used: &[Assigned<'_>],
-) -> Result<Vec<PhaseRule>, ImportError> {
+) -> Read<Vec<PhaseRule>> {
     let mut rules = options.phases.clone();
     // Sorted by name; the rule `any` takes every pattern with a foot down, so that the order of the two known phases is
     // free.

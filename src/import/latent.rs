@@ -13,7 +13,7 @@ use super::assemble::Parts;
 use super::equations::{Equation, Section, Sections};
 use super::options::{ImportOptions, PhaseRule};
 use super::run::{ImportReport, ReadEquation};
-use super::{ImportError, library};
+use super::{ImportError, Read, library};
 use crate::model::{LatentVariable, Library, Phase};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
 
@@ -24,7 +24,7 @@ pub(super) fn parts(
     file: &str,
     sections: &Sections,
     options: &ImportOptions,
-) -> Result<(Parts, ImportReport), ImportError> {
+) -> Read<(Parts, ImportReport)> {
     let latent_dim = sections.latent_dim;
     check_options(latent_dim, options)?;
     let ordered = phases_in_order(file, sections, options)?;
@@ -84,7 +84,7 @@ struct Row {
     factor: f64,
 }
 
-fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
+fn check_options(latent_dim: usize, options: &ImportOptions) -> Read<()> {
     if let Some(given) = options.latent_dim.filter(|given| *given != latent_dim) {
         let expected = format!("{latent_dim}, as the equations have");
         let found = given.to_string();
@@ -111,7 +111,7 @@ fn phases_in_order<'s>(
     file: &str,
     sections: &'s Sections,
     options: &ImportOptions,
-) -> Result<Vec<(PhaseRule, &'s Section)>, ImportError> {
+) -> Read<Vec<(PhaseRule, &'s Section)>> {
     let mut ordered = Vec::new();
     let by_order = options.phases.len() == sections.sections.len();
     for (place, section) in sections.sections.iter().enumerate() {
@@ -158,7 +158,7 @@ fn separate(
     equation: &Equation,
     pool: &mut ExprPool,
     known: &HashMap<ExprId, Row>,
-) -> Result<Coefficients, ImportError> {
+) -> Read<Coefficients> {
     let (place, output) = ((equation.line, 1), equation.output + 1);
     let expr = equation.parse(file, latent_dim, pool)?;
     let is_term = |expr| known.contains_key(&expr);
@@ -191,7 +191,7 @@ fn union(
     latent_dim: usize,
     pool: &ExprPool,
     separated: &[Vec<Coefficients>],
-) -> Result<(Library, HashMap<ExprId, Row>), ImportError> {
+) -> Read<(Library, HashMap<ExprId, Row>)> {
     let found = separated.iter().flatten().flat_map(Coefficients::keys);
     let mut found: Vec<ExprId> = found.copied().collect();
     found.sort_unstable();

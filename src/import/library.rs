@@ -7,10 +7,10 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::ImportError;
 use super::equations::plain_name;
 use super::options::standard_text;
 use super::run::{check_size, read_file};
+use super::{ImportError, Read};
 use crate::model::{Library, LibraryChoice, LibraryOrder, StandardLibrary};
 use crate::symbolic::Function;
 
@@ -24,11 +24,7 @@ pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
 }
 
 /// The library at a latent dimension; a standard one in romc's order.
-pub(super) fn build(
-    file: &str,
-    choice: &LibraryChoice,
-    latent_dim: usize,
-) -> Result<Library, ImportError> {
+pub(super) fn build(file: &str, choice: &LibraryChoice, latent_dim: usize) -> Read<Library> {
     let choice = match choice {
         LibraryChoice::Terms(terms) => LibraryChoice::Terms(
             readable(terms, latent_dim)
@@ -44,7 +40,7 @@ pub(super) fn order(
     standard: StandardLibrary,
     latent_dim: usize,
     stated: Option<LibraryOrder>,
-) -> Result<LibraryOrder, ImportError> {
+) -> Read<LibraryOrder> {
     let texts = |order: &LibraryOrder| standard.texts_in(*order, latent_dim);
     let orders: Result<Vec<Vec<String>>, _> = LibraryOrder::NAMED.iter().map(texts).collect();
     let orders = orders.map_err(|source| ImportError::unusable("", source))?;
@@ -88,13 +84,13 @@ pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String
 ///
 /// # Errors
 /// [`ImportError`] with line and column.
-pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
+pub fn read_terms(path: &Path) -> Read<Vec<String>> {
     let (file, bytes) = read_file(path, MAX_TERMS_BYTES)?;
     check_size(&file, &bytes, MAX_TERMS_BYTES)?;
     parse_terms(&file, &String::from_utf8_lossy(&bytes))
 }
 
-fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
+fn parse_terms(file: &str, text: &str) -> Read<Vec<String>> {
     let text = text.trim_start_matches('\u{feff}');
     let refused = |place: (usize, usize), found: &str, expected: &str| {
         ImportError::at(file, place, found, expected)

@@ -6,9 +6,9 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use nalgebra::DVector;
 
-use super::ImportError;
 use super::latex::SymbolNames;
 use super::role::{Mapping, ONLY_PHASE};
+use super::{ImportError, Read};
 use crate::files::Place;
 use crate::files::magic::{self, OtherFormat};
 use crate::model::{
@@ -32,7 +32,7 @@ pub enum Format {
 
 impl Format {
     /// The kind of a file by its ending.
-    pub(crate) fn of_path(path: &Path) -> Result<Self, ImportError> {
+    pub(crate) fn of_path(path: &Path) -> Read<Self> {
         let ending = (path.extension()).map(|ending| ending.to_string_lossy().to_lowercase());
         let found = match ending.as_deref() {
             Some("safetensors") => return Ok(Format::Safetensors),
@@ -58,11 +58,7 @@ impl Format {
     }
 
     /// The kind of a file that was read: as given, else by its bytes or its ending.
-    pub(super) fn of_file(
-        path: &Path,
-        bytes: &[u8],
-        given: Option<Self>,
-    ) -> Result<Self, ImportError> {
+    pub(super) fn of_file(path: &Path, bytes: &[u8], given: Option<Self>) -> Read<Self> {
         let content = magic::arrays_by_content(path, bytes);
         let is_known = content.is_some();
         match content.and_then(|found| refusal(path, found)) {
@@ -111,7 +107,7 @@ pub enum XiLayout {
 ///
 /// # Errors
 /// [`ImportError`] of the option.
-pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
+pub fn parse_standard(text: &str) -> Read<StandardLibrary> {
     let refused = |part: &str| {
         let expected = "degree=N, then trigonometric and inputs if the library has them, separated \
                         by commas; or a file with the list of terms";
@@ -157,7 +153,7 @@ pub struct PhaseRule {
 impl FromStr for PhaseRule {
     type Err = ImportError;
 
-    fn from_str(text: &str) -> Result<Self, ImportError> {
+    fn from_str(text: &str) -> Read<Self> {
         let refused = || {
             let expected = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr \
                             rl, such as rear=0011,0001";
@@ -274,12 +270,7 @@ impl ImportOptions {
 
     /// The rule of a phase: as given, or for `contact` and `flight` as usual. `found` is what of the file belongs to
     /// it.
-    pub(super) fn feet_of(
-        &self,
-        file: &str,
-        phase: &str,
-        found: &str,
-    ) -> Result<FeetRule, ImportError> {
+    pub(super) fn feet_of(&self, file: &str, phase: &str, found: &str) -> Read<FeetRule> {
         match (self.given(phase), phase) {
             (Some(place), _) => Ok(self.phases[place].feet.clone()),
             (None, "contact") => Ok(FeetRule::Any),

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::ImportError;
+use super::{ImportError, Read};
 
 /// One of the two maps between robot and latent coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -105,7 +105,7 @@ impl FromStr for Role {
     type Err = ImportError;
 
     /// Reads the name of a part; underscores may stand for its dots.
-    fn from_str(text: &str) -> Result<Self, ImportError> {
+    fn from_str(text: &str) -> Read<Self> {
         read_role(text)
             .ok_or_else(|| ImportError::option("--map", format!("the part {text:?}"), EXPECTED))
     }
@@ -234,7 +234,7 @@ pub struct Mapping {
 impl FromStr for Mapping {
     type Err = ImportError;
 
-    fn from_str(text: &str) -> Result<Self, ImportError> {
+    fn from_str(text: &str) -> Read<Self> {
         match text.split_once('=') {
             Some((role, tensor)) if !tensor.is_empty() => Ok(Mapping {
                 role: role.trim().parse()?,

@@ -4,7 +4,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::Read;
+use std::io::Read as _;
 use std::path::Path;
 
 use serde::Serialize;
@@ -16,7 +16,7 @@ use super::equations::{self, Sections};
 use super::latex::{self, SymbolNames};
 use super::options::{Format, ImportOptions, refusal};
 use super::tensors::{self, Tensor};
-use super::{ImportError, latent};
+use super::{ImportError, Read, latent};
 use crate::files::{Place, hex, magic};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
@@ -36,7 +36,7 @@ pub struct Imported {
 ///
 /// # Errors
 /// [`ImportError`] with the place, what was found and what was expected.
-pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
+pub fn import(path: &Path, options: &ImportOptions) -> Read<Imported> {
     let (file, bytes) = read_file(path, MAX_FILE_BYTES).map_err(|fault| {
         let foreign = magic::arrays_by_neighbours(path);
         (foreign.and_then(|found| refusal(path, found))).unwrap_or(fault)
@@ -47,7 +47,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
 
 /// The name of a file and its bytes, at most one more than allowed, which tells a file that is too large from one that
 /// just fits.
-pub(super) fn read_file(path: &Path, max: u64) -> Result<(String, Vec<u8>), ImportError> {
+pub(super) fn read_file(path: &Path, max: u64) -> Read<(String, Vec<u8>)> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
     match File::open(path).and_then(|open| open.take(max + 1).read_to_end(&mut bytes)) {
@@ -65,7 +65,7 @@ pub fn import_from_bytes(
     format: Format,
     bytes: &[u8],
     options: &ImportOptions,
-) -> Result<Imported, ImportError> {
+) -> Read<Imported> {
     let (parts, mut report) = match format {
         Format::Safetensors => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
@@ -95,13 +95,13 @@ pub fn import_tensors(
     source: &str,
     arrays: &[Tensor<'_>],
     options: &ImportOptions,
-) -> Result<Imported, ImportError> {
+) -> Read<Imported> {
     let (parts, mut report) = assemble::parts(&tensors::open_arrays(source, arrays)?, options)?;
     (report.file, report.format) = (source.to_owned(), "arrays");
     finish(parts, report, &tensors::digest(arrays), options)
 }
 
-pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {
+pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Read<()> {
     match bytes.len() as u64 > max {
         true => Err(too_large(file, Place::Whole, max, "bytes")),
         false => Ok(()),
@@ -125,7 +125,7 @@ fn sections(
     bytes: &[u8],
     symbols: &SymbolNames,
     known: &[String],
-) -> Result<Sections, ImportError> {
+) -> Read<Sections> {
     check_size(file, bytes, equations::MAX_TEXT_BYTES)?;
     if format != Format::Latex {
         return equations::read(file, bytes);
@@ -150,7 +150,7 @@ pub fn read_equations(
     bytes: &[u8],
     symbols: &SymbolNames,
     known: &[String],
-) -> Result<Sections, ImportError> {
+) -> Read<Sections> {
     let read = sections(file, format, bytes, symbols, known)?;
     for equation in read.sections.iter().flat_map(|section| &section.equations) {
         // Each in a pool of its own: only faults are wanted.
@@ -164,7 +164,7 @@ fn finish(
     mut report: ImportReport,
     digest: &[u8],
     options: &ImportOptions,
-) -> Result<Imported, ImportError> {
+) -> Read<Imported> {
     report.state_dim = parts.state_dim();
     let model = build(&report.file, parts, provenance(&report, digest), options)?;
     report.latent_dim = model.latent_dim();
@@ -200,7 +200,7 @@ fn build(
     parts: Parts,
     provenance: Map<String, Value>,
     options: &ImportOptions,
-) -> Result<ReducedModel, ImportError> {
+) -> Read<ReducedModel> {
     let (encoder, decoder) = (parts.encoder, parts.decoder);
     let map = (encoder.as_ref().map(|_| "an encoder")).or(decoder.as_ref().map(|_| "a decoder"));
     if let (Some(map), None) = (map, &parts.scaling) {

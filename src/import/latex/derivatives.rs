@@ -1,6 +1,7 @@
 //! Derivatives with respect to time, however they are written, as dots.
 
-use super::reader::{FONTS, INVISIBLE, has};
+use super::reader::{FONTS, INVISIBLE};
+use super::token::has;
 use super::token::{Kind, Token, group_length};
 use super::variables::is_greek;
 

@@ -5,9 +5,11 @@
 //! Braces, fonts and the ends of macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single
 //! digit as an argument (`x^12`, `\frac12`), the reader ends behind it, and so does the number.
 
+use super::super::Read;
 use super::definitions::changes_digits;
 use super::expression::WORDS;
-use super::reader::{Digits, FONTS, INVISIBLE_WITH_ARGUMENT, Last, Read, Reader, has};
+use super::reader::{Digits, FONTS, INVISIBLE_WITH_ARGUMENT, Last, Reader};
+use super::token::has;
 use super::token::{Kind, Token};
 use super::variables::function;
 

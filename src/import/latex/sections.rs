@@ -2,14 +2,15 @@
 //!
 //! The displays of a document as they are printed.
 
-use super::super::ImportError;
 use super::super::equations::{Section, Sections, complete, text_of};
+use super::super::{ImportError, Read};
 use super::derivatives::with_dots;
 use super::expander::Expander;
 use super::expression::LeftSide;
 use super::markdown;
 use super::numbers::without_operator_braces;
-use super::reader::{Digits, Reader, has};
+use super::reader::{Digits, Reader};
+use super::token::has;
 use super::token::{Kind, Token, group_length};
 use super::variables::SymbolNames;
 
@@ -25,7 +26,7 @@ pub(in crate::import) fn read(
     bytes: &[u8],
     names: &SymbolNames,
     known: &[String],
-) -> Result<Sections, ImportError> {
+) -> Read<Sections> {
     let text = text_of(file, bytes)?;
     let is_markdown = file.ends_with(".md") || file.ends_with(".markdown");
     let items = match is_markdown {
@@ -95,7 +96,7 @@ fn left_sides(
 }
 
 /// Refuses equations in the lines of the text for coordinates that no display has: they would be dropped.
-fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(), ImportError> {
+fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Read<()> {
     let equations = document.sections.iter().flat_map(|s| &s.equations);
     let known: Vec<usize> = equations.map(|equation| equation.output).collect();
     let is_other = |side: &LeftSide| side.output.is_some_and(|output| !known.contains(&output));
@@ -116,7 +117,7 @@ fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(),
 
 /// The tokens without `\begin` and `\end` of environments that arrange lines, and without the brace that `\left\{` puts
 /// before them.
-fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
+fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
     let mut flat: Vec<Token> = Vec::with_capacity(tokens.len());
     let mut open: Vec<(&Token, &str)> = Vec::new();
     let refused = |token: &Token, why: &str, expected: &str| {
@@ -227,7 +228,7 @@ impl Document<'_> {
         }
     }
 
-    fn display(&mut self, tokens: &[Token], alone: bool) -> Result<(), ImportError> {
+    fn display(&mut self, tokens: &[Token], alone: bool) -> Read<()> {
         let Some(dotted) = tokens.iter().find(|token| token.is_command("ddot")) else {
             return Ok(());
         };
@@ -313,7 +314,7 @@ impl Document<'_> {
         output: usize,
         place: (usize, usize),
         label: Option<String>,
-    ) -> Result<&mut Section, ImportError> {
+    ) -> Read<&mut Section> {
         let starts_phase = std::mem::take(&mut self.starts_phase);
         let named = self.phase.clone().filter(|_| starts_phase);
         let has_phase = self.phase.is_some();
@@ -375,7 +376,7 @@ pub(super) fn is_one_of(list: &str, name: &str) -> bool {
 }
 
 /// Finds the displays of the tokens, and of the text behind them.
-pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Result<Vec<Item>, ImportError> {
+pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Read<Vec<Item>> {
     let mut expander = Expander::new(file, tokens, text);
     let mut items = Vec::new();
     while let Some(token) = expander.next()? {
@@ -384,7 +385,7 @@ pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Result<Vec<It
             (Kind::Begin(name), _) if name == "document" => begin_document(file, &mut items)?,
             (Kind::Begin(name), _) if is_one_of(LAYOUTS, name) || is_one_of(CASES, name) => {
                 if is_one_of(WITH_COLUMNS, name) {
-                    expander.skip_group();
+                    let _ = expander.is_brace_next() && expander.argument().is_some();
                 }
                 items.push(display(&mut expander, &token)?);
             }
@@ -398,7 +399,7 @@ pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Result<Vec<It
 }
 
 /// Only comments count of what stands before `\begin{document}`; equations there are refused.
-fn begin_document(file: &str, items: &mut Vec<Item>) -> Result<(), ImportError> {
+fn begin_document(file: &str, items: &mut Vec<Item>) -> Read<()> {
     for item in &*items {
         let (Item::Display(tokens) | Item::Inline(tokens)) = item else {
             continue;
@@ -414,19 +415,19 @@ fn begin_document(file: &str, items: &mut Vec<Item>) -> Result<(), ImportError> 
 }
 
 /// The tokens of the formula that `start` opened, up to its end, which is passed.
-fn display(expander: &mut Expander, start: &Token) -> Result<Item, ImportError> {
-    let Some(tokens) = formula(expander, |_| false)? else {
+fn display(expander: &mut Expander, start: &Token) -> Read<Item> {
+    let Some(tokens) = expander.formula(|_| false)? else {
         return expander.refuse(start, " without its end", "the end of the display");
     };
     match unread(&tokens) {
         Some((token, expected)) => expander.refuse(token, "", expected),
-        None => Ok(Item::Display(tokens)),
+        None => Ok(Item::Display(plain(tokens))),
     }
 }
 
-fn inline(expander: &mut Expander) -> Result<Option<Item>, ImportError> {
-    let tokens = formula(expander, |token| token.kind == Kind::Paragraph)?;
-    Ok(tokens.map(Item::Inline))
+fn inline(expander: &mut Expander) -> Read<Option<Item>> {
+    let tokens = expander.formula(|token| token.kind == Kind::Paragraph)?;
+    Ok(tokens.map(|tokens| Item::Inline(plain(tokens))))
 }
 
 /// The first token of what is not followed, and what could be there.
@@ -437,20 +438,6 @@ pub(super) fn unread(tokens: &[Token]) -> Option<(&Token, &'static str)> {
     })
 }
 
-fn formula(
-    expander: &mut Expander,
-    ends: fn(&Token) -> bool,
-) -> Result<Option<Vec<Token>>, ImportError> {
-    let around = expander.scopes.formula_around();
-    expander.scopes.formula = Some(around);
-    let mut tokens = Vec::new();
-    while let Some(token) = expander.next()? {
-        if expander.scopes.depth() <= around || ends(&token) {
-            expander.scopes.leave_to(around);
-            expander.scopes.formula = None;
-            return Ok(Some(with_dots(&without_operator_braces(tokens))));
-        }
-        tokens.push(token);
-    }
-    Ok(None)
+fn plain(tokens: Vec<Token>) -> Vec<Token> {
+    with_dots(&without_operator_braces(tokens))
 }

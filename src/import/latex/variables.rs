@@ -4,9 +4,10 @@
 
 use std::collections::BTreeMap;
 
-use super::super::ImportError;
-use super::reader::{BARE, FONTS, INVISIBLE, Last, Read, Reader, has};
+use super::super::{ImportError, Read};
+use super::reader::{BARE, FONTS, INVISIBLE, Last, Reader};
 use super::token::Kind;
+use super::token::has;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 
 pub(super) struct Symbol {
