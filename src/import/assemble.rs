@@ -193,8 +193,7 @@ impl<'a> Assembly<'a, '_> {
         Ok((library, phases))
     }
 
-    /// Brings the rows of coefficients over a standard library from the file's order into romc's; returns the terms in
-    /// the file's order.
+    /// Brings rows over a standard library from the file's order into romc's; returns the terms in the file's order.
     fn sort_terms(&mut self, library: &Library, phases: &mut [Phase]) -> Read<Vec<String>> {
         let LibraryChoice::Standard(standard) = library.choice() else {
             let terms = library.terms().iter().map(|term| term.text().to_owned());
@@ -217,7 +216,14 @@ impl<'a> Assembly<'a, '_> {
 
     /// Refuses options that are of use with an encoder or decoder alone.
     fn check_options_of_maps(&self) -> Read<()> {
-        let Some(option) = self.options.of_maps() else {
+        const OF_MAPS: [&str; 5] = [
+            "--robot",
+            "--scaling",
+            "--input-scaling",
+            "--order",
+            "--weights",
+        ];
+        let Some(option) = self.options.first_of(&OF_MAPS) else {
             return Ok(());
         };
         let unused = self.assignment.unused.iter().take(24);

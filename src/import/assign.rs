@@ -54,8 +54,7 @@ pub(super) fn assign<'f>(
     })
 }
 
-/// The tensors with names of parts that `--map` does not settle: it settles all weights of a map at once. Factors
-/// beside `--scaling` are not settled: they are refused.
+/// The tensors with names of parts that `--map` does not settle: it settles all weights of a map at once.
 fn named<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
@@ -132,8 +131,7 @@ fn in_phase(
     }
 }
 
-/// Refuses a tensor in the module of an encoder or decoder that is no weight or bias of a linear layer, unless `--map`
-/// names the weights: without it the map would be another one.
+/// Refuses a tensor of an encoder or decoder that is no layer's weight or bias, unless `--map` names the weights.
 fn check_layers(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,

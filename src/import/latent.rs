@@ -1,7 +1,5 @@
 //! From equations as text to library and coefficients.
 //!
-//! Separates equations into candidate terms and their coefficients.
-//!
 //! A coefficient is the number in front of a term, bit for bit as it is written; sums inside a product with a number
 //! are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums stay one term (`z1*(1 + dz1)`).
 
@@ -17,9 +15,7 @@ use super::{ImportError, Read, library};
 use crate::model::{LatentVariable, Library, Phase};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
 
-/// Makes the parts of a model out of equations, with the decisions about each.
-///
-/// Without a library in the options, the library is the union of the terms found.
+/// Makes the parts of a model; without a library in the options, it is the union of the terms found.
 pub(super) fn parts(
     file: &str,
     sections: &Sections,
@@ -90,20 +86,20 @@ fn check_options(latent_dim: usize, options: &ImportOptions) -> Read<()> {
         let found = given.to_string();
         return Err(ImportError::option("--latent-dim", found, expected));
     }
-    let given = [
-        ("--map", !options.mapping.is_empty()),
-        ("--weights", options.weights.is_some()),
-        ("--xi-layout", options.xi_layout.is_some()),
-        ("--library-order", options.library_order.is_some()),
-        ("--activation", options.activation.is_some()),
-        ("--input-scaling", options.input_scaling.is_some()),
-        ("--order", options.order.is_some()),
+    const OF_TENSORS: [&str; 7] = [
+        "--map",
+        "--weights",
+        "--xi-layout",
+        "--library-order",
+        "--activation",
+        "--input-scaling",
+        "--order",
     ];
-    let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) else {
-        return Ok(());
-    };
     let (found, expected) = ("a file of equations", "a file of tensors");
-    Err(ImportError::option(option, found, expected))
+    match options.first_of(&OF_TENSORS) {
+        Some(option) => Err(ImportError::option(option, found, expected)),
+        None => Ok(()),
+    }
 }
 
 /// The sections with their phases, in the order of `--phase` or of the file.
@@ -211,9 +207,7 @@ fn union(
 
 pub(super) type Coefficients = HashMap<ExprId, Number>;
 
-/// Coefficients of `expr` as a sum over terms; `None` if one overflows.
-///
-/// A sum which `is_term` names is taken whole.
+/// Coefficients of `expr` as a sum over terms; `None` if one overflows. A sum that is a term is taken whole.
 pub(super) fn coefficients(
     pool: &ExprPool,
     expr: ExprId,
@@ -248,8 +242,7 @@ fn multiply(a: Number, b: Number) -> Option<Number> {
     }
 }
 
-/// Sorts terms as the standard library does: constant, z, dz, monomials by degree, sin z, sin dz, cos z, cos dz,
-/// anything else, u.
+/// Sorts terms as the standard library does; others stand before the inputs.
 pub(super) fn sort(pool: &ExprPool, latent_dim: usize, terms: &mut [ExprId]) {
     let key = |expr: &ExprId| Key::of(pool, latent_dim, *expr);
     terms.sort_by(|a, b| key(a).cmp(&key(b)).then_with(|| pool.compare(*a, *b)));

@@ -1,6 +1,4 @@
-//! The candidate terms of imported coefficients.
-//!
-//! Candidate terms as PySINDy and its relatives name them: `z1 z2`, `sin(1 z1)`, `x0 u0`, `z1**2`.
+//! The candidate terms of imported coefficients, as PySINDy and its relatives name them: `z1 z2`, `x0 u0`, `z1**2`.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -79,8 +77,7 @@ pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String
     fitting.map(standard_text).collect()
 }
 
-/// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or one term per line
-/// (`#` starts a comment).
+/// Reads a list of terms: a JSON list, alone or under `library`, or one term per line (`#` starts a comment).
 ///
 /// # Errors
 /// [`ImportError`] with line and column.
@@ -130,11 +127,8 @@ fn kind_of(value: &Value) -> &'static str {
     }
 }
 
-/// A list of terms in romc's grammar; terms that are in it already stay as they are.
-///
-/// Operands with a space between them are multiplied. Where a list has names `x0`, `x1`, ..., as PySINDy has, these are
-/// the latent coordinates and then their velocities, and `u0` is `u1`; where they end in `x{2d}`, they and `u1` are
-/// counted from one. Else what was found and expected.
+/// A list of terms in romc's grammar, with operands next to each other multiplied. Names `x0`, `x1`, ... are the latent
+/// coordinates and then their velocities; where they end in `x{2d}`, they and `u1` count from one.
 pub(super) fn readable(
     terms: &[String],
     latent_dim: usize,

@@ -222,16 +222,14 @@ pub struct ImportOptions {
     pub robot: Option<&'static Robot>,
     /// Axes of the force and moment in the inputs that the model was trained with; needs the robot.
     pub wrench_frame: WrenchFrame,
-    /// What the joints take of the motors' torques in the inputs that the model was trained with, `None` for the
-    /// motors' torques as they are; needs the robot.
+    /// Friction and inertia of the joints, if training subtracted them from the torques; needs the robot.
     pub actuators: Option<Actuators>,
     /// Sampling period of the training recordings, s.
     pub sample_time_s: Option<f64>,
 }
 
 impl ImportOptions {
-    /// Options with the scale factors of states and of inputs, each none, one, or one per coordinate; inputs have those
-    /// of the states where tensors bring neither.
+    /// Options with scale factors of states and inputs: none, one, or one per coordinate; inputs default to states.
     pub fn of_factors(state: &[f64], input: &[f64]) -> Self {
         let factors = |given: &[f64]| match given {
             [factor] => ScaleFactors::Uniform(*factor),
@@ -252,24 +250,27 @@ impl ImportOptions {
         }
     }
 
-    pub(super) fn of_maps(&self) -> Option<&'static str> {
-        let given = [
-            ("--robot", self.robot.is_some()),
-            ("--scaling", self.scaling.is_some()),
-            ("--input-scaling", self.input_scaling.is_some()),
-            ("--order", self.order.is_some()),
-            ("--weights", self.weights.is_some()),
-        ];
-        let mut given = given.into_iter().filter(|(_, is_given)| *is_given);
-        given.next().map(|(option, _)| option)
+    /// The first of some options that is given.
+    pub(super) fn first_of(&self, options: &[&'static str]) -> Option<&'static str> {
+        let is_given = |option: &&&str| match **option {
+            "--map" => !self.mapping.is_empty(),
+            "--weights" => self.weights.is_some(),
+            "--xi-layout" => self.xi_layout.is_some(),
+            "--library-order" => self.library_order.is_some(),
+            "--activation" => self.activation.is_some(),
+            "--scaling" => self.scaling.is_some(),
+            "--input-scaling" => self.input_scaling.is_some(),
+            "--order" => self.order.is_some(),
+            _ => self.robot.is_some(),
+        };
+        options.iter().find(is_given).copied()
     }
 
     pub(super) fn given(&self, phase: &str) -> Option<usize> {
         self.phases.iter().position(|rule| rule.name == phase)
     }
 
-    /// The rule of a phase: as given, or for `contact` and `flight` as usual. `found` is what of the file belongs to
-    /// it.
+    /// The rule of a phase: as given, or the usual one; `found` of the file belongs to it.
     pub(super) fn feet_of(&self, file: &str, phase: &str, found: &str) -> Read<FeetRule> {
         match (self.given(phase), phase) {
             (Some(place), _) => Ok(self.phases[place].feet.clone()),

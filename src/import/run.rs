@@ -1,6 +1,4 @@
-//! The way from a foreign file to a checked model.
-//!
-//! The decisions of an import: the use of each tensor, how it was stored, tensors left unused.
+//! The way from a foreign file to a checked model, and the record of what was decided on it.
 
 use std::fmt;
 use std::fs::File;
@@ -45,8 +43,7 @@ pub fn import(path: &Path, options: &ImportOptions) -> Read<Imported> {
     import_from_bytes(&file, format, &bytes, options)
 }
 
-/// The name of a file and its bytes, at most one more than allowed, which tells a file that is too large from one that
-/// just fits.
+/// The name of a file and its bytes, at most one more than allowed.
 pub(super) fn read_file(path: &Path, max: u64) -> Read<(String, Vec<u8>)> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
@@ -139,8 +136,7 @@ fn sections(
     Err(ImportError::option("--symbols", found, expected))
 }
 
-/// Reads the equations of a file in memory. `symbols` are LaTeX's names of variables, `known` names of phases that its
-/// labels may end in.
+/// Reads the equations of a file in memory; LaTeX has names of variables, and labels that end in `known` phases.
 ///
 /// # Errors
 /// [`ImportError`] with the place of what cannot be read.

@@ -1,11 +1,8 @@
 //! Named arrays of numbers: in a foreign file, whatever its container, or in memory.
 //!
-//! NumPy's `.npz`: a zip file of `.npy` arrays.
-//!
-//! Only headers are read until an array is asked for, and then no more bytes are unpacked than its header announces: a
-//! small file cannot fill the memory. An array is `\x93NUMPY`, two bytes of the version (1 to 3), the length of the
-//! rest (2 or 4 bytes, little endian), and a Python dictionary: `{'descr': '<f8', 'fortran_order': False, 'shape': (18,
-//! 4), }`.
+//! Headers are read first, and later no more bytes than they announce: a small file cannot fill the memory. In an npz,
+//! a zip file, an array is `\x93NUMPY`, two bytes of the version (1 to 3), the length of the rest (2 or 4 bytes, little
+//! endian), and a Python dictionary: `{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }`.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -145,8 +142,7 @@ impl<'b> TensorFile<'b> {
         self.refused(Place::Whole, found, expected)
     }
 
-    /// The numbers of a tensor for one use, which `place` names in errors; all are finite, and as many as the matrix
-    /// has.
+    /// The numbers of a tensor, all finite, as many as the matrix has; `place` names its use in errors.
     pub(super) fn read(
         &self,
         info: &TensorInfo,

@@ -1,6 +1,4 @@
-//! Equations for READMEs and lab notebooks: a [`ReducedModel`](crate::model::ReducedModel) enters, `NAME.md` leaves,
-//! with its mathematics as GitHub and GitLab draw it. The formulas are those of the [`latex`](crate::typeset::latex)
-//! backend.
+//! Equations for READMEs and lab notebooks, with formulas as GitHub and GitLab draw them.
 
 use askama::Template;
 
@@ -11,8 +9,7 @@ use crate::typeset::page::{Page, rendered};
 use crate::typeset::words::{Spelling, code_point, ends_line};
 use crate::typeset::{Math, NumberStyle, PrintOptions, TypesetError};
 
-/// The file `NAME.md`: each phase's equations in `math` fences, and the table of coefficients, as GitHub and GitLab
-/// show them.
+/// The file `NAME.md`: equations in `math` fences and the table of coefficients.
 ///
 /// # Errors
 /// [`TypesetError::Template`].
@@ -47,8 +44,7 @@ fn after_comma(unit: &Option<Unit>) -> String {
     unit.map_or(String::new(), |unit| format!(", $`{}`$", tex_unit(unit)))
 }
 
-/// Text from outside that Markdown shows as it is: punctuation is escaped, and control characters become spaces, so
-/// that a text cannot start a new line.
+/// Text from outside that Markdown shows as it is, in one line.
 ///
 /// ```
 /// use romc::typeset::markdown::markdown_text;

@@ -53,8 +53,7 @@ pub fn counted(count: usize, noun: &str) -> String {
     }
 }
 
-/// A front or rear pair of feet: the words for how many of it are on the ground, none where it does not matter, and
-/// whether they hold of no foot, of one, of both.
+/// Words for how many feet of a front or rear pair are down, and whether they hold of none, one, both.
 const PAIRS: [(&str, [bool; 3]); 5] = [
     ("", [true, true, true]),
     ("no {} foot", [true, false, false]),

@@ -1,7 +1,4 @@
-//! Encoder and decoder from the tensors of their layers; a linear map is a single layer.
-//!
-//! Units and order of the robot's coordinates: scale factors, means that training took off, and the order in which the
-//! file has them.
+//! Encoder and decoder from the tensors of their layers, with scale factors, means and the order of coordinates.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -145,8 +142,7 @@ impl<'a> Assembly<'a, '_> {
         Ok(Some(map))
     }
 
-    /// How the weights are stored: the way in which each layer takes what the one before gives, and `d <= n`
-    /// coordinates leave an encoder. Every shape but a square decides.
+    /// How the weights are stored: so that layers fit each other and `d <= n` coordinates leave an encoder.
     fn orientation(&mut self, part: Part, layers: &[Tensors<'_>]) -> Read<Layout> {
         let first = layers[0].0;
         let shapes = layers.iter().map(|(assigned, _)| shape_of(part, assigned));
@@ -318,8 +314,7 @@ impl<'a> Assembly<'a, '_> {
         })
     }
 
-    /// Takes the mean that the training subtracted into the biases: of `E(s (x - m))` and `D(z) / s + m` to `E'(s x)`
-    /// and `D'(z) / s`.
+    /// Takes the subtracted mean into the biases: of `E(s (x - m))` and `D(z) / s + m` to `E'(s x)` and `D'(z) / s`.
     pub(super) fn fold_mean(&mut self, parts: &mut Parts) -> Read<()> {
         let Some(assigned) = self.find(&Role::StateMean) else {
             return Ok(());

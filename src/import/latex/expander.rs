@@ -316,11 +316,8 @@ impl Expander<'_> {
         }
     }
 
-    /// Opens and closes what a printed token opens and closes.
-    ///
-    /// # Errors
-    /// For what closes something else than what is open. Inside a formula that is left to its reader, but for
-    /// `\begingroup`, which it does not see.
+    /// Opens and closes what a printed token opens and closes. What closes something else is refused, in a formula only
+    /// with `\begingroup`, which its reader does not see.
     pub(super) fn pass(&mut self, token: &Token) -> Read<()> {
         let innermost = self.open.last();
         let is_open = innermost.is_some_and(|scope| scope.opener.kind == token.kind);

@@ -117,8 +117,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads terms with their signs up to something that ends a sum; where it `leads`, integers that begin a term are
-    /// coefficients.
+    /// Reads terms with their signs; where it `leads`, integers that begin a term are coefficients.
     pub(super) fn sum(&mut self, leads: bool) -> Read<()> {
         let mut is_first = true;
         loop {

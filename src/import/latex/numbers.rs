@@ -1,7 +1,5 @@
 //! Numbers (literals, powers of ten, `\num`) and roots (`\sqrt{z_1}`, `\sqrt[3]{z_1}`).
 //!
-//! Numbers, of the digits that print next to each other.
-//!
 //! Braces, fonts and the ends of macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single
 //! digit as an argument (`x^12`, `\frac12`), the reader ends behind it, and so does the number.
 
@@ -17,8 +15,7 @@ use super::variables::function;
 const MAX_ODD_RADICAND: usize = 1000;
 
 impl Reader<'_> {
-    /// The literal of a number: a power of ten behind it goes into it, and an integer that the document has rounded
-    /// gets a point or an exponent, so that it counts as rounded.
+    /// The literal of a number with its power of ten; a rounded integer gets a point or an exponent.
     pub(super) fn literal(&mut self, text: &str, leads: bool) -> String {
         if let Some(exponent) = self.power_of_ten()
             && !text.contains(['e', 'E'])
@@ -130,8 +127,7 @@ impl Reader<'_> {
         Ok(Last::Number)
     }
 
-    /// A root at its command. Even ones have no value below zero, as powers do not; odd ones are
-    /// `abs(x)^(1/3)*sign(x)`.
+    /// A root at its command. Even ones have no value below zero; odd ones are `abs(x)^(1/3)*sign(x)`.
     pub(super) fn root(&mut self, place: (usize, usize)) -> Read<Last> {
         self.at += 1;
         let index = self.index()?;

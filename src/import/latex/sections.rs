@@ -1,6 +1,4 @@
 //! From a document's displays to sections of equations: one per phase.
-//!
-//! The displays of a document as they are printed.
 
 use super::super::equations::{Section, Sections, complete, text_of};
 use super::super::{ImportError, Read};
@@ -17,10 +15,8 @@ use super::variables::SymbolNames;
 /// Environments that arrange lines only if whole equations are in them.
 const DISTINCTIONS: &str = "cases dcases array";
 
-/// Reads the equations of a document.
-///
-/// `known` are names of phases, which labels may end in; the phase of a comment `Phase NAME` (a heading in Markdown)
-/// goes before that of a label.
+/// Reads the equations of a document. Labels may end in `known` names of phases; comments `Phase NAME` and headings go
+/// before them.
 pub(in crate::import) fn read(
     file: &str,
     bytes: &[u8],
@@ -115,8 +111,7 @@ fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Read<()> {
     }
 }
 
-/// The tokens without `\begin` and `\end` of environments that arrange lines, and without the brace that `\left\{` puts
-/// before them.
+/// The tokens without environments that arrange lines and the brace that `\left\{` puts before them.
 fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
     let mut flat: Vec<Token> = Vec::with_capacity(tokens.len());
     let mut open: Vec<(&Token, &str)> = Vec::new();
@@ -176,14 +171,12 @@ fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
     }
 }
 
-/// Whether an environment only arranges lines. `subequations` is none of [`LAYOUTS`], which begin displays: it holds
-/// displays, and text between them.
+/// Whether an environment only arranges lines; `subequations` holds displays and text between them.
 fn is_layout(name: &str) -> bool {
     is_one_of(LAYOUTS, name) || is_one_of("subequations", name)
 }
 
-/// Whether the environment of this name whose contents begin here has equations in it: it is then no matrix, and on no
-/// right side, where it would tell cases apart.
+/// Whether the environment whose contents begin here holds equations: it is then no matrix and no right side.
 fn has_left_side(contents: &[Token], name: &str) -> bool {
     let end = Kind::End(name.to_owned());
     let mut inside = contents.iter().take_while(|token| token.kind != end);
@@ -307,8 +300,7 @@ impl Document<'_> {
             .filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
     }
 
-    /// The section that an equation belongs to: the open one, or a new one where a comment or label names another
-    /// phase, or where the left side is there already.
+    /// The open section, or a new one for another phase or a left side that is there already.
     fn section(
         &mut self,
         output: usize,

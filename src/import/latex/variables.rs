@@ -1,6 +1,4 @@
-//! Functions with their arguments, and variables with dots and subscripts.
-//!
-//! How a document writes the model's variables.
+//! Functions with their arguments, variables with dots and subscripts, and how a document names them.
 
 use std::collections::BTreeMap;
 
@@ -346,10 +344,8 @@ pub struct NameError {
     pub entry: String,
 }
 
-/// Names that a document gives to latent coordinates and inputs; `z_1` and `u_1` unless renamed.
-///
-/// A name is written as in `romc compile --rename`: a letter, word or Greek letter's name, with an optional subscript
-/// (`x`, `theta`, `F_lin,x`). Velocities follow their coordinate.
+/// Names that a document gives to latent coordinates and inputs, as in `romc compile --rename` (`x`, `theta`,
+/// `F_lin,x`); `z_1` and `u_1` unless renamed. Velocities follow their coordinate.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SymbolNames {
     names: BTreeMap<String, LatentVariable>,
@@ -359,8 +355,7 @@ impl SymbolNames {
     /// Reads entries `VARIABLE=NAME`.
     ///
     /// # Errors
-    /// [`NameError`] for an entry without `=`, with a left side other than `z1` to `z64` or `u1` and so on, or with a
-    /// variable or name that was given before.
+    /// [`NameError`] for an entry of another form or variable, or one that was given before.
     pub fn parse<S: AsRef<str>>(entries: &[S]) -> Result<Self, NameError> {
         let mut names = BTreeMap::new();
         for entry in entries.iter().map(AsRef::as_ref) {
@@ -385,9 +380,7 @@ impl SymbolNames {
         Ok(Self { names })
     }
 
-    /// The variable of a name as `Symbol` spells it: `z_1`, `F_lin,x`.
-    ///
-    /// `alone` allows `z` and `u` without a subscript, for the first of each.
+    /// The variable of a name such as `z_1` or `F_lin,x`; `alone` allows `z` and `u` for the first of each.
     pub(super) fn variable(&self, name: &str, alone: bool) -> Option<LatentVariable> {
         if let Some(variable) = self.names.get(name) {
             return Some(*variable);

@@ -1,6 +1,4 @@
 //! The files of the LaTeX backend.
-//!
-//! What each symbol of the equations means.
 
 use std::fmt;
 
@@ -22,17 +20,10 @@ use crate::typeset::{
 
 /// The LaTeX files of a model; NAME is its identifier:
 ///
-/// - `NAME.tex`: the equations of each phase, to be taken in by `\input`;
-/// - `NAME_PHASE.tex`: the same equations, one phase a file, to be placed one by one;
-/// - `NAME-table.tex`: the coefficients as booktabs tables;
-/// - `NAME-nomenclature.tex`: what the symbols mean;
-/// - `NAME-robot.tex`, if the model has encoder and decoder: what the latent coordinates
-///   are made of, and the accelerations of the robot, in SI units;
-/// - `NAME-preview.tex`: a document that shows them all, in two columns where the width asked for is
-///   at most `TWO_COLUMNS_EM`.
-///
-/// The first lines of `NAME.tex` say how coefficients were rounded, the largest error that this made, and which terms
-/// vanished by it. Files with labels list them.
+/// - `NAME.tex`: the equations of each phase, below how rounding changed them; `NAME_PHASE.tex`: those of one phase;
+/// - `NAME-table.tex`: the coefficients as booktabs tables; `NAME-nomenclature.tex`: what the symbols mean;
+/// - `NAME-robot.tex`, with encoder and decoder: the latent coordinates and robot accelerations in SI units;
+/// - `NAME-preview.tex`: a document that shows them all, in two columns for narrow equations.
 ///
 /// # Errors
 /// [`TypesetError`] if a coefficient is too large for a float in robot coordinates.
@@ -288,23 +279,36 @@ const STRONGEST: usize = 3;
 const NEGLIGIBLE: f64 = 0.1;
 
 /// The list of symbols with what each means.
-fn nomenclature<'a>(system: &Equations<'_>, header: String, options: &PrintOptions) -> Document<'a> {
+fn nomenclature<'a>(
+    system: &Equations<'_>,
+    header: String,
+    options: &PrintOptions,
+) -> Document<'a> {
     let (model, units) = (system.model(), system.latent_units());
     let (dim, numbers) = (model.latent_dim(), options.numbers);
     let symbol = |variable| format!("${}$", tex_symbol(&options.symbols.symbol(variable)));
     // `$z_1, \dots, z_6$`, or all of up to three.
     let range = |of: fn(usize) -> LatentVariable| match dim {
-        ..=3 => (0..dim).map(|index| symbol(of(index))).collect::<Vec<_>>().join(", "),
+        ..=3 => (0..dim)
+            .map(|index| symbol(of(index)))
+            .collect::<Vec<_>>()
+            .join(", "),
         _ => format!(r"{}, \dots, {}", symbol(of(0)), symbol(of(dim - 1))),
     };
     let position = |index| {
         let unit = units.map(|units| tex_unit(units.position[index]));
-        (symbol(LatentVariable::Z(index)), unit, coordinate(model, index, numbers))
+        (
+            symbol(LatentVariable::Z(index)),
+            unit,
+            coordinate(model, index, numbers),
+        )
     };
     let input = |(index, unit): (usize, &Unit)| {
         (symbol(LatentVariable::U(index)), tex_unit(*unit), index + 1)
     };
-    let inputs = units.iter().flat_map(|units| units.input.iter().enumerate().map(input));
+    let inputs = units
+        .iter()
+        .flat_map(|units| units.input.iter().enumerate().map(input));
     Document::Nomenclature {
         header,
         positions: (0..dim).map(position).collect(),
@@ -317,7 +321,11 @@ fn nomenclature<'a>(system: &Equations<'_>, header: String, options: &PrintOptio
             (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
             (Err(_), Err(_)) => None,
         },
-        layers: (model.encoder_map().ok().filter(|_| model.encoder().is_err())).map(layers),
+        layers: (model
+            .encoder_map()
+            .ok()
+            .filter(|_| model.encoder().is_err()))
+        .map(layers),
         factors: scale_factors(model, numbers),
     }
 }
@@ -360,10 +368,15 @@ fn layers(encoder: &StateMap) -> String {
 fn scale_factors(model: &ReducedModel, numbers: NumberStyle) -> Vec<(char, String)> {
     let value = |factors: &ScaleFactors| match factors {
         ScaleFactors::Uniform(factor) => {
-            format!("${}$ for all", tex_number(&Decimal::exact(*factor), numbers))
+            format!(
+                "${}$ for all",
+                tex_number(&Decimal::exact(*factor), numbers)
+            )
         }
         ScaleFactors::PerCoordinate(_) => "one per coordinate".to_owned(),
     };
     let scaling = model.scaling().into_iter();
-    scaling.flat_map(|of| [('x', value(&of.state)), ('u', value(&of.input))]).collect()
+    scaling
+        .flat_map(|of| [('x', value(&of.state)), ('u', value(&of.input))])
+        .collect()
 }

@@ -1,9 +1,4 @@
-//! Equations as `math` elements, and a page that shows them.
-//!
-//! The one way for text of a model file into a page. In romc's own sentences and tables a few symbols become
-//! mathematics.
-//!
-//! The MathML spelling of the typeset tree (MathML Core), without the `math` element around it.
+//! Equations as MathML Core, a page that shows them, and the one way for text from outside into a page.
 
 use std::fmt;
 
@@ -24,8 +19,7 @@ use crate::typeset::{
 /// What a continued line is set in by, in em.
 const INDENT: f64 = 2.0;
 
-/// One phase as a `math` element: a brace before its equations, each broken into lines of `width_em`. The LaTeX of the
-/// same equations stands in an annotation, where tools for copying find it.
+/// One phase as a `math` element with lines of `width_em`; an annotation for copying has its LaTeX.
 pub fn system(system: &EquationSystem, width_em: f64) -> String {
     let mut rows = String::new();
     for equation in &system.equations {
@@ -64,8 +58,7 @@ fn row(left: &str, right: &str, indent: f64) -> String {
     )
 }
 
-/// The page `NAME.html`: each phase's equations and the table of coefficients, without scripts or anything from
-/// elsewhere.
+/// The page `NAME.html`: equations and the table of coefficients, without scripts or anything from elsewhere.
 ///
 /// # Errors
 /// [`TypesetError::Template`].
@@ -147,8 +140,7 @@ const SYMBOLS: [(&str, &str); 14] = [
     ("lambda", "<mi>λ</mi>"),
 ];
 
-/// Text for the content of an element: known symbols become `math` elements, a hyphen before a digit a minus, `s^2` a
-/// raised digit, `us` microseconds, a lone hyphen a dash.
+/// Text in which known symbols become `math` elements, hyphens before digits minus signs, and units their signs.
 ///
 /// ```
 /// use romc::typeset::mathml::HtmlProse;
