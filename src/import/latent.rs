@@ -244,43 +244,28 @@ fn multiply(a: Number, b: Number) -> Option<Number> {
 
 /// Sorts terms as the standard library does; others stand before the inputs.
 pub(super) fn sort(pool: &ExprPool, latent_dim: usize, terms: &mut [ExprId]) {
-    let key = |expr: &ExprId| Key::of(pool, latent_dim, *expr);
+    let key = |expr: &ExprId| place(pool, latent_dim, *expr);
     terms.sort_by(|a, b| key(a).cmp(&key(b)).then_with(|| pool.compare(*a, *b)));
 }
 
-/// Place of a term; the derived order is that of the variants and their fields.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Key {
-    Constant,
-    /// Degree, then indices into (z, dz), each as often as its power.
-    Monomial(usize, Vec<usize>),
-    /// Function (sin, cos), then index into (z, dz).
-    Trigonometric(usize, usize),
-    Other,
-    Input(usize),
-}
-
-impl Key {
-    fn of(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Key {
-        if expr == ExprId::ONE {
-            return Key::Constant;
-        }
-        if let Some(LatentVariable::U(index)) = variable(pool, latent_dim, expr) {
-            return Key::Input(index);
-        }
-        if let Node::Apply(function, argument) = pool.node(expr) {
-            let state = state_index(pool, latent_dim, *argument);
-            return match (function, state) {
-                (Function::Sin, Some(index)) => Key::Trigonometric(0, index),
-                (Function::Cos, Some(index)) => Key::Trigonometric(1, index),
-                _ => Key::Other,
-            };
-        }
-        match monomial(pool, latent_dim, expr) {
-            Some(indices) => Key::Monomial(indices.len(), indices),
-            None => Key::Other,
-        }
+/// Where a term stands: its kind (constant, monomial, sine, cosine, anything else, input), its degree, and its indices
+/// into (z, dz), each as often as its power.
+fn place(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> (usize, usize, Vec<usize>) {
+    const OTHER: (usize, usize, Vec<usize>) = (4, 0, Vec::new());
+    if expr == ExprId::ONE {
+        return (0, 0, Vec::new());
     }
+    if let Some(LatentVariable::U(index)) = variable(pool, latent_dim, expr) {
+        return (5, 1, vec![index]);
+    }
+    if let Node::Apply(function, argument) = pool.node(expr) {
+        return match (function, state_index(pool, latent_dim, *argument)) {
+            (Function::Sin, Some(index)) => (2, 1, vec![index]),
+            (Function::Cos, Some(index)) => (3, 1, vec![index]),
+            _ => OTHER,
+        };
+    }
+    monomial(pool, latent_dim, expr).map_or(OTHER, |indices| (1, indices.len(), indices))
 }
 
 fn variable(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<LatentVariable> {

@@ -64,13 +64,13 @@ pub fn import_from_bytes(
     options: &ImportOptions,
 ) -> Read<Imported> {
     let (parts, mut report) = match format {
-        Format::Safetensors => {
+        Format::Safetensors | Format::Npz => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
-            assemble::parts(&tensors::open_safetensors(file, bytes)?, options)?
-        }
-        Format::Npz => {
-            check_size(file, bytes, MAX_FILE_BYTES)?;
-            assemble::parts(&tensors::open_npz(file, bytes)?, options)?
+            let tensors = match format {
+                Format::Npz => tensors::open_npz(file, bytes)?,
+                _ => tensors::open_safetensors(file, bytes)?,
+            };
+            assemble::parts(&tensors, options)?
         }
         Format::Equations | Format::Latex => {
             let usual = ["contact", "flight"].map(str::to_owned);
@@ -176,17 +176,13 @@ fn provenance(report: &ImportReport, digest: &[u8]) -> Map<String, Value> {
         let value = json!({ "tensor": used.tensor, "layout": used.layout });
         (used.role.clone(), value)
     });
-    let entries = [
-        ("imported_from", json!(name)),
-        ("format", json!(report.format)),
-        ("sha256", json!(hex(digest))),
-        ("romc", json!(env!("CARGO_PKG_VERSION"))),
-        ("tensors", Value::Object(tensors.collect())),
-    ];
-    let entries = entries.map(|(key, value)| (key.to_owned(), value));
-    let mut entries = Map::from_iter(entries);
-    if report.used.is_empty() {
-        entries.remove("tensors");
+    let mut entries = Map::new();
+    entries.insert("imported_from".to_owned(), json!(name));
+    entries.insert("format".to_owned(), json!(report.format));
+    entries.insert("sha256".to_owned(), json!(hex(digest)));
+    entries.insert("romc".to_owned(), json!(env!("CARGO_PKG_VERSION")));
+    if !report.used.is_empty() {
+        entries.insert("tensors".to_owned(), Value::Object(tensors.collect()));
     }
     entries
 }

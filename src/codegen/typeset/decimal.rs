@@ -261,56 +261,53 @@ impl Rounder {
         terms: &[(&str, Signed)],
         xi: &DMatrix<f64>,
     ) -> EquationSystem {
-        let equations = outputs.iter().zip(xi.column_iter());
-        let equations = equations.map(|((left, output), column)| {
+        let mut equations = Vec::with_capacity(outputs.len());
+        for ((left, output), column) in outputs.iter().zip(xi.column_iter()) {
             let entries = column.iter().zip(terms).filter(|(xi, _)| **xi != 0.0);
-            self.equation(phase, left, output, entries)
-        });
+            let terms = entries.filter_map(|(xi, term)| self.term(phase, left, output, *xi, term));
+            equations.push(Equation {
+                terms: terms.collect(),
+                left: left.clone(),
+                is_approximate: false,
+            });
+        }
         EquationSystem {
-            equations: equations.collect(),
+            equations,
             phase: phase.to_owned(),
         }
     }
 
-    /// `left = sum of coefficient * term`; each term also as text, for the record.
-    fn equation<'a>(
+    /// A coefficient before its term, which also is a text for the record; nothing if it rounds to zero.
+    fn term(
         &mut self,
         phase: &str,
         left: &Symbol,
         output: &str,
-        entries: impl Iterator<Item = (&'a f64, &'a (&'a str, Signed))>,
-    ) -> Equation {
-        let mut terms = Vec::new();
-        for (&coefficient, (text, term)) in entries {
-            let place = || Occurrence {
-                phase: phase.to_owned(),
-                output: output.to_owned(),
-                term: (*text).to_owned(),
-                coefficient,
-                left: left.clone(),
-                math: term.clone(),
-            };
-            let printed = self.round(coefficient);
-            let report = &mut self.report;
-            report.active += 1;
-            let error = (printed.value() - coefficient).abs();
-            let largest = report.largest.as_ref().map_or(0.0, |(error, _)| *error);
-            if error > largest {
-                report.largest = Some((error, place()));
-            }
-            if printed.is_zero() {
-                report.dropped.push(place());
-                continue;
-            }
-            report.largest_relative = report.largest_relative.max(error / coefficient.abs());
-            // Only a true one: a rounded 1.00 says how well it is known.
-            let is_omitted = coefficient.abs() == 1.0 && self.is_exact;
-            terms.push(with_coefficient(&printed, is_omitted, term.clone()));
-        }
-        Equation {
+        coefficient: f64,
+        (text, term): &(&str, Signed),
+    ) -> Option<Signed> {
+        let place = || Occurrence {
+            phase: phase.to_owned(),
+            output: output.to_owned(),
+            term: (*text).to_owned(),
+            coefficient,
             left: left.clone(),
-            terms,
-            is_approximate: false,
+            math: term.clone(),
+        };
+        let printed = self.round(coefficient);
+        let report = &mut self.report;
+        report.active += 1;
+        let error = (printed.value() - coefficient).abs();
+        if error > report.largest.as_ref().map_or(0.0, |(error, _)| *error) {
+            report.largest = Some((error, place()));
         }
+        if printed.is_zero() {
+            report.dropped.push(place());
+            return None;
+        }
+        report.largest_relative = report.largest_relative.max(error / coefficient.abs());
+        // Only a true one: a rounded 1.00 says how well it is known.
+        let is_omitted = coefficient.abs() == 1.0 && self.is_exact;
+        Some(with_coefficient(&printed, is_omitted, term.clone()))
     }
 }

@@ -75,8 +75,7 @@ pub fn feet(rule: &FeetRule) -> String {
 /// Patterns of feet by front and rear pair where that says the same, one by one otherwise.
 fn pairs(patterns: &[ContactFlags]) -> String {
     let is_meant = |[front, rear]: [[bool; 3]; 2]| {
-        (0..16u8).all(|bits| {
-            let feet: ContactFlags = std::array::from_fn(|foot| bits >> foot & 1 == 1);
+        FeetRule::all_patterns().all(|feet| {
             let down = |pair: &[bool]| pair.iter().filter(|down| **down).count();
             let holds = front[down(&feet[..2])] && rear[down(&feet[2..])];
             holds == patterns.contains(&feet)

@@ -114,49 +114,49 @@ fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Read<()> {
 /// The tokens without environments that arrange lines and the brace that `\left\{` puts before them.
 fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
     let mut flat: Vec<Token> = Vec::with_capacity(tokens.len());
-    let mut open: Vec<(&Token, &str)> = Vec::new();
+    let mut open: Vec<&Token> = Vec::new();
     let refused = |token: &Token, why: &str, expected: &str| {
         let found = format!("{}{why}", token.quoted());
         Err(ImportError::at(file, token.place, found, expected))
     };
-    let kind = |at: usize| tokens.get(at).map(|token| &token.kind);
-    let mut at = 0;
-    while let Some(token) = tokens.get(at) {
-        at += 1;
+    let is_distinction = |token: &Token| matches!(&token.kind, Kind::Begin(name) | Kind::End(name) if is_one_of(DISTINCTIONS, name));
+    let mut rest = tokens;
+    while let Some((token, behind)) = rest.split_first() {
+        rest = behind;
         match &token.kind {
             Kind::Begin(name)
-                if is_layout(name)
-                    || is_one_of(DISTINCTIONS, name) && has_left_side(&tokens[at..], name) =>
+                if is_layout(name) || is_distinction(token) && has_left_side(rest, name) =>
             {
-                open.push((token, name.as_str()));
+                open.push(token);
                 if flat.len() >= 2 && flat[flat.len() - 2].is_command("left") {
                     flat.truncate(flat.len() - 2);
                 }
-                if kind(at) == Some(&Kind::Character('[')) {
+                if rest
+                    .first()
+                    .is_some_and(|next| next.kind == Kind::Character('['))
+                {
                     // A vertical position such as [t].
-                    at += 3;
+                    rest = &rest[rest.len().min(3)..];
                 }
-                if is_one_of(WITH_COLUMNS, name) && kind(at) == Some(&Kind::Open) {
-                    let rest = &tokens[at..];
-                    at += group_length(rest.iter()).unwrap_or(rest.len());
+                let is_group = rest.first().is_some_and(|next| next.kind == Kind::Open);
+                if is_group && is_one_of(WITH_COLUMNS, name) {
+                    rest = &rest[group_length(rest.iter()).unwrap_or(rest.len())..];
                 }
             }
             Kind::End(name)
                 if is_layout(name)
-                    || is_one_of(DISTINCTIONS, name)
-                        && open
-                            .last()
-                            .is_some_and(|(_, open)| is_one_of(DISTINCTIONS, open)) =>
+                    || is_distinction(token)
+                        && open.last().is_some_and(|open| is_distinction(open)) =>
             {
-                if open.pop().is_none_or(|(_, open)| open != name) {
+                if open
+                    .pop()
+                    .is_none_or(|open| open.kind != Kind::Begin(name.clone()))
+                {
                     let expected = "environments that end in the order in which they begin";
                     return refused(token, "", expected);
                 }
-                if tokens
-                    .get(at)
-                    .is_some_and(|token| token.is_command("right"))
-                {
-                    at += 2;
+                if rest.first().is_some_and(|next| next.is_command("right")) {
+                    rest = &rest[rest.len().min(2)..];
                 }
             }
             _ => flat.push(token.clone()),
@@ -164,7 +164,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
     }
     match open.first() {
         None => Ok(flat),
-        Some((token, _)) => {
+        Some(token) => {
             let expected = "environments that end inside their display";
             refused(token, " without its end", expected)
         }

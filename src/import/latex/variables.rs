@@ -337,12 +337,9 @@ pub(super) fn is_greek(command: &str) -> bool {
 /// Why a name for a variable was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{entry}`: expected `VARIABLE=NAME`, such as `z1=x`, `z2=theta` or `u1=F_lin,x`, each variable and name once"
+    "`{0}`: expected `VARIABLE=NAME`, such as `z1=x`, `z2=theta` or `u1=F_lin,x`, each variable and name once"
 )]
-pub struct NameError {
-    /// The entry as given.
-    pub entry: String,
-}
+pub struct NameError(String);
 
 /// Names that a document gives to latent coordinates and inputs, as in `romc compile --rename` (`x`, `theta`,
 /// `F_lin,x`); `z_1` and `u_1` unless renamed. Velocities follow their coordinate.
@@ -359,9 +356,7 @@ impl SymbolNames {
     pub fn parse<S: AsRef<str>>(entries: &[S]) -> Result<Self, NameError> {
         let mut names = BTreeMap::new();
         for entry in entries.iter().map(AsRef::as_ref) {
-            let refused = || NameError {
-                entry: entry.to_owned(),
-            };
+            let refused = || NameError(entry.to_owned());
             let (left, right) = entry.split_once('=').ok_or_else(refused)?;
             let variable = LatentVariable::from_name(left.trim(), MAX_LATENT_DIM)
                 .filter(|variable| !matches!(variable, LatentVariable::Dz(_)))
