@@ -66,10 +66,8 @@ pub struct Sections {
 
 pub(super) fn read(file: &str, bytes: &[u8]) -> Read<Sections> {
     let text = text_of(file, bytes)?;
-    let mut reader = Reader {
-        file,
-        sections: Vec::new(),
-    };
+    let sections = Vec::new();
+    let mut reader = Reader { file, sections };
     for (index, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or("");
         let indent = line.len() - line.trim_start().len();

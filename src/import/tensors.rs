@@ -64,11 +64,13 @@ impl TensorInfo {
     }
 
     fn index_of(&self, mut position: usize) -> Vec<usize> {
-        let mut index = vec![0; self.shape.len()];
-        for step in 0..index.len() {
-            let axis = match self.is_column_major {
-                true => step,
-                false => index.len() - 1 - step,
+        let rank = self.shape.len();
+        let mut index = vec![0; rank];
+        for step in 0..rank {
+            let axis = if self.is_column_major {
+                step
+            } else {
+                rank - 1 - step
             };
             index[axis] = position % self.shape[axis];
             position /= self.shape[axis];

@@ -11,7 +11,7 @@ use crate::equations::Equations;
 const WIDTH_EM: f64 = 44.0;
 
 pub(super) struct Page<'a> {
-    equations: &'a Equations<'a>,
+    pub equations: &'a Equations<'a>,
     pub typeset: Typeset,
     pub rounding: String,
     width_em: f64,
@@ -33,14 +33,6 @@ impl<'a> Page<'a> {
             digest: options.digest.as_deref(),
             version: env!("CARGO_PKG_VERSION"),
         }
-    }
-
-    pub(super) fn name(&self) -> &str {
-        self.equations.model().name()
-    }
-
-    pub(super) fn description(&self) -> &str {
-        self.equations.model().description()
     }
 
     /// Name, feet and equations of each phase.

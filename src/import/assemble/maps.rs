@@ -155,17 +155,17 @@ impl<'a> Assembly<'a, '_> {
             Some(WeightVectors::Row) => &[Layout::Row],
             None => &[Layout::Column, Layout::Row],
         };
-        let known = |&layout| Some((layout, ends(part, &shapes, layout, self.known)?));
+        let known = |&layout| Some((layout, dims(part, &shapes, layout, self.known)?));
         let fitting: Vec<(Layout, Known)> = ways.iter().filter_map(known).collect();
+        let ends = if part == Part::Encoder {
+            "n to d"
+        } else {
+            "d to n"
+        };
         let expected = || match (layers, part) {
             ([_], _) => self.expected_weights(part, are_kernels),
             _ => format!(
-                "layers from {}, each taking the outputs of the one before, among {}",
-                if part == Part::Encoder {
-                    "n to d"
-                } else {
-                    "d to n"
-                },
+                "layers from {ends}, each taking the outputs of the one before, among {}",
                 described(layers)
             ),
         };
@@ -187,10 +187,8 @@ impl<'a> Assembly<'a, '_> {
             Part::Encoder => (d, n),
             Part::Decoder => (n, d),
         };
-        let (column, row) = (
-            format!("{outputs} x {inputs}"),
-            format!("{inputs} x {outputs}"),
-        );
+        let column = format!("{outputs} x {inputs}");
+        let row = format!("{inputs} x {outputs}");
         match self.options.weights {
             Some(WeightVectors::Column) => format!("{column} (--weights column){bound}"),
             Some(WeightVectors::Row) => format!("{row} (--weights row){bound}"),
@@ -223,7 +221,7 @@ fn shape_of(part: Part, assigned: &Assigned<'_>) -> Option<(usize, usize)> {
 }
 
 /// Latent and state dimension if the layers, stored in this way, are a chain that fits.
-fn ends(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> Option<Known> {
+fn dims(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> Option<Known> {
     // Numbers of inputs and outputs.
     let widths = shapes.iter().map(|&(rows, columns)| match layout {
         Layout::Row => (rows, columns),

@@ -1,4 +1,5 @@
-//! Equations as MathML Core, a page that shows them, and the one way for text from outside into a page.
+//! Equations for pages: the typeset tree as MathML Core, which browsers draw without scripts, a page that shows it, and
+//! the one way for text from outside into a page.
 
 use std::fmt;
 
@@ -21,41 +22,29 @@ const INDENT: f64 = 2.0;
 
 /// One phase as a `math` element with lines of `width_em`; an annotation for copying has its LaTeX.
 pub fn system(system: &EquationSystem, width_em: f64) -> String {
-    let mut rows = String::new();
+    let mut rows = Vec::new();
     for equation in &system.equations {
-        let left = mathml_symbol(&equation.left);
-        let first = symbol_width(&equation.left) + EQUALS;
-        let lines = break_lines(&equation.terms, width_em, first, INDENT);
         let relation = if equation.is_approximate { "≈" } else { "=" };
-        let mut head = format!("{left}<mo>{relation}</mo>");
-        if lines.is_empty() {
-            rows.push_str(&row(&head, &mathml(&equation.right()), 0.0));
-        }
-        for (place, terms) in lines.into_iter().enumerate() {
-            let continues = place > 0;
-            let indent = if continues { INDENT } else { 0.0 };
-            rows.push_str(&row(&head, &mathml_terms(terms, continues), indent));
-            head.clear();
-        }
+        let head = format!("{}<mo>{relation}</mo>", mathml_symbol(&equation.left));
+        let first = symbol_width(&equation.left) + EQUALS;
+        let mut lines = break_lines(&equation.terms, width_em, first, INDENT).into_iter();
+        let whole = || mathml(&equation.right());
+        let first = lines.next().map(|terms| mathml_terms(terms, false));
+        rows.push((head, first.unwrap_or_else(whole), 0.0));
+        rows.extend(lines.map(|terms| (String::new(), mathml_terms(terms, true), INDENT)));
     }
-    let tex = tex_cases(system, width_em);
-    format!(
-        "<math display=\"block\"><semantics><mrow><mo fence=\"true\" form=\"prefix\" \
-         stretchy=\"true\">{{</mo><mtable displaystyle=\"true\">{rows}</mtable></mrow>\
-         <annotation encoding=\"application/x-tex\">{}</annotation></semantics></math>",
-        HtmlText(&tex)
-    )
+    let tex = &tex_cases(system, width_em);
+    let tex = HtmlText(tex);
+    let rendered = Lines { rows, tex }.render();
+    rendered.expect("strings take all that is written")
 }
 
-fn row(left: &str, right: &str, indent: f64) -> String {
-    let space = match indent > 0.0 {
-        true => format!("<mspace width=\"{indent}em\"/>"),
-        false => String::new(),
-    };
-    format!(
-        "<mtr><mtd style=\"text-align:right;padding-right:0\"><mrow>{left}</mrow></mtd>\
-         <mtd style=\"text-align:left;padding-left:0\"><mrow>{space}{right}</mrow></mtd></mtr>"
-    )
+/// Lines of a system with their sides and indentation in em, and its LaTeX.
+#[derive(Template)]
+#[template(path = "mathml/system.askama", config = "templates/askama.toml")]
+struct Lines<'a> {
+    rows: Vec<(String, String, f64)>,
+    tex: HtmlText<'a>,
 }
 
 /// The page `NAME.html`: equations and the table of coefficients, without scripts or anything from elsewhere.
