@@ -55,7 +55,7 @@ pub fn emit(
     equations: &Equations<'_>,
     options: &PrintOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
-    let page = Page::new::<Html>(equations, options);
+    let page = Page::new(equations, options, &HTML);
     let path = format!("{}.html", equations.model().identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
@@ -67,18 +67,10 @@ struct Document<'a> {
 }
 
 /// Text and mathematics for the content of an element.
-#[derive(Clone, Copy, Debug)]
-pub struct Html;
-
-impl Spelling for Html {
-    fn text(text: &str) -> String {
-        HtmlText(text).to_string()
-    }
-
-    fn math(math: &Math, _: &str) -> String {
-        format!("<math>{}</math>", mathml(math))
-    }
-}
+pub const HTML: Spelling = Spelling {
+    text: |text| HtmlText(text).to_string(),
+    math: |math, _| format!("<math>{}</math>", mathml(math)),
+};
 
 fn after_comma(unit: &Option<Unit>) -> String {
     unit.map_or(String::new(), |unit| format!(", {unit}"))

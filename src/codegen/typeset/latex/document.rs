@@ -12,10 +12,10 @@ use crate::equations::{Equations, Unit};
 use crate::files::EmittedFile;
 use crate::model::{Activation, Identifier, LatentVariable, ReducedModel, ScaleFactors, StateMap};
 use crate::typeset::decimal::RoundingReport;
-use crate::typeset::words::{self, Plain, Spelling};
+use crate::typeset::words::{self, Spelling};
 use crate::typeset::{
-    Decimal, EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, Rounding,
-    Typeset, TypesetError, rendered,
+    Decimal, EquationSystem, Form, NumberStyle, PrintOptions, RobotTypeset, Rounding, Typeset,
+    TypesetError, rendered,
 };
 
 /// The LaTeX files of a model; NAME is its identifier:
@@ -73,7 +73,7 @@ pub fn emit(
         phases: (systems.iter().enumerate())
             .map(|(place, system)| (system.introduction.as_str(), model.phase_identifier(place)))
             .collect(),
-        rounding: words::rounding::<Tex>(options.rounding, &typeset.rounding),
+        rounding: words::rounding(&TEX, options.rounding, &typeset.rounding),
         siunitx: options.numbers == NumberStyle::Siunitx,
         two_columns: is_narrow(width_em),
         has_robot: robot.is_some(),
@@ -153,17 +153,10 @@ pub(super) fn is_narrow(width_em: f64) -> bool {
 }
 
 /// Running text of LaTeX.
-struct Tex;
-
-impl Spelling for Tex {
-    fn text(text: &str) -> String {
-        tex_text(text)
-    }
-
-    fn math(math: &Math, _: &str) -> String {
-        format!("${}$", tex(math, NumberStyle::Plain))
-    }
-}
+const TEX: Spelling = Spelling {
+    text: tex_text,
+    math: |math, _| format!("${}$", tex(math, NumberStyle::Plain)),
+};
 
 struct System {
     comment: String,
@@ -250,7 +243,7 @@ impl Header<'_> {
             NumberStyle::Siunitx => "amsmath and siunitx",
         };
         let short = self.short(&format!("For \\input; needs {packages}."));
-        let rounding = words::rounding::<Plain>(self.options.rounding, report);
+        let rounding = words::rounding(&words::PLAIN, self.options.rounding, report);
         let dropped = report.dropped.iter().map(|term| {
             let names = [&term.phase, &term.output, &term.term].map(|name| comment_text(name));
             let ([phase, output, text], xi) = (names, term.coefficient);
