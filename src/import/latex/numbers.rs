@@ -3,6 +3,8 @@
 //! Braces, fonts and the ends of macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single
 //! digit as an argument (`x^12`, `\frac12`), the reader ends behind it, and so does the number.
 
+use std::ops::Range;
+
 use super::super::Read;
 use super::definitions::changes_digits;
 use super::expression::WORDS;
@@ -55,15 +57,20 @@ impl Reader<'_> {
         self.at = ten.behind;
         self.takes(&Kind::Superscript).then_some(())?;
         let behind = self.after_argument(self.at);
-        let seen = (self.at..behind).filter(|at| !self.is_around[*at]);
-        let characters = seen.filter_map(|at| match &self.tokens[at].kind {
-            Kind::Open | Kind::Close => None,
-            Kind::Character(c) => Some(*c),
-            _ => Some('?'),
-        });
-        let text: String = characters.collect();
+        let text = self.characters(self.at..behind);
         self.at = behind;
         text.parse().ok()
+    }
+
+    /// The characters in a range, braces and fonts aside, and `?` for anything else.
+    pub(super) fn characters(&self, places: Range<usize>) -> String {
+        let characters = places.filter_map(|at| match &self.tokens[at].kind {
+            Kind::Open | Kind::Close | Kind::Comment(_) => None,
+            Kind::Command(name) if has(FONTS, name) => None,
+            Kind::Character(character) => Some(*character),
+            _ => Some('?'),
+        });
+        characters.collect()
     }
 
     pub(super) fn number(&mut self, expected: &str) -> Read<String> {
@@ -97,14 +104,7 @@ impl Reader<'_> {
         self.peek();
         let first = self.at;
         let behind = self.after_argument(first);
-        let parts = self.tokens[first..behind]
-            .iter()
-            .map(|token| match &token.kind {
-                Kind::Open | Kind::Close | Kind::Comment(_) => Some(String::new()),
-                Kind::Character(character) => Some(character.to_string()),
-                _ => None,
-            });
-        let text = parts.collect::<Option<String>>().unwrap_or_default();
+        let text = self.characters(first..behind);
         let text = text.replace(',', ".").replace(['d', 'D', 'E'], "e");
         let is_negative = text.starts_with('-');
         let digits = text.trim_start_matches(['-', '+']);

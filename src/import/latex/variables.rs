@@ -34,14 +34,7 @@ impl Reader<'_> {
             return None;
         }
         let close = self.closing[self.at + 1];
-        let word: String = (self.tokens[self.at + 2..close].iter())
-            .filter_map(|token| match &token.kind {
-                Kind::Character(letter) => Some(*letter),
-                Kind::Command(inner) if has(FONTS, inner) => None,
-                Kind::Open | Kind::Close => None,
-                _ => Some('?'),
-            })
-            .collect();
+        let word = self.characters(self.at + 2..close);
         let name = match word.as_str() {
             "e" if self.kind(close + 1) == Some(&Kind::Superscript) => {
                 return Some(("e".to_owned(), close + 2));
