@@ -164,7 +164,7 @@ pub fn equations(
                     terms: (0..equations.latent_dim()).map(summands).collect(),
                 }
             });
-        let rounding = words::rounding::<words::Plain>(print.rounding, &typeset.rounding);
+        let rounding = words::rounding(&words::PLAIN, print.rounding, &typeset.rounding);
         Ok((phases.collect(), rounding))
     });
     made.map_err(|error| python_error(py, error))

@@ -9,7 +9,7 @@ use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
 use super::role::{Part, Role, is_of_optimiser};
 use super::run::{ImportReport, Layout, UnusedTensor, UsedTensor};
 use super::tensors::{TensorFile, TensorInfo, shape_text};
-use super::{ImportError, library};
+use super::{ImportError, Read, library};
 use crate::files::Place;
 use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
 use crate::robot::STATE_DIM;
@@ -40,7 +40,7 @@ struct Known {
 pub(super) fn parts(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
-) -> Result<(Parts, ImportReport), ImportError> {
+) -> Read<(Parts, ImportReport)> {
     if matches!(options.library, Some(LibraryChoice::Terms(_))) && options.library_order.is_some() {
         let found = "a list of terms, which has an order";
         let expected = "--library degree=N[,trigonometric][,inputs]";
@@ -122,7 +122,7 @@ impl<'a> Assembly<'a, '_> {
         fitting: &[(Layout, T)],
         expected: impl FnOnce() -> String,
         option: &str,
-    ) -> Result<(Layout, T), ImportError> {
+    ) -> Read<(Layout, T)> {
         match fitting {
             [only] => Ok(*only),
             [] => Err(self.wrong_shape(assigned, expected())),
@@ -141,7 +141,7 @@ impl<'a> Assembly<'a, '_> {
         assigned: &Assigned<'_>,
         shape: (usize, usize),
         layout: Layout,
-    ) -> Result<DMatrix<f64>, ImportError> {
+    ) -> Read<DMatrix<f64>> {
         let info = assigned.info;
         if info.element.0 == "bool" && !matches!(assigned.role, Role::Mask(_)) {
             return Err(self.refused(assigned, "numbers of type bool", "f32 or f64"));
@@ -162,11 +162,7 @@ impl<'a> Assembly<'a, '_> {
     }
 
     /// A tensor that is a list of `length` numbers; a matrix of one row or column is one.
-    fn list(
-        &mut self,
-        assigned: &Assigned<'_>,
-        length: usize,
-    ) -> Result<DVector<f64>, ImportError> {
+    fn list(&mut self, assigned: &Assigned<'_>, length: usize) -> Read<DVector<f64>> {
         let is_list = match assigned.info.shape[..] {
             [] => length == 1,
             [found] | [1, found] | [found, 1] => found == length,
@@ -179,7 +175,7 @@ impl<'a> Assembly<'a, '_> {
         Ok(values.column(0).into_owned())
     }
 
-    fn coefficients(&mut self) -> Result<(Library, Vec<Phase>), ImportError> {
+    fn coefficients(&mut self) -> Read<(Library, Vec<Phase>)> {
         let first = Role::Xi(self.assignment.phases[0].name.clone());
         let first = (self.find(&first)).expect("every phase was assigned coefficients");
         let options = self.options;
@@ -197,13 +193,8 @@ impl<'a> Assembly<'a, '_> {
         Ok((library, phases))
     }
 
-    /// Brings the rows of coefficients over a standard library from the file's order into romc's; returns the terms in
-    /// the file's order.
-    fn sort_terms(
-        &mut self,
-        library: &Library,
-        phases: &mut [Phase],
-    ) -> Result<Vec<String>, ImportError> {
+    /// Brings rows over a standard library from the file's order into romc's; returns the terms in the file's order.
+    fn sort_terms(&mut self, library: &Library, phases: &mut [Phase]) -> Read<Vec<String>> {
         let LibraryChoice::Standard(standard) = library.choice() else {
             let terms = library.terms().iter().map(|term| term.text().to_owned());
             return Ok(terms.collect());
@@ -224,8 +215,15 @@ impl<'a> Assembly<'a, '_> {
     }
 
     /// Refuses options that are of use with an encoder or decoder alone.
-    fn check_options_of_maps(&self) -> Result<(), ImportError> {
-        let Some(option) = self.options.of_maps() else {
+    fn check_options_of_maps(&self) -> Read<()> {
+        const OF_MAPS: [&str; 5] = [
+            "--robot",
+            "--scaling",
+            "--input-scaling",
+            "--order",
+            "--weights",
+        ];
+        let Some(option) = self.options.first_of(&OF_MAPS) else {
             return Ok(());
         };
         let unused = self.assignment.unused.iter().take(24);
@@ -240,7 +238,7 @@ impl<'a> Assembly<'a, '_> {
     }
 
     /// Refuses unused tensors that by shape are a missing encoder or decoder, or by their numbers a mask.
-    fn check_left_over(&self, parts: &Parts) -> Result<(), ImportError> {
+    fn check_left_over(&self, parts: &Parts) -> Read<()> {
         let unused = self.assignment.unused.iter();
         let unused: Vec<_> = unused.filter(|info| !is_of_optimiser(&info.name)).collect();
         let refused = |found: String, expected: String| {
@@ -292,7 +290,7 @@ impl<'a> Assembly<'a, '_> {
     }
 
     /// Coefficients of a phase in the file's order of terms, `library_dim x latent_dim`.
-    fn xi(&mut self, phase: &str, choice: &LibraryChoice) -> Result<DMatrix<f64>, ImportError> {
+    fn xi(&mut self, phase: &str, choice: &LibraryChoice) -> Read<DMatrix<f64>> {
         let assigned = self.find(&Role::Xi(phase.to_owned()));
         let assigned = assigned.expect("every phase was assigned coefficients");
         let (xi, _) = self.terms_by_latent(assigned, choice)?;
@@ -321,7 +319,7 @@ impl<'a> Assembly<'a, '_> {
         &mut self,
         assigned: &Assigned<'_>,
         choice: &LibraryChoice,
-    ) -> Result<(DMatrix<f64>, Layout), ImportError> {
+    ) -> Read<(DMatrix<f64>, Layout)> {
         let (by_terms, by_latent) = (Layout::TermsByLatent, Layout::LatentByTerms);
         // Each way with the numbers of terms and of latent coordinates.
         let mut ways = match assigned.info.shape[..] {
@@ -394,7 +392,7 @@ impl<'a> Assembly<'a, '_> {
         self.tensors.refused(Place::Whole, found, expected)
     }
 
-    fn statistics(&mut self) -> Result<Vec<(String, InputStatistics)>, ImportError> {
+    fn statistics(&mut self) -> Read<Vec<(String, InputStatistics)>> {
         let mut all = Vec::new();
         for rule in &self.assignment.phases {
             let roles = [Role::InputMean, Role::InputCovariance].map(|of| of(rule.name.clone()));

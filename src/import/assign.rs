@@ -1,10 +1,10 @@
 //! The use of each tensor: as mapped, else by its name.
 
-use super::ImportError;
 use super::options::{ImportOptions, PhaseRule};
 use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};
 use super::run::Chosen;
 use super::tensors::{TensorFile, TensorInfo};
+use super::{ImportError, Read};
 use crate::files::Place;
 
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ pub(super) struct Assignment<'f> {
 pub(super) fn assign<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
-) -> Result<Assignment<'f>, ImportError> {
+) -> Read<Assignment<'f>> {
     let mut used = mapped(tensors, options)?;
     used.extend(named(tensors, options, &used)?);
     used.sort_by(|a, b| a.role.cmp(&b.role));
@@ -54,13 +54,12 @@ pub(super) fn assign<'f>(
     })
 }
 
-/// The tensors with names of parts that `--map` does not settle: it settles all weights of a map at once. Factors
-/// beside `--scaling` are not settled: they are refused.
+/// The tensors with names of parts that `--map` does not settle: it settles all weights of a map at once.
 fn named<'f>(
     tensors: &'f TensorFile<'_>,
     options: &ImportOptions,
     mapped: &[Assigned<'_>],
-) -> Result<Vec<Assigned<'f>>, ImportError> {
+) -> Read<Vec<Assigned<'f>>> {
     let is_settled = |role: &Role| {
         mapped.iter().any(|assigned| match (&assigned.role, role) {
             (Role::Weights(a, _), Role::Weights(b, _)) => a == b,
@@ -114,7 +113,7 @@ fn in_phase(
     info: &TensorInfo,
     role: Role,
     known: &[String],
-) -> Result<Role, ImportError> {
+) -> Read<Role> {
     let is_known = |phase: &str| known.is_empty() || known.iter().any(|name| name == phase);
     if role.phase().is_none_or(is_known) {
         return Ok(role);
@@ -132,13 +131,12 @@ fn in_phase(
     }
 }
 
-/// Refuses a tensor in the module of an encoder or decoder that is no weight or bias of a linear layer, unless `--map`
-/// names the weights: without it the map would be another one.
+/// Refuses a tensor of an encoder or decoder that is no layer's weight or bias, unless `--map` names the weights.
 fn check_layers(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
     unused: &[&TensorInfo],
-) -> Result<(), ImportError> {
+) -> Read<()> {
     let is_mapped = |part: Part| {
         let mut mapped = options.mapping.iter();
         mapped.any(|mapping| matches!(mapping.role, Role::Weights(of, _) if of == part))
@@ -158,10 +156,7 @@ fn check_layers(
     Ok(())
 }
 
-fn mapped<'f>(
-    tensors: &'f TensorFile<'_>,
-    options: &ImportOptions,
-) -> Result<Vec<Assigned<'f>>, ImportError> {
+fn mapped<'f>(tensors: &'f TensorFile<'_>, options: &ImportOptions) -> Read<Vec<Assigned<'f>>> {
     let mut used: Vec<Assigned<'f>> = Vec::new();
     for mapping in &options.mapping {
         let (role, tensor) = (&mapping.role, &mapping.tensor);
@@ -185,7 +180,7 @@ fn phases(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
     used: &[Assigned<'_>],
-) -> Result<Vec<PhaseRule>, ImportError> {
+) -> Read<Vec<PhaseRule>> {
     let mut rules = options.phases.clone();
     // Sorted by name; the rule `any` takes every pattern with a foot down, so that the order of the two known phases is
     // free.

@@ -13,8 +13,8 @@
 //! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase, which `--phase`
 //! names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
 
-use super::ImportError;
 use super::library::tokens;
+use super::{ImportError, Read};
 use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};
@@ -64,12 +64,10 @@ pub struct Sections {
     pub sections: Vec<Section>,
 }
 
-pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
+pub(super) fn read(file: &str, bytes: &[u8]) -> Read<Sections> {
     let text = text_of(file, bytes)?;
-    let mut reader = Reader {
-        file,
-        sections: Vec::new(),
-    };
+    let sections = Vec::new();
+    let mut reader = Reader { file, sections };
     for (index, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or("");
         let indent = line.len() - line.trim_start().len();
@@ -80,7 +78,7 @@ pub(super) fn read(file: &str, bytes: &[u8]) -> Result<Sections, ImportError> {
     complete(file, reader.sections, text.lines().count(), expected)
 }
 
-pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, ImportError> {
+pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Read<&'b str> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
         let place = Place::of_byte(&before, before.len());
@@ -100,16 +98,11 @@ struct Reader<'f> {
 }
 
 impl Reader<'_> {
-    fn refused<T>(
-        &self,
-        place: (usize, usize),
-        found: &str,
-        expected: &str,
-    ) -> Result<T, ImportError> {
+    fn refused<T>(&self, place: (usize, usize), found: &str, expected: &str) -> Read<T> {
         Err(ImportError::at(self.file, place, found, expected))
     }
 
-    fn line(&mut self, place: (usize, usize), content: &str) -> Result<(), ImportError> {
+    fn line(&mut self, place: (usize, usize), content: &str) -> Read<()> {
         if content.is_empty() {
             return Ok(());
         }
@@ -134,7 +127,7 @@ impl Reader<'_> {
         }
     }
 
-    fn header(&mut self, place: (usize, usize), content: &str) -> Result<(), ImportError> {
+    fn header(&mut self, place: (usize, usize), content: &str) -> Read<()> {
         let name = (content.strip_prefix('[')).and_then(|rest| rest.strip_suffix(']'));
         let Some(name) = name.map(str::trim).filter(|name| !name.is_empty()) else {
             let expected = "the name of a phase in brackets, such as `[contact]`";
@@ -155,12 +148,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn equation(
-        &mut self,
-        place: (usize, usize),
-        left: &str,
-        pieces: Vec<Piece>,
-    ) -> Result<(), ImportError> {
+    fn equation(&mut self, place: (usize, usize), left: &str, pieces: Vec<Piece>) -> Read<()> {
         let name = plain_name(left).unwrap_or_else(|| left.to_owned());
         let variable = (name.strip_prefix('d'))
             .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM));
@@ -220,7 +208,7 @@ pub(super) fn complete(
     mut sections: Vec<Section>,
     lines: usize,
     expected: &str,
-) -> Result<Sections, ImportError> {
+) -> Read<Sections> {
     let outputs = sections.iter().flat_map(|section| &section.equations);
     let Some(last) = outputs.map(|equation| equation.output).max() else {
         let (place, found) = ((lines.max(1), 1), "the end of the text");
@@ -246,12 +234,7 @@ pub(super) fn complete(
 }
 
 impl Equation {
-    pub(super) fn parse(
-        &self,
-        file: &str,
-        latent_dim: usize,
-        pool: &mut ExprPool,
-    ) -> Result<ExprId, ImportError> {
+    pub(super) fn parse(&self, file: &str, latent_dim: usize, pool: &mut ExprPool) -> Read<ExprId> {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
         let read = pool.parse_defined(&self.text(), &known, &|_, _| None, ParseLimits::default());
         read.map(|reading| reading.expr).map_err(|error| {

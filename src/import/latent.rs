@@ -1,7 +1,5 @@
 //! From equations as text to library and coefficients.
 //!
-//! Separates equations into candidate terms and their coefficients.
-//!
 //! A coefficient is the number in front of a term, bit for bit as it is written; sums inside a product with a number
 //! are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums stay one term (`z1*(1 + dz1)`).
 
@@ -13,18 +11,16 @@ use super::assemble::Parts;
 use super::equations::{Equation, Section, Sections};
 use super::options::{ImportOptions, PhaseRule};
 use super::run::{ImportReport, ReadEquation};
-use super::{ImportError, library};
+use super::{ImportError, Read, library};
 use crate::model::{LatentVariable, Library, Phase};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
 
-/// Makes the parts of a model out of equations, with the decisions about each.
-///
-/// Without a library in the options, the library is the union of the terms found.
+/// Makes the parts of a model; without a library in the options, it is the union of the terms found.
 pub(super) fn parts(
     file: &str,
     sections: &Sections,
     options: &ImportOptions,
-) -> Result<(Parts, ImportReport), ImportError> {
+) -> Read<(Parts, ImportReport)> {
     let latent_dim = sections.latent_dim;
     check_options(latent_dim, options)?;
     let ordered = phases_in_order(file, sections, options)?;
@@ -84,26 +80,26 @@ struct Row {
     factor: f64,
 }
 
-fn check_options(latent_dim: usize, options: &ImportOptions) -> Result<(), ImportError> {
+fn check_options(latent_dim: usize, options: &ImportOptions) -> Read<()> {
     if let Some(given) = options.latent_dim.filter(|given| *given != latent_dim) {
         let expected = format!("{latent_dim}, as the equations have");
         let found = given.to_string();
         return Err(ImportError::option("--latent-dim", found, expected));
     }
-    let given = [
-        ("--map", !options.mapping.is_empty()),
-        ("--weights", options.weights.is_some()),
-        ("--xi-layout", options.xi_layout.is_some()),
-        ("--library-order", options.library_order.is_some()),
-        ("--activation", options.activation.is_some()),
-        ("--input-scaling", options.input_scaling.is_some()),
-        ("--order", options.order.is_some()),
+    const OF_TENSORS: [&str; 7] = [
+        "--map",
+        "--weights",
+        "--xi-layout",
+        "--library-order",
+        "--activation",
+        "--input-scaling",
+        "--order",
     ];
-    let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) else {
-        return Ok(());
-    };
     let (found, expected) = ("a file of equations", "a file of tensors");
-    Err(ImportError::option(option, found, expected))
+    match options.first_of(&OF_TENSORS) {
+        Some(option) => Err(ImportError::option(option, found, expected)),
+        None => Ok(()),
+    }
 }
 
 /// The sections with their phases, in the order of `--phase` or of the file.
@@ -111,7 +107,7 @@ fn phases_in_order<'s>(
     file: &str,
     sections: &'s Sections,
     options: &ImportOptions,
-) -> Result<Vec<(PhaseRule, &'s Section)>, ImportError> {
+) -> Read<Vec<(PhaseRule, &'s Section)>> {
     let mut ordered = Vec::new();
     let by_order = options.phases.len() == sections.sections.len();
     for (place, section) in sections.sections.iter().enumerate() {
@@ -158,7 +154,7 @@ fn separate(
     equation: &Equation,
     pool: &mut ExprPool,
     known: &HashMap<ExprId, Row>,
-) -> Result<Coefficients, ImportError> {
+) -> Read<Coefficients> {
     let (place, output) = ((equation.line, 1), equation.output + 1);
     let expr = equation.parse(file, latent_dim, pool)?;
     let is_term = |expr| known.contains_key(&expr);
@@ -191,7 +187,7 @@ fn union(
     latent_dim: usize,
     pool: &ExprPool,
     separated: &[Vec<Coefficients>],
-) -> Result<(Library, HashMap<ExprId, Row>), ImportError> {
+) -> Read<(Library, HashMap<ExprId, Row>)> {
     let found = separated.iter().flatten().flat_map(Coefficients::keys);
     let mut found: Vec<ExprId> = found.copied().collect();
     found.sort_unstable();
@@ -211,9 +207,7 @@ fn union(
 
 pub(super) type Coefficients = HashMap<ExprId, Number>;
 
-/// Coefficients of `expr` as a sum over terms; `None` if one overflows.
-///
-/// A sum which `is_term` names is taken whole.
+/// Coefficients of `expr` as a sum over terms; `None` if one overflows. A sum that is a term is taken whole.
 pub(super) fn coefficients(
     pool: &ExprPool,
     expr: ExprId,
@@ -248,46 +242,30 @@ fn multiply(a: Number, b: Number) -> Option<Number> {
     }
 }
 
-/// Sorts terms as the standard library does: constant, z, dz, monomials by degree, sin z, sin dz, cos z, cos dz,
-/// anything else, u.
+/// Sorts terms as the standard library does; others stand before the inputs.
 pub(super) fn sort(pool: &ExprPool, latent_dim: usize, terms: &mut [ExprId]) {
-    let key = |expr: &ExprId| Key::of(pool, latent_dim, *expr);
+    let key = |expr: &ExprId| place(pool, latent_dim, *expr);
     terms.sort_by(|a, b| key(a).cmp(&key(b)).then_with(|| pool.compare(*a, *b)));
 }
 
-/// Place of a term; the derived order is that of the variants and their fields.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Key {
-    Constant,
-    /// Degree, then indices into (z, dz), each as often as its power.
-    Monomial(usize, Vec<usize>),
-    /// Function (sin, cos), then index into (z, dz).
-    Trigonometric(usize, usize),
-    Other,
-    Input(usize),
-}
-
-impl Key {
-    fn of(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Key {
-        if expr == ExprId::ONE {
-            return Key::Constant;
-        }
-        if let Some(LatentVariable::U(index)) = variable(pool, latent_dim, expr) {
-            return Key::Input(index);
-        }
-        if let Node::Apply(function, argument) = pool.node(expr) {
-            let state = state_index(pool, latent_dim, *argument);
-            return match (function, state) {
-                (Function::Sin, Some(index)) => Key::Trigonometric(0, index),
-                (Function::Cos, Some(index)) => Key::Trigonometric(1, index),
-                _ => Key::Other,
-            };
-        }
-        match monomial(pool, latent_dim, expr) {
-            Some(indices) => Key::Monomial(indices.len(), indices),
-            None => Key::Other,
-        }
+/// Where a term stands: its kind (constant, monomial, sine, cosine, anything else, input), its degree, and its indices
+/// into (z, dz), each as often as its power.
+fn place(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> (usize, usize, Vec<usize>) {
+    const OTHER: (usize, usize, Vec<usize>) = (4, 0, Vec::new());
+    if expr == ExprId::ONE {
+        return (0, 0, Vec::new());
     }
+    if let Some(LatentVariable::U(index)) = variable(pool, latent_dim, expr) {
+        return (5, 1, vec![index]);
+    }
+    if let Node::Apply(function, argument) = pool.node(expr) {
+        return match (function, state_index(pool, latent_dim, *argument)) {
+            (Function::Sin, Some(index)) => (2, 1, vec![index]),
+            (Function::Cos, Some(index)) => (3, 1, vec![index]),
+            _ => OTHER,
+        };
+    }
+    monomial(pool, latent_dim, expr).map_or(OTHER, |indices| (1, indices.len(), indices))
 }
 
 fn variable(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<LatentVariable> {

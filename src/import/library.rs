@@ -1,16 +1,14 @@
-//! The candidate terms of imported coefficients.
-//!
-//! Candidate terms as PySINDy and its relatives name them: `z1 z2`, `sin(1 z1)`, `x0 u0`, `z1**2`.
+//! The candidate terms of imported coefficients, as PySINDy and its relatives name them: `z1 z2`, `x0 u0`, `z1**2`.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::Value;
 
-use super::ImportError;
 use super::equations::plain_name;
 use super::options::standard_text;
 use super::run::{check_size, read_file};
+use super::{ImportError, Read};
 use crate::model::{Library, LibraryChoice, LibraryOrder, StandardLibrary};
 use crate::symbolic::Function;
 
@@ -24,11 +22,7 @@ pub(super) fn dim(choice: &LibraryChoice, latent_dim: usize) -> Option<usize> {
 }
 
 /// The library at a latent dimension; a standard one in romc's order.
-pub(super) fn build(
-    file: &str,
-    choice: &LibraryChoice,
-    latent_dim: usize,
-) -> Result<Library, ImportError> {
+pub(super) fn build(file: &str, choice: &LibraryChoice, latent_dim: usize) -> Read<Library> {
     let choice = match choice {
         LibraryChoice::Terms(terms) => LibraryChoice::Terms(
             readable(terms, latent_dim)
@@ -44,7 +38,7 @@ pub(super) fn order(
     standard: StandardLibrary,
     latent_dim: usize,
     stated: Option<LibraryOrder>,
-) -> Result<LibraryOrder, ImportError> {
+) -> Read<LibraryOrder> {
     let texts = |order: &LibraryOrder| standard.texts_in(*order, latent_dim);
     let orders: Result<Vec<Vec<String>>, _> = LibraryOrder::NAMED.iter().map(texts).collect();
     let orders = orders.map_err(|source| ImportError::unusable("", source))?;
@@ -83,18 +77,17 @@ pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String
     fitting.map(standard_text).collect()
 }
 
-/// Reads a list of terms: a JSON list of texts, a JSON object with such a list under `library`, or one term per line
-/// (`#` starts a comment).
+/// Reads a list of terms: a JSON list, alone or under `library`, or one term per line (`#` starts a comment).
 ///
 /// # Errors
 /// [`ImportError`] with line and column.
-pub fn read_terms(path: &Path) -> Result<Vec<String>, ImportError> {
+pub fn read_terms(path: &Path) -> Read<Vec<String>> {
     let (file, bytes) = read_file(path, MAX_TERMS_BYTES)?;
     check_size(&file, &bytes, MAX_TERMS_BYTES)?;
     parse_terms(&file, &String::from_utf8_lossy(&bytes))
 }
 
-fn parse_terms(file: &str, text: &str) -> Result<Vec<String>, ImportError> {
+fn parse_terms(file: &str, text: &str) -> Read<Vec<String>> {
     let text = text.trim_start_matches('\u{feff}');
     let refused = |place: (usize, usize), found: &str, expected: &str| {
         ImportError::at(file, place, found, expected)
@@ -134,11 +127,8 @@ fn kind_of(value: &Value) -> &'static str {
     }
 }
 
-/// A list of terms in romc's grammar; terms that are in it already stay as they are.
-///
-/// Operands with a space between them are multiplied. Where a list has names `x0`, `x1`, ..., as PySINDy has, these are
-/// the latent coordinates and then their velocities, and `u0` is `u1`; where they end in `x{2d}`, they and `u1` are
-/// counted from one. Else what was found and expected.
+/// A list of terms in romc's grammar, with operands next to each other multiplied. Names `x0`, `x1`, ... are the latent
+/// coordinates and then their velocities; where they end in `x{2d}`, they and `u1` count from one.
 pub(super) fn readable(
     terms: &[String],
     latent_dim: usize,

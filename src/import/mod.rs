@@ -49,3 +49,5 @@ pub use tensors::Tensor;
 
 /// A fault and its place: the file, a tensor with its use, a character of a text, or an option.
 pub type ImportError = crate::files::Located<crate::files::Fault<crate::model::ModelError>>;
+
+type Read<T> = Result<T, ImportError>;

@@ -6,9 +6,9 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use nalgebra::DVector;
 
-use super::ImportError;
 use super::latex::SymbolNames;
 use super::role::{Mapping, ONLY_PHASE};
+use super::{ImportError, Read};
 use crate::files::Place;
 use crate::files::magic::{self, OtherFormat};
 use crate::model::{
@@ -32,7 +32,7 @@ pub enum Format {
 
 impl Format {
     /// The kind of a file by its ending.
-    pub(crate) fn of_path(path: &Path) -> Result<Self, ImportError> {
+    pub(crate) fn of_path(path: &Path) -> Read<Self> {
         let ending = (path.extension()).map(|ending| ending.to_string_lossy().to_lowercase());
         let found = match ending.as_deref() {
             Some("safetensors") => return Ok(Format::Safetensors),
@@ -58,11 +58,7 @@ impl Format {
     }
 
     /// The kind of a file that was read: as given, else by its bytes or its ending.
-    pub(super) fn of_file(
-        path: &Path,
-        bytes: &[u8],
-        given: Option<Self>,
-    ) -> Result<Self, ImportError> {
+    pub(super) fn of_file(path: &Path, bytes: &[u8], given: Option<Self>) -> Read<Self> {
         let content = magic::arrays_by_content(path, bytes);
         let is_known = content.is_some();
         match content.and_then(|found| refusal(path, found)) {
@@ -111,7 +107,7 @@ pub enum XiLayout {
 ///
 /// # Errors
 /// [`ImportError`] of the option.
-pub fn parse_standard(text: &str) -> Result<StandardLibrary, ImportError> {
+pub fn parse_standard(text: &str) -> Read<StandardLibrary> {
     let refused = |part: &str| {
         let expected = "degree=N, then trigonometric and inputs if the library has them, separated \
                         by commas; or a file with the list of terms";
@@ -157,7 +153,7 @@ pub struct PhaseRule {
 impl FromStr for PhaseRule {
     type Err = ImportError;
 
-    fn from_str(text: &str) -> Result<Self, ImportError> {
+    fn from_str(text: &str) -> Read<Self> {
         let refused = || {
             let expected = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr \
                             rl, such as rear=0011,0001";
@@ -226,16 +222,14 @@ pub struct ImportOptions {
     pub robot: Option<&'static Robot>,
     /// Axes of the force and moment in the inputs that the model was trained with; needs the robot.
     pub wrench_frame: WrenchFrame,
-    /// What the joints take of the motors' torques in the inputs that the model was trained with, `None` for the
-    /// motors' torques as they are; needs the robot.
+    /// Friction and inertia of the joints, if training subtracted them from the torques; needs the robot.
     pub actuators: Option<Actuators>,
     /// Sampling period of the training recordings, s.
     pub sample_time_s: Option<f64>,
 }
 
 impl ImportOptions {
-    /// Options with the scale factors of states and of inputs, each none, one, or one per coordinate; inputs have those
-    /// of the states where tensors bring neither.
+    /// Options with scale factors of states and inputs: none, one, or one per coordinate; inputs default to states.
     pub fn of_factors(state: &[f64], input: &[f64]) -> Self {
         let factors = |given: &[f64]| match given {
             [factor] => ScaleFactors::Uniform(*factor),
@@ -256,30 +250,28 @@ impl ImportOptions {
         }
     }
 
-    pub(super) fn of_maps(&self) -> Option<&'static str> {
-        let given = [
-            ("--robot", self.robot.is_some()),
-            ("--scaling", self.scaling.is_some()),
-            ("--input-scaling", self.input_scaling.is_some()),
-            ("--order", self.order.is_some()),
-            ("--weights", self.weights.is_some()),
-        ];
-        let mut given = given.into_iter().filter(|(_, is_given)| *is_given);
-        given.next().map(|(option, _)| option)
+    /// The first of some options that is given.
+    pub(super) fn first_of(&self, options: &[&'static str]) -> Option<&'static str> {
+        let is_given = |option: &&&str| match **option {
+            "--map" => !self.mapping.is_empty(),
+            "--weights" => self.weights.is_some(),
+            "--xi-layout" => self.xi_layout.is_some(),
+            "--library-order" => self.library_order.is_some(),
+            "--activation" => self.activation.is_some(),
+            "--scaling" => self.scaling.is_some(),
+            "--input-scaling" => self.input_scaling.is_some(),
+            "--order" => self.order.is_some(),
+            _ => self.robot.is_some(),
+        };
+        options.iter().find(is_given).copied()
     }
 
     pub(super) fn given(&self, phase: &str) -> Option<usize> {
         self.phases.iter().position(|rule| rule.name == phase)
     }
 
-    /// The rule of a phase: as given, or for `contact` and `flight` as usual. `found` is what of the file belongs to
-    /// it.
-    pub(super) fn feet_of(
-        &self,
-        file: &str,
-        phase: &str,
-        found: &str,
-    ) -> Result<FeetRule, ImportError> {
+    /// The rule of a phase: as given, or the usual one; `found` of the file belongs to it.
+    pub(super) fn feet_of(&self, file: &str, phase: &str, found: &str) -> Read<FeetRule> {
         match (self.given(phase), phase) {
             (Some(place), _) => Ok(self.phases[place].feet.clone()),
             (None, "contact") => Ok(FeetRule::Any),

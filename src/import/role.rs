@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::ImportError;
+use super::{ImportError, Read};
 
 /// One of the two maps between robot and latent coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -105,7 +105,7 @@ impl FromStr for Role {
     type Err = ImportError;
 
     /// Reads the name of a part; underscores may stand for its dots.
-    fn from_str(text: &str) -> Result<Self, ImportError> {
+    fn from_str(text: &str) -> Read<Self> {
         read_role(text)
             .ok_or_else(|| ImportError::option("--map", format!("the part {text:?}"), EXPECTED))
     }
@@ -149,8 +149,7 @@ fn read_role(text: &str) -> Option<Role> {
     }
 }
 
-/// The number of a layer in the names of its modules, the last that there is: 2 of `net.2` and of `dense_2`. The first
-/// `dense` of Keras has none.
+/// The last number in the names of modules: 2 of `net.2` and of `dense_2`; the first `dense` of Keras has none.
 fn layer(modules: &str) -> Option<Option<usize>> {
     let numbers = modules.split(|c: char| !c.is_ascii_digit());
     match numbers.rev().find(|number| !number.is_empty()) {
@@ -160,9 +159,8 @@ fn layer(modules: &str) -> Option<Option<usize>> {
 }
 
 impl Role {
-    /// The part that the name of a tensor stands for: the part's own name, alone or behind the names of the modules
-    /// that hold it, as in `autoencoder.encoder.0.weight`. A mask has the phase `always` where its phase is at most a
-    /// word of its name.
+    /// The part that a tensor is by its name, alone or behind names of modules (`autoencoder.encoder.0.weight`). A mask
+    /// has the phase `always` where its phase is at most a word of its name.
     pub fn of_name(name: &str) -> Option<Self> {
         let name = without_tensorflow_end(name);
         if is_of_optimiser(name) {
@@ -234,7 +232,7 @@ pub struct Mapping {
 impl FromStr for Mapping {
     type Err = ImportError;
 
-    fn from_str(text: &str) -> Result<Self, ImportError> {
+    fn from_str(text: &str) -> Read<Self> {
         match text.split_once('=') {
             Some((role, tensor)) if !tensor.is_empty() => Ok(Mapping {
                 role: role.trim().parse()?,

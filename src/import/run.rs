@@ -1,10 +1,8 @@
-//! The way from a foreign file to a checked model.
-//!
-//! The decisions of an import: the use of each tensor, how it was stored, tensors left unused.
+//! The way from a foreign file to a checked model, and the record of what was decided on it.
 
 use std::fmt;
 use std::fs::File;
-use std::io::Read;
+use std::io::Read as _;
 use std::path::Path;
 
 use serde::Serialize;
@@ -16,7 +14,7 @@ use super::equations::{self, Sections};
 use super::latex::{self, SymbolNames};
 use super::options::{Format, ImportOptions, refusal};
 use super::tensors::{self, Tensor};
-use super::{ImportError, latent};
+use super::{ImportError, Read, latent};
 use crate::files::{Place, hex, magic};
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::symbolic::ExprPool;
@@ -36,7 +34,7 @@ pub struct Imported {
 ///
 /// # Errors
 /// [`ImportError`] with the place, what was found and what was expected.
-pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportError> {
+pub fn import(path: &Path, options: &ImportOptions) -> Read<Imported> {
     let (file, bytes) = read_file(path, MAX_FILE_BYTES).map_err(|fault| {
         let foreign = magic::arrays_by_neighbours(path);
         (foreign.and_then(|found| refusal(path, found))).unwrap_or(fault)
@@ -45,9 +43,8 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
     import_from_bytes(&file, format, &bytes, options)
 }
 
-/// The name of a file and its bytes, at most one more than allowed, which tells a file that is too large from one that
-/// just fits.
-pub(super) fn read_file(path: &Path, max: u64) -> Result<(String, Vec<u8>), ImportError> {
+/// The name of a file and its bytes, at most one more than allowed.
+pub(super) fn read_file(path: &Path, max: u64) -> Read<(String, Vec<u8>)> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
     match File::open(path).and_then(|open| open.take(max + 1).read_to_end(&mut bytes)) {
@@ -65,15 +62,15 @@ pub fn import_from_bytes(
     format: Format,
     bytes: &[u8],
     options: &ImportOptions,
-) -> Result<Imported, ImportError> {
+) -> Read<Imported> {
     let (parts, mut report) = match format {
-        Format::Safetensors => {
+        Format::Safetensors | Format::Npz => {
             check_size(file, bytes, MAX_FILE_BYTES)?;
-            assemble::parts(&tensors::open_safetensors(file, bytes)?, options)?
-        }
-        Format::Npz => {
-            check_size(file, bytes, MAX_FILE_BYTES)?;
-            assemble::parts(&tensors::open_npz(file, bytes)?, options)?
+            let tensors = match format {
+                Format::Npz => tensors::open_npz(file, bytes)?,
+                _ => tensors::open_safetensors(file, bytes)?,
+            };
+            assemble::parts(&tensors, options)?
         }
         Format::Equations | Format::Latex => {
             let usual = ["contact", "flight"].map(str::to_owned);
@@ -95,13 +92,13 @@ pub fn import_tensors(
     source: &str,
     arrays: &[Tensor<'_>],
     options: &ImportOptions,
-) -> Result<Imported, ImportError> {
+) -> Read<Imported> {
     let (parts, mut report) = assemble::parts(&tensors::open_arrays(source, arrays)?, options)?;
     (report.file, report.format) = (source.to_owned(), "arrays");
     finish(parts, report, &tensors::digest(arrays), options)
 }
 
-pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Result<(), ImportError> {
+pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Read<()> {
     match bytes.len() as u64 > max {
         true => Err(too_large(file, Place::Whole, max, "bytes")),
         false => Ok(()),
@@ -125,7 +122,7 @@ fn sections(
     bytes: &[u8],
     symbols: &SymbolNames,
     known: &[String],
-) -> Result<Sections, ImportError> {
+) -> Read<Sections> {
     check_size(file, bytes, equations::MAX_TEXT_BYTES)?;
     if format != Format::Latex {
         return equations::read(file, bytes);
@@ -139,8 +136,7 @@ fn sections(
     Err(ImportError::option("--symbols", found, expected))
 }
 
-/// Reads the equations of a file in memory. `symbols` are LaTeX's names of variables, `known` names of phases that its
-/// labels may end in.
+/// Reads the equations of a file in memory; LaTeX has names of variables, and labels that end in `known` phases.
 ///
 /// # Errors
 /// [`ImportError`] with the place of what cannot be read.
@@ -150,7 +146,7 @@ pub fn read_equations(
     bytes: &[u8],
     symbols: &SymbolNames,
     known: &[String],
-) -> Result<Sections, ImportError> {
+) -> Read<Sections> {
     let read = sections(file, format, bytes, symbols, known)?;
     for equation in read.sections.iter().flat_map(|section| &section.equations) {
         // Each in a pool of its own: only faults are wanted.
@@ -164,7 +160,7 @@ fn finish(
     mut report: ImportReport,
     digest: &[u8],
     options: &ImportOptions,
-) -> Result<Imported, ImportError> {
+) -> Read<Imported> {
     report.state_dim = parts.state_dim();
     let model = build(&report.file, parts, provenance(&report, digest), options)?;
     report.latent_dim = model.latent_dim();
@@ -180,17 +176,13 @@ fn provenance(report: &ImportReport, digest: &[u8]) -> Map<String, Value> {
         let value = json!({ "tensor": used.tensor, "layout": used.layout });
         (used.role.clone(), value)
     });
-    let entries = [
-        ("imported_from", json!(name)),
-        ("format", json!(report.format)),
-        ("sha256", json!(hex(digest))),
-        ("romc", json!(env!("CARGO_PKG_VERSION"))),
-        ("tensors", Value::Object(tensors.collect())),
-    ];
-    let entries = entries.map(|(key, value)| (key.to_owned(), value));
-    let mut entries = Map::from_iter(entries);
-    if report.used.is_empty() {
-        entries.remove("tensors");
+    let mut entries = Map::new();
+    entries.insert("imported_from".to_owned(), json!(name));
+    entries.insert("format".to_owned(), json!(report.format));
+    entries.insert("sha256".to_owned(), json!(hex(digest)));
+    entries.insert("romc".to_owned(), json!(env!("CARGO_PKG_VERSION")));
+    if !report.used.is_empty() {
+        entries.insert("tensors".to_owned(), Value::Object(tensors.collect()));
     }
     entries
 }
@@ -200,7 +192,7 @@ fn build(
     parts: Parts,
     provenance: Map<String, Value>,
     options: &ImportOptions,
-) -> Result<ReducedModel, ImportError> {
+) -> Read<ReducedModel> {
     let (encoder, decoder) = (parts.encoder, parts.decoder);
     let map = (encoder.as_ref().map(|_| "an encoder")).or(decoder.as_ref().map(|_| "a decoder"));
     if let (Some(map), None) = (map, &parts.scaling) {

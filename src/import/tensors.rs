@@ -1,15 +1,12 @@
 //! Named arrays of numbers: in a foreign file, whatever its container, or in memory.
 //!
-//! NumPy's `.npz`: a zip file of `.npy` arrays.
-//!
-//! Only headers are read until an array is asked for, and then no more bytes are unpacked than its header announces: a
-//! small file cannot fill the memory. An array is `\x93NUMPY`, two bytes of the version (1 to 3), the length of the
-//! rest (2 or 4 bytes, little endian), and a Python dictionary: `{'descr': '<f8', 'fortran_order': False, 'shape': (18,
-//! 4), }`.
+//! Headers are read first, and later no more bytes than they announce: a small file cannot fill the memory. In an npz,
+//! a zip file, an array is `\x93NUMPY`, two bytes of the version (1 to 3), the length of the rest (2 or 4 bytes, little
+//! endian), and a Python dictionary: `{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }`.
 
 use std::borrow::Cow;
 use std::fmt::Display;
-use std::io::{self, Cursor, Read};
+use std::io::{self, Cursor, Read as _};
 
 use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensors};
@@ -17,8 +14,8 @@ use sha2::digest::Output;
 use sha2::{Digest as _, Sha256};
 use zip::ZipArchive;
 
-use super::ImportError;
 use super::run::{damaged, too_large};
+use super::{ImportError, Read};
 use crate::files::Place;
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
@@ -67,11 +64,13 @@ impl TensorInfo {
     }
 
     fn index_of(&self, mut position: usize) -> Vec<usize> {
-        let mut index = vec![0; self.shape.len()];
-        for step in 0..index.len() {
-            let axis = match self.is_column_major {
-                true => step,
-                false => index.len() - 1 - step,
+        let rank = self.shape.len();
+        let mut index = vec![0; rank];
+        for step in 0..rank {
+            let axis = if self.is_column_major {
+                step
+            } else {
+                rank - 1 - step
             };
             index[axis] = position % self.shape[axis];
             position /= self.shape[axis];
@@ -93,7 +92,7 @@ impl TensorInfo {
 }
 
 /// The bytes of a tensor's numbers, so many.
-type Bytes<'b> = dyn Fn(&TensorInfo, usize) -> Result<Cow<'b, [u8]>, ImportError> + 'b;
+type Bytes<'b> = dyn Fn(&TensorInfo, usize) -> Read<Cow<'b, [u8]>> + 'b;
 
 /// A file of tensors: their descriptions, and their numbers, which are read one tensor at a time.
 pub(super) struct TensorFile<'b> {
@@ -108,7 +107,7 @@ impl<'b> TensorFile<'b> {
         file: &str,
         mut infos: Vec<TensorInfo>,
         bytes: Box<Bytes<'b>>,
-    ) -> Result<TensorFile<'b>, ImportError> {
+    ) -> Read<TensorFile<'b>> {
         infos.sort_by(|a, b| a.name.cmp(&b.name));
         if let Some(pair) = infos.windows(2).find(|pair| pair[0].name == pair[1].name) {
             let (place, found) = (format!("`{}`", pair[0].name), "two tensors of this name");
@@ -145,14 +144,13 @@ impl<'b> TensorFile<'b> {
         self.refused(Place::Whole, found, expected)
     }
 
-    /// The numbers of a tensor for one use, which `place` names in errors; all are finite, and as many as the matrix
-    /// has.
+    /// The numbers of a tensor, all finite, as many as the matrix has; `place` names its use in errors.
     pub(super) fn read(
         &self,
         info: &TensorInfo,
         (rows, columns): (usize, usize),
         place: impl Fn(&[usize]) -> Place,
-    ) -> Result<DMatrix<f64>, ImportError> {
+    ) -> Read<DMatrix<f64>> {
         let (element, size) = (&info.element.0, info.element.1);
         if size == 0 {
             let found = format!("numbers of type {element}");
@@ -178,10 +176,7 @@ impl<'b> TensorFile<'b> {
 }
 
 /// Opens a file; offsets and lengths of its tensors are checked against the file.
-pub(super) fn open_safetensors<'b>(
-    file: &str,
-    bytes: &'b [u8],
-) -> Result<TensorFile<'b>, ImportError> {
+pub(super) fn open_safetensors<'b>(file: &str, bytes: &'b [u8]) -> Read<TensorFile<'b>> {
     let (header, metadata) = SafeTensors::read_metadata(bytes)
         .map_err(|error| damaged(file, "safetensors", &error.to_string()))?;
     let tensors = metadata.tensors().into_iter();
@@ -202,10 +197,7 @@ pub(super) fn open_safetensors<'b>(
 }
 
 /// Opens arrays as a file of tensors; `source` names them in errors.
-pub(super) fn open_arrays<'t>(
-    source: &str,
-    tensors: &'t [Tensor<'t>],
-) -> Result<TensorFile<'t>, ImportError> {
+pub(super) fn open_arrays<'t>(source: &str, tensors: &'t [Tensor<'t>]) -> Read<TensorFile<'t>> {
     let info = |(member, tensor): (usize, &Tensor<'_>)| {
         let expected = tensor.shape.iter().product::<usize>();
         if tensor.values.len() != expected {
@@ -258,7 +250,7 @@ const MAX_RANK: usize = 32;
 
 type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 
-pub(super) fn open_npz<'b>(file: &str, bytes: &'b [u8]) -> Result<TensorFile<'b>, ImportError> {
+pub(super) fn open_npz<'b>(file: &str, bytes: &'b [u8]) -> Read<TensorFile<'b>> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged_npz(file, e))?;
     if archive.has_duplicate_names() {
         return Err(damaged_npz(file, "two arrays of one name"));
@@ -280,11 +272,7 @@ fn damaged_npz(file: &str, error: impl Display) -> ImportError {
     damaged(file, "npz", &error.to_string())
 }
 
-fn describe(
-    file: &str,
-    archive: &mut Archive<'_>,
-    member: usize,
-) -> Result<Option<TensorInfo>, ImportError> {
+fn describe(file: &str, archive: &mut Archive<'_>, member: usize) -> Read<Option<TensorInfo>> {
     let mut entry = archive.by_index(member).map_err(|e| damaged_npz(file, e))?;
     let name = entry.name().map_err(|e| damaged_npz(file, e))?.into_owned();
     let Some(name) = name.strip_suffix(".npy") else {
@@ -300,12 +288,7 @@ fn describe(
     }
 }
 
-fn numbers(
-    file: &str,
-    bytes: &[u8],
-    info: &TensorInfo,
-    length: usize,
-) -> Result<Cow<'static, [u8]>, ImportError> {
+fn numbers(file: &str, bytes: &[u8], info: &TensorInfo, length: usize) -> Read<Cow<'static, [u8]>> {
     let refused = |found: String| {
         let place = format!("`{}`", info.name);
         let expected = "as many bytes as its shape and type need";
@@ -328,7 +311,7 @@ fn numbers(
 }
 
 /// The description in an array's header, without name and member; else what was found and expected.
-fn read_header(reader: &mut impl Read) -> Result<TensorInfo, (String, &'static str)> {
+fn read_header(reader: &mut impl io::Read) -> Result<TensorInfo, (String, &'static str)> {
     let io = |error: io::Error| (error.to_string(), "a readable .npy array");
     let mut fixed = [0; 8];
     reader.read_exact(&mut fixed).map_err(io)?;

@@ -9,7 +9,7 @@ use super::*;
 use crate::artifact;
 use crate::equations::{Equations, PhaseEquations};
 use crate::typeset::latex::tex_cases;
-use crate::typeset::mathml::{Html, HtmlProse, HtmlText, system};
+use crate::typeset::mathml::{HTML, HtmlProse, HtmlText, system};
 use crate::typeset::words::{feet, rounding};
 use crate::typeset::{EquationSystem, Rounding, SymbolTable, Typeset, TypesetError, rendered};
 
@@ -38,7 +38,7 @@ pub(crate) fn page(
         tiles: tiles(content),
         remarks: &content.assessment.remarks,
         phases: typeset.systems.iter().zip(equations.phases()).collect(),
-        rounding: rounding::<Html>(Rounding::default(), &typeset.rounding),
+        rounding: rounding(&HTML, Rounding::default(), &typeset.rounding),
         jumps: &figures.jumps,
         rest: content.assessment.runs.len() - figures.jumps.len(),
         sections: sections(content, figures, options),

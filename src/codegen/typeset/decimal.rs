@@ -1,6 +1,4 @@
-//! Numbers as they are printed: how many digits, and what that costs.
-//!
-//! Coefficients before terms, with a record of what rounding changed.
+//! Numbers as they are printed, and coefficients before terms with a record of what rounding changed.
 
 use std::fmt;
 
@@ -13,8 +11,7 @@ use super::tree::{Signed, Symbol};
 /// How coefficients are rounded for print.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rounding {
-    /// The paper's two decimals, with more for coefficients that would be off by over 5 %: every coefficient of 0.1 and
-    /// above has exactly two. Never rounds a term away.
+    /// The paper's two decimals, or more where a coefficient would be off by over 5 %. Never rounds a term away.
     #[default]
     Adaptive,
     /// Exactly this many places after the point, as the paper prints; small coefficients can vanish.
@@ -60,8 +57,7 @@ impl Decimal {
         Self::plain(value as f64, value.unsigned_abs().to_string())
     }
 
-    /// `value` rounded for print; the exact binary value is rounded, ties to even. More than 40 digits are taken as 40,
-    /// and more digits than asked where fewer would round to a number beyond the range of floats.
+    /// `value` rounded to at most 40 digits, ties to even; more digits than asked where fewer would leave the floats.
     pub fn rounded(value: f64, rounding: Rounding) -> Self {
         match rounding {
             Rounding::Exact => Self::exact(value),
@@ -188,8 +184,7 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// A coefficient in full, the phase, output (`ddz1`) and left side of its equation, and its candidate term as the
-/// library spells it and laid out.
+/// A coefficient with its equation and its candidate term, as the library spells it and laid out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Occurrence {
     pub phase: String,
@@ -223,8 +218,7 @@ pub(super) struct Rounder {
 /// Share of the coefficients that need every decimal from which a model counts as rounded to them.
 const ROUNDED_SHARE: f64 = 0.6;
 
-/// Whether a whole number among `coefficients` is one exactly: not where it could as well be a rounded one, because
-/// digits were asked for or because the model itself was rounded.
+/// Whether whole numbers among `coefficients` are exact, not rounded by request or in the model itself.
 fn are_whole_exact(rounding: Rounding, coefficients: impl Iterator<Item = f64>) -> bool {
     match rounding {
         Rounding::Significant(_) | Rounding::Exact => return true,
@@ -259,8 +253,7 @@ impl Rounder {
         }
     }
 
-    /// The equations of one phase out of `xi`, a row a term, a column an output, which has a symbol and a name for the
-    /// record.
+    /// The equations of a phase: `xi` has a row per term, a column per output.
     pub(super) fn system(
         &mut self,
         phase: &str,
@@ -268,56 +261,53 @@ impl Rounder {
         terms: &[(&str, Signed)],
         xi: &DMatrix<f64>,
     ) -> EquationSystem {
-        let equations = outputs.iter().zip(xi.column_iter());
-        let equations = equations.map(|((left, output), column)| {
+        let mut equations = Vec::with_capacity(outputs.len());
+        for ((left, output), column) in outputs.iter().zip(xi.column_iter()) {
             let entries = column.iter().zip(terms).filter(|(xi, _)| **xi != 0.0);
-            self.equation(phase, left, output, entries)
-        });
+            let terms = entries.filter_map(|(xi, term)| self.term(phase, left, output, *xi, term));
+            equations.push(Equation {
+                terms: terms.collect(),
+                left: left.clone(),
+                is_approximate: false,
+            });
+        }
         EquationSystem {
-            equations: equations.collect(),
+            equations,
             phase: phase.to_owned(),
         }
     }
 
-    /// `left = sum of coefficient * term`; each term also as text, for the record.
-    fn equation<'a>(
+    /// A coefficient before its term, which also is a text for the record; nothing if it rounds to zero.
+    fn term(
         &mut self,
         phase: &str,
         left: &Symbol,
         output: &str,
-        entries: impl Iterator<Item = (&'a f64, &'a (&'a str, Signed))>,
-    ) -> Equation {
-        let mut terms = Vec::new();
-        for (&coefficient, (text, term)) in entries {
-            let place = || Occurrence {
-                phase: phase.to_owned(),
-                output: output.to_owned(),
-                term: (*text).to_owned(),
-                coefficient,
-                left: left.clone(),
-                math: term.clone(),
-            };
-            let printed = self.round(coefficient);
-            let report = &mut self.report;
-            report.active += 1;
-            let error = (printed.value() - coefficient).abs();
-            let largest = report.largest.as_ref().map_or(0.0, |(error, _)| *error);
-            if error > largest {
-                report.largest = Some((error, place()));
-            }
-            if printed.is_zero() {
-                report.dropped.push(place());
-                continue;
-            }
-            report.largest_relative = report.largest_relative.max(error / coefficient.abs());
-            // Only a true one: a rounded 1.00 says how well it is known.
-            let is_omitted = coefficient.abs() == 1.0 && self.is_exact;
-            terms.push(with_coefficient(&printed, is_omitted, term.clone()));
-        }
-        Equation {
+        coefficient: f64,
+        (text, term): &(&str, Signed),
+    ) -> Option<Signed> {
+        let place = || Occurrence {
+            phase: phase.to_owned(),
+            output: output.to_owned(),
+            term: (*text).to_owned(),
+            coefficient,
             left: left.clone(),
-            terms,
-            is_approximate: false,
+            math: term.clone(),
+        };
+        let printed = self.round(coefficient);
+        let report = &mut self.report;
+        report.active += 1;
+        let error = (printed.value() - coefficient).abs();
+        if error > report.largest.as_ref().map_or(0.0, |(error, _)| *error) {
+            report.largest = Some((error, place()));
         }
+        if printed.is_zero() {
+            report.dropped.push(place());
+            return None;
+        }
+        report.largest_relative = report.largest_relative.max(error / coefficient.abs());
+        // Only a true one: a rounded 1.00 says how well it is known.
+        let is_omitted = coefficient.abs() == 1.0 && self.is_exact;
+        Some(with_coefficient(&printed, is_omitted, term.clone()))
     }
 }

@@ -1,5 +1,4 @@
-//! From canonical expressions to the typeset tree: fractions, roots, parentheses and the order in which readers expect
-//! factors and terms.
+//! From canonical expressions to the typeset tree, with factors and terms in the order that readers expect.
 
 use crate::equations::Equations;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
@@ -12,7 +11,7 @@ use super::tree::{Glyph, Math, Signed};
 /// Lays out an expression over the variables of a latent model.
 ///
 /// # Panics
-/// If the expression has a symbol that is no variable of a latent model, such as `x`; libraries of models refuse these.
+/// If it has a symbol that is no such variable; libraries of models refuse these.
 pub fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signed {
     Layout { pool, symbols }.signed(expr)
 }
@@ -304,8 +303,7 @@ fn bare(math: Math) -> Math {
     }
 }
 
-/// Factors side by side, with a dot where digits or words would run together; dots among the factors, as a product that
-/// is extended has them, are set anew.
+/// Factors side by side, with a dot where digits or words would run together; other dots among them are dropped.
 fn product(factors: Vec<Math>) -> Math {
     let mut laid_out: Vec<Math> = Vec::with_capacity(factors.len());
     for factor in factors {

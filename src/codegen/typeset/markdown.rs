@@ -1,6 +1,4 @@
-//! Equations for READMEs and lab notebooks: a [`ReducedModel`](crate::model::ReducedModel) enters, `NAME.md` leaves,
-//! with its mathematics as GitHub and GitLab draw it. The formulas are those of the [`latex`](crate::typeset::latex)
-//! backend.
+//! Equations for READMEs and lab notebooks, with formulas as GitHub and GitLab draw them.
 
 use askama::Template;
 
@@ -9,10 +7,9 @@ use crate::files::{EmittedFile, is_invisible};
 use crate::typeset::latex::{tex, tex_cases, tex_symbol, tex_unit};
 use crate::typeset::page::{Page, rendered};
 use crate::typeset::words::{Spelling, code_point, ends_line};
-use crate::typeset::{Math, NumberStyle, PrintOptions, TypesetError};
+use crate::typeset::{NumberStyle, PrintOptions, TypesetError};
 
-/// The file `NAME.md`: each phase's equations in `math` fences, and the table of coefficients, as GitHub and GitLab
-/// show them.
+/// The file `NAME.md`: equations in `math` fences and the table of coefficients.
 ///
 /// # Errors
 /// [`TypesetError::Template`].
@@ -20,7 +17,7 @@ pub fn emit(
     equations: &Equations<'_>,
     options: &PrintOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
-    let page = Page::new::<Markdown>(equations, options);
+    let page = Page::new(equations, options, &MARKDOWN);
     let path = format!("{}.md", equations.model().identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
@@ -31,24 +28,16 @@ struct Document<'a> {
     page: Page<'a>,
 }
 
-struct Markdown;
-
-impl Spelling for Markdown {
-    fn text(text: &str) -> String {
-        markdown_text(text)
-    }
-
-    fn math(math: &Math, _: &str) -> String {
-        format!("$`{}`$", tex(math, NumberStyle::Plain))
-    }
-}
+const MARKDOWN: Spelling = Spelling {
+    text: markdown_text,
+    math: |math, _| format!("$`{}`$", tex(math, NumberStyle::Plain)),
+};
 
 fn after_comma(unit: &Option<Unit>) -> String {
     unit.map_or(String::new(), |unit| format!(", $`{}`$", tex_unit(unit)))
 }
 
-/// Text from outside that Markdown shows as it is: punctuation is escaped, and control characters become spaces, so
-/// that a text cannot start a new line.
+/// Text from outside that Markdown shows as it is, in one line.
 ///
 /// ```
 /// use romc::typeset::markdown::markdown_text;

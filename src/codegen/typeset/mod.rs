@@ -1,9 +1,8 @@
 //! Equations laid out for print, before they have a spelling.
 //!
-//! A [`ReducedModel`](crate::model::ReducedModel) enters; a [`Typeset`] leaves: one [`EquationSystem`] a phase, made of
-//! [`Math`] trees in which fractions, roots, parentheses, signs and rounded coefficients have their final place.
-//! [`latex`], [`markdown`] and [`mathml`] spell the same trees. Read `tree` first, then `expression` (from the algebra
-//! to the tree) and `equations`.
+//! A model enters; a [`Typeset`] leaves: one [`EquationSystem`] a phase, of [`Math`] trees with all parentheses, signs
+//! and rounded coefficients in place, which [`latex`], [`markdown`] and [`mathml`] spell. Read `tree` first, then
+//! `expression` and `equations`.
 
 mod decimal;
 mod equations;

@@ -11,7 +11,8 @@ use crate::equations::Equations;
 const WIDTH_EM: f64 = 44.0;
 
 pub(super) struct Page<'a> {
-    equations: &'a Equations<'a>,
+    pub equations: &'a Equations<'a>,
+    pub spelling: &'a Spelling,
     pub typeset: Typeset,
     pub rounding: String,
     width_em: f64,
@@ -20,27 +21,21 @@ pub(super) struct Page<'a> {
 }
 
 impl<'a> Page<'a> {
-    pub(super) fn new<S: Spelling>(
+    pub(super) fn new(
         equations: &'a Equations<'a>,
         options: &'a PrintOptions,
+        spelling: &'a Spelling,
     ) -> Self {
         let typeset = Typeset::new(equations, &options.symbols, options.rounding);
         Self {
             equations,
-            rounding: words::rounding::<S>(options.rounding, &typeset.rounding),
+            spelling,
+            rounding: words::rounding(spelling, options.rounding, &typeset.rounding),
             typeset,
             width_em: options.width_em.unwrap_or(WIDTH_EM),
             digest: options.digest.as_deref(),
             version: env!("CARGO_PKG_VERSION"),
         }
-    }
-
-    pub(super) fn name(&self) -> &str {
-        self.equations.model().name()
-    }
-
-    pub(super) fn description(&self) -> &str {
-        self.equations.model().description()
     }
 
     /// Name, feet and equations of each phase.

@@ -1,5 +1,4 @@
-//! The model in robot coordinates: what the latent coordinates are made of, and the accelerations of the robot that the
-//! latent dynamics mean.
+//! The model in robot coordinates: the rows of the encoder, and the accelerations that the latent dynamics mean.
 
 use std::collections::BTreeSet;
 
@@ -31,8 +30,7 @@ pub struct RobotTypeset {
 }
 
 impl RobotTypeset {
-    /// Lays out a model in robot coordinates; `None` for a model without encoder, decoder, scaling or names of its
-    /// state.
+    /// Lays out a model; `None` without encoder, decoder, scaling or names of its state.
     ///
     /// # Errors
     /// [`TypesetError::NotFinite`] if a coefficient is too large for a float in SI units.

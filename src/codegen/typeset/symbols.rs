@@ -1,6 +1,4 @@
-//! How the model's variables are written: `z1` as z with subscript 1, or renamed.
-//!
-//! What a user can choose about printed equations, and why they cannot be printed.
+//! How the model's variables are written, and what else a user can choose about printed equations.
 
 use std::collections::BTreeMap;
 
@@ -29,17 +27,13 @@ impl SymbolTable {
     /// Reads entries `VARIABLE=NAME` for a model of `latent_dim` coordinates.
     ///
     /// # Errors
-    /// [`RenameError`] for an entry that is malformed, names no variable of the model, or makes two variables look
-    /// alike.
+    /// [`RenameError`] for an entry that is malformed, names no variable, or makes two variables look alike.
     pub fn parse<S: AsRef<str>>(entries: &[S], latent_dim: usize) -> Result<Self, RenameError> {
         let mut table = Self::default();
-        for entry in entries {
-            table
-                .rename(entry.as_ref(), latent_dim)
-                .map_err(RenameError)?;
-        }
-        table.check_distinct(latent_dim).map_err(RenameError)?;
-        Ok(table)
+        let mut entries = entries.iter();
+        let renamed = entries.try_for_each(|entry| table.rename(entry.as_ref(), latent_dim));
+        let checked = renamed.and_then(|()| table.check_distinct(latent_dim));
+        checked.map(|()| table).map_err(RenameError)
     }
 
     fn rename(&mut self, entry: &str, latent_dim: usize) -> Result<(), String> {
@@ -189,9 +183,7 @@ pub enum NumberStyle {
     Siunitx,
 }
 
-/// How equations are printed, in LaTeX, Markdown and MathML alike.
-///
-/// The default reproduces the form of the paper's equations (25) and (26).
+/// How equations are printed; the default reproduces the form of the paper's equations (25) and (26).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PrintOptions {
     /// How coefficients are rounded.

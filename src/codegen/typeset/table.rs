@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use askama::Template;
+
 use super::decimal::finite_digits;
 use super::mathml::HtmlProse;
 use super::words::code_point;
@@ -182,24 +184,8 @@ impl Table {
 
     /// A `<table>` with the caption, if there is one.
     pub fn html(&self) -> String {
-        let caption = match self.caption.as_str() {
-            "" => String::new(),
-            caption => format!("<caption>{}</caption>\n", HtmlProse(caption)),
-        };
-        let header: String = (self.header().iter())
-            .map(|title| format!("<th scope=\"col\">{}</th>", HtmlProse(title)))
-            .collect();
-        let cell = |(column, cell): (usize, &String)| match column {
-            0 => format!("<th scope=\"row\">{}</th>", HtmlProse(cell)),
-            _ => format!("<td>{}</td>", HtmlProse(cell)),
-        };
-        let rows: String = (self.rows.iter())
-            .map(|row| row.iter().enumerate().map(cell).collect::<String>())
-            .map(|cells| format!("<tr>{cells}</tr>\n"))
-            .collect();
-        format!(
-            "<table>\n{caption}<thead><tr>{header}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table>"
-        )
+        let rendered = Html { table: self }.render();
+        rendered.expect("strings take all that is written")
     }
 
     /// Comma-separated values: names of the columns, then the rows; cells with commas, quotes or line ends are quoted.
@@ -214,6 +200,12 @@ impl Table {
             .map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n")
             .collect()
     }
+}
+
+#[derive(Template)]
+#[template(path = "mathml/table.askama", config = "templates/askama.toml")]
+struct Html<'a> {
+    table: &'a Table,
 }
 
 /// A table under construction, with a row for each item.

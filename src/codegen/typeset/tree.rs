@@ -1,17 +1,10 @@
-//! The typeset tree: mathematics as it is laid out, before it has a spelling.
-//!
-//! Estimated widths, and where a long equation is broken.
-//!
-//! Widths are in em of the surrounding text, from the metrics of Computer Modern: good to a few percent, which is all
-//! that line breaking needs.
+//! The typeset tree: mathematics as it is laid out, before it has a spelling, with its estimated width in em (metrics
+//! of Computer Modern, good to a few percent) and where a long equation is broken.
 
 use super::decimal::Decimal;
 use crate::symbolic::Function;
 
-/// One piece of laid-out mathematics.
-///
-/// Parentheses ([`Math::Group`]) and multiplication dots ([`Math::Dot`]) are already in place, and signs sit only in
-/// [`Signed`], so that a printer chooses spelling and nothing else.
+/// One piece of laid-out mathematics: parentheses, dots and signs are in place, a printer chooses spelling alone.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Math {
     /// A number without sign.
@@ -32,8 +25,7 @@ pub enum Math {
     Power(Box<Math>, Box<Math>),
     /// A root; no index means the square root.
     Root(Box<Math>, Option<u32>),
-    /// A function of one argument by its name, with an optional power on that; square roots and magnitudes have forms
-    /// of their own.
+    /// A function by its name, with an optional power on that; roots and magnitudes have forms of their own.
     Function(Function, Option<Box<Math>>, Box<Math>),
     /// The absolute value.
     Absolute(Box<Math>),
@@ -225,8 +217,8 @@ fn glyph_width(glyph: &Glyph) -> f64 {
     }
 }
 
-/// Splits `terms` into lines no wider than `available` em where that is possible: greedily, and only before a sign.
-/// `first` em of the first line and `indent` em of each further line are taken by what stands before the terms.
+/// Splits terms before signs into lines of `available` em, greedily; `first` em of the first line and `indent` em of
+/// others are taken.
 pub(crate) fn break_lines(
     terms: &[Signed],
     available: f64,
@@ -251,20 +243,4 @@ pub(crate) fn break_lines(
         lines.push(&terms[start..]);
     }
     lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::decimal::Decimal;
-    use super::*;
-
-    #[test]
-    fn break_lines_keeps_every_term_once_and_each_line_within_the_width_but_for_a_single_term() {
-        let terms = vec![Signed::plus(Math::Number(Decimal::exact(0.25))); 40];
-        let lines = break_lines(&terms, 20.0, 3.0, 2.0);
-        assert!(lines.len() > 1 && lines.concat() == terms);
-        assert!((lines.iter()).all(|line| 2.0 + OPERATOR + sum_width(line) <= 20.0 + 3.0));
-        assert_eq!(break_lines(&terms, 0.5, 0.0, 0.0).len(), 40);
-        assert!(break_lines(&[], 20.0, 0.0, 0.0).is_empty());
-    }
 }

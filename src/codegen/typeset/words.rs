@@ -10,30 +10,29 @@ use super::table::{rounded, rounded_up};
 use super::tree::{Math, Signed};
 
 /// How a sentence spells words from outside and mathematics.
-pub trait Spelling {
+#[derive(Debug)]
+pub struct Spelling {
     /// Text, so that it shows as it is.
-    fn text(text: &str) -> String;
-    /// Mathematics within a line or cell, which `text` spells in the library's syntax.
-    fn math(math: &Math, text: &str) -> String;
-    /// A number within a line or cell.
-    fn number(number: &Decimal) -> String {
-        Self::math(&Math::Number(number.clone()), &number.to_string())
+    pub text: fn(&str) -> String,
+    /// Mathematics within a line or cell, which the text spells in the library's syntax.
+    pub math: fn(&Math, &str) -> String,
+}
+
+impl Spelling {
+    pub(super) fn inline(&self, math: &Math) -> String {
+        (self.math)(math, "")
+    }
+
+    pub(super) fn number(&self, number: &Decimal) -> String {
+        (self.math)(&Math::Number(number.clone()), &number.to_string())
     }
 }
 
 /// The spelling of comments and terminals.
-#[derive(Clone, Copy, Debug)]
-pub struct Plain;
-
-impl Spelling for Plain {
-    fn text(text: &str) -> String {
-        text.to_owned()
-    }
-
-    fn math(_: &Math, text: &str) -> String {
-        text.to_owned()
-    }
-}
+pub const PLAIN: Spelling = Spelling {
+    text: str::to_owned,
+    math: |_, text| text.to_owned(),
+};
 
 /// Whether a character of a text from outside ends a line or is a control character.
 pub(super) fn ends_line(character: char) -> bool {
@@ -53,8 +52,7 @@ pub fn counted(count: usize, noun: &str) -> String {
     }
 }
 
-/// A front or rear pair of feet: the words for how many of it are on the ground, none where it does not matter, and
-/// whether they hold of no foot, of one, of both.
+/// Words for how many feet of a front or rear pair are down, and whether they hold of none, one, both.
 const PAIRS: [(&str, [bool; 3]); 5] = [
     ("", [true, true, true]),
     ("no {} foot", [true, false, false]),
@@ -76,8 +74,7 @@ pub fn feet(rule: &FeetRule) -> String {
 /// Patterns of feet by front and rear pair where that says the same, one by one otherwise.
 fn pairs(patterns: &[ContactFlags]) -> String {
     let is_meant = |[front, rear]: [[bool; 3]; 2]| {
-        (0..16u8).all(|bits| {
-            let feet: ContactFlags = std::array::from_fn(|foot| bits >> foot & 1 == 1);
+        FeetRule::all_patterns().all(|feet| {
             let down = |pair: &[bool]| pair.iter().filter(|down| **down).count();
             let holds = front[down(&feet[..2])] && rear[down(&feet[2..])];
             holds == patterns.contains(&feet)
@@ -112,7 +109,7 @@ fn by_name(pattern: &ContactFlags) -> String {
 }
 
 /// How coefficients were rounded and what it changed, in a few sentences.
-pub fn rounding<S: Spelling>(rule: Rounding, report: &RoundingReport) -> String {
+pub fn rounding(spelling: &Spelling, rule: Rounding, report: &RoundingReport) -> String {
     let rule = match rule {
         Rounding::Adaptive => format!(
             "Coefficients have {LEAST_DECIMALS} decimals, more where they would be off by over {} %.",
@@ -122,18 +119,18 @@ pub fn rounding<S: Spelling>(rule: Rounding, report: &RoundingReport) -> String 
         Rounding::Significant(digits) => format!("Coefficients have {digits} significant digits."),
         Rounding::Exact => "Coefficients are printed in full.".to_owned(),
     };
-    let rule = S::text(&rule);
+    let rule = (spelling.text)(&rule);
     let error = match &report.largest {
         None => "No coefficient is changed by rounding.".to_owned(),
         Some((error, place)) => format!(
             "The largest rounding error is {}, of the term {} of {} in phase {}; no printed \
              coefficient is off by more than {}{}",
-            S::number(&at_most(*error)),
-            summand::<S>(place),
-            S::math(&Math::Symbol(place.left.clone()), &place.output),
-            S::text(&place.phase),
-            S::number(&at_most(100.0 * report.largest_relative)),
-            S::text(" %.")
+            spelling.number(&at_most(*error)),
+            summand(spelling, place),
+            (spelling.math)(&Math::Symbol(place.left.clone()), &place.output),
+            (spelling.text)(&place.phase),
+            spelling.number(&at_most(100.0 * report.largest_relative)),
+            (spelling.text)(" %.")
         ),
     };
     let dropped = match report.dropped.len() {
@@ -147,15 +144,15 @@ pub fn rounding<S: Spelling>(rule: Rounding, report: &RoundingReport) -> String 
 }
 
 /// A coefficient with more digits than are printed, before its term.
-fn summand<S: Spelling>(place: &Occurrence) -> String {
+fn summand(spelling: &Spelling, place: &Occurrence) -> String {
     let coefficient = Decimal::exact(rounded(place.coefficient, 6));
-    let number = S::number(&coefficient);
+    let number = spelling.number(&coefficient);
     match &place.math {
         Signed {
             math: Math::Number(one),
             ..
         } if one.is_one() => number,
-        term => number + " " + &S::math(&term.clone().into_math(), &place.term),
+        term => number + " " + &(spelling.math)(&term.clone().into_math(), &place.term),
     }
 }
 

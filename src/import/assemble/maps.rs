@@ -1,15 +1,12 @@
-//! Encoder and decoder from the tensors of their layers; a linear map is a single layer.
-//!
-//! Units and order of the robot's coordinates: scale factors, means that training took off, and the order in which the
-//! file has them.
+//! Encoder and decoder from the tensors of their layers, with scale factors, means and the order of coordinates.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::super::ImportError;
 use super::super::assign::Assigned;
 use super::super::options::WeightVectors;
 use super::super::role::{Part, Role, without_tensorflow_end};
 use super::super::run::Layout;
+use super::super::{ImportError, Read};
 use super::{Assembly, Known, Parts, text_or};
 use crate::files::Place;
 use crate::model::{Activation, AffineMap, Layer, ScaleFactors, Scaling, StateMap};
@@ -21,7 +18,7 @@ const LARGEST_CHANGE: f64 = 0.5;
 type Tensors<'a> = (&'a Assigned<'a>, Option<&'a Assigned<'a>>);
 
 impl<'a> Assembly<'a, '_> {
-    pub(super) fn maps(&mut self) -> Result<(Option<StateMap>, Option<StateMap>), ImportError> {
+    pub(super) fn maps(&mut self) -> Read<(Option<StateMap>, Option<StateMap>)> {
         let maps = (self.map(Part::Encoder)?, self.map(Part::Decoder)?);
         let is_deep = |map: &StateMap| map.layers().len() > 1;
         if let Some(activation) = self.options.activation
@@ -52,7 +49,7 @@ impl<'a> Assembly<'a, '_> {
     }
 
     /// How much `encode(decode(z))` changes steps from `z = 0` along each coordinate, relative to them.
-    fn change(&self, encoder: &StateMap, decoder: &StateMap) -> Result<f64, ImportError> {
+    fn change(&self, encoder: &StateMap, decoder: &StateMap) -> Read<f64> {
         let dim = decoder.input_dim();
         let change = |index: Option<usize>| {
             let z = DVector::from_fn(dim, |k, _| f64::from(Some(k) == index));
@@ -68,7 +65,7 @@ impl<'a> Assembly<'a, '_> {
         Ok((sum / dim as f64).sqrt())
     }
 
-    fn layers(&self, part: Part) -> Result<Vec<Tensors<'a>>, ImportError> {
+    fn layers(&self, part: Part) -> Read<Vec<Tensors<'a>>> {
         let mut layers: Vec<Tensors<'a>> = Vec::new();
         for assigned in &self.assignment.used {
             match assigned.role {
@@ -98,7 +95,7 @@ impl<'a> Assembly<'a, '_> {
     }
 
     /// Encoder or decoder: the activation after each layer but the last.
-    fn map(&mut self, part: Part) -> Result<Option<StateMap>, ImportError> {
+    fn map(&mut self, part: Part) -> Read<Option<StateMap>> {
         let tensors = self.layers(part)?;
         let part_name = part.name();
         let Some(last) = tensors.len().checked_sub(1) else {
@@ -145,9 +142,8 @@ impl<'a> Assembly<'a, '_> {
         Ok(Some(map))
     }
 
-    /// How the weights are stored: the way in which each layer takes what the one before gives, and `d <= n`
-    /// coordinates leave an encoder. Every shape but a square decides.
-    fn orientation(&mut self, part: Part, layers: &[Tensors<'_>]) -> Result<Layout, ImportError> {
+    /// How the weights are stored: so that layers fit each other and `d <= n` coordinates leave an encoder.
+    fn orientation(&mut self, part: Part, layers: &[Tensors<'_>]) -> Read<Layout> {
         let first = layers[0].0;
         let shapes = layers.iter().map(|(assigned, _)| shape_of(part, assigned));
         let shapes: Vec<(usize, usize)> = shapes.collect::<Option<_>>().unwrap_or_default();
@@ -159,17 +155,17 @@ impl<'a> Assembly<'a, '_> {
             Some(WeightVectors::Row) => &[Layout::Row],
             None => &[Layout::Column, Layout::Row],
         };
-        let known = |&layout| Some((layout, ends(part, &shapes, layout, self.known)?));
+        let known = |&layout| Some((layout, dims(part, &shapes, layout, self.known)?));
         let fitting: Vec<(Layout, Known)> = ways.iter().filter_map(known).collect();
+        let ends = if part == Part::Encoder {
+            "n to d"
+        } else {
+            "d to n"
+        };
         let expected = || match (layers, part) {
             ([_], _) => self.expected_weights(part, are_kernels),
             _ => format!(
-                "layers from {}, each taking the outputs of the one before, among {}",
-                if part == Part::Encoder {
-                    "n to d"
-                } else {
-                    "d to n"
-                },
+                "layers from {ends}, each taking the outputs of the one before, among {}",
                 described(layers)
             ),
         };
@@ -191,10 +187,8 @@ impl<'a> Assembly<'a, '_> {
             Part::Encoder => (d, n),
             Part::Decoder => (n, d),
         };
-        let (column, row) = (
-            format!("{outputs} x {inputs}"),
-            format!("{inputs} x {outputs}"),
-        );
+        let column = format!("{outputs} x {inputs}");
+        let row = format!("{inputs} x {outputs}");
         match self.options.weights {
             Some(WeightVectors::Column) => format!("{column} (--weights column){bound}"),
             Some(WeightVectors::Row) => format!("{row} (--weights row){bound}"),
@@ -227,7 +221,7 @@ fn shape_of(part: Part, assigned: &Assigned<'_>) -> Option<(usize, usize)> {
 }
 
 /// Latent and state dimension if the layers, stored in this way, are a chain that fits.
-fn ends(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> Option<Known> {
+fn dims(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> Option<Known> {
     // Numbers of inputs and outputs.
     let widths = shapes.iter().map(|&(rows, columns)| match layout {
         Layout::Row => (rows, columns),
@@ -252,7 +246,7 @@ fn ends(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> 
 
 impl<'a> Assembly<'a, '_> {
     /// Scale factors from tensors, or as given; in the file's order.
-    pub(super) fn scaling(&mut self) -> Result<Option<Scaling>, ImportError> {
+    pub(super) fn scaling(&mut self) -> Read<Option<Scaling>> {
         let state = self.one_of(&Role::StateScaling, &Role::StateStd)?;
         let input = self.one_of(&Role::InputScaling, &Role::InputStd)?;
         let given = self.options.input_scaling.clone();
@@ -284,11 +278,7 @@ impl<'a> Assembly<'a, '_> {
         Ok(Some(Scaling { state, input }))
     }
 
-    fn one_of(
-        &self,
-        factor: &Role,
-        deviation: &Role,
-    ) -> Result<Option<&'a Assigned<'a>>, ImportError> {
+    fn one_of(&self, factor: &Role, deviation: &Role) -> Read<Option<&'a Assigned<'a>>> {
         match (self.find(factor), self.find(deviation)) {
             (Some(_), Some(other)) => {
                 let found = format!("{deviation} beside {factor}");
@@ -298,7 +288,7 @@ impl<'a> Assembly<'a, '_> {
         }
     }
 
-    fn factors(&mut self, assigned: &Assigned<'_>) -> Result<ScaleFactors, ImportError> {
+    fn factors(&mut self, assigned: &Assigned<'_>) -> Read<ScaleFactors> {
         let is_deviation = matches!(assigned.role, Role::StateStd | Role::InputStd);
         let count: usize = assigned.info.shape.iter().product();
         let dim = match count {
@@ -322,9 +312,8 @@ impl<'a> Assembly<'a, '_> {
         })
     }
 
-    /// Takes the mean that the training subtracted into the biases: of `E(s (x - m))` and `D(z) / s + m` to `E'(s x)`
-    /// and `D'(z) / s`.
-    pub(super) fn fold_mean(&mut self, parts: &mut Parts) -> Result<(), ImportError> {
+    /// Takes the subtracted mean into the biases: of `E(s (x - m))` and `D(z) / s + m` to `E'(s x)` and `D'(z) / s`.
+    pub(super) fn fold_mean(&mut self, parts: &mut Parts) -> Read<()> {
         let Some(assigned) = self.find(&Role::StateMean) else {
             return Ok(());
         };
@@ -354,7 +343,7 @@ impl<'a> Assembly<'a, '_> {
         parts: &mut Parts,
         of_encoder: impl Fn(&AffineMap) -> (DMatrix<f64>, DVector<f64>),
         of_decoder: impl Fn(&AffineMap) -> (DMatrix<f64>, DVector<f64>),
-    ) -> Result<(), ImportError> {
+    ) -> Read<()> {
         let changed = |map: &StateMap, end: usize, (weights, bias)| {
             let mut layers = map.layers().to_vec();
             layers[end].map = AffineMap::new("layer", weights, bias)?;
@@ -373,7 +362,7 @@ impl<'a> Assembly<'a, '_> {
     }
 
     /// Brings everything that is over the robot's coordinates into the robot's order.
-    pub(super) fn sort(&mut self, parts: &mut Parts) -> Result<(), ImportError> {
+    pub(super) fn sort(&mut self, parts: &mut Parts) -> Read<()> {
         let Some(order) = &self.options.order else {
             return Ok(());
         };

@@ -1,6 +1,7 @@
 //! Derivatives with respect to time, however they are written, as dots.
 
-use super::reader::{FONTS, INVISIBLE, has};
+use super::reader::{FONTS, INVISIBLE};
+use super::token::has;
 use super::token::{Kind, Token, group_length};
 use super::variables::is_greek;
 
@@ -8,8 +9,7 @@ const MAX_DOTS: usize = 3;
 /// Longest group that is looked at: a variable or a differential.
 const MAX_GROUP: usize = 32;
 
-/// The tokens with `z_1''`, `z_1^{\prime\prime}` and `\frac{d^2 z_1}{dt^2}` or `\frac{d^2}{dt^2} z_1` written
-/// `\ddot{z_1}`; others stay. What is written anew stands at the place of its first token.
+/// The tokens with `z_1''`, `z_1^{\prime\prime}`, `\frac{d^2 z_1}{dt^2}`, `\frac{d^2}{dt^2} z_1` as `\ddot{z_1}`.
 pub(super) fn with_dots(tokens: &[Token]) -> Vec<Token> {
     with_each(&with_each(tokens, fraction), primed)
 }

@@ -1,34 +1,65 @@
-//! What TeX makes of a document before it prints: macros replaced, definitions followed, branches of conditionals
-//! chosen, text that is not printed left out.
+//! What TeX makes of a document before it prints: macros replaced, definitions held until their scope ends.
 
+use std::collections::HashMap;
 use std::rc::Rc;
 
-use super::super::ImportError;
-use super::reader::has;
-use super::scopes::{Macro, Meaning, Refusal, Scopes};
-use super::sections::is_one_of;
+use super::super::{ImportError, Read};
+use super::sections::{CASES, LAYOUTS, is_one_of};
 use super::token::{Kind, Lexer, Token};
 
 const MAX_EXPANDED: usize = 500_000;
-const VERBATIM: &str =
-    "verbatim Verbatim BVerbatim LVerbatim lstlisting minted comment filecontents";
-/// Environments that old documents begin by their commands: `\let\be\equation`.
-const BY_COMMAND: &str = "equation eqnarray displaymath";
-/// Commands whose argument takes room and prints nothing, and commands whose argument does not print.
-const PHANTOMS: &str = "phantom hphantom vphantom";
-const NOT_PRINTED: &str = "index typeout message hypersetup pdfbookmark nocite @gobble";
-/// Commands after which the text reads in another way than is followed here.
-const NOT_FOLLOWED: &str =
-    "globaldefs aftergroup afterassignment scantokens mathcode everymath everydisplay";
-const OTHER_FILES: &str = "input include subfile subfileinclude subinputfrom import subimport inputfrom includefrom \
-    InputIfFileExists @input";
+/// Environments whose rows are not divided into cells.
+const WITHOUT_CELLS: &str = "equation displaymath dmath dgroup";
+/// Environments with cells besides those that arrange equations.
+const WITH_CELLS: &str = "array tabular tabularx longtable matrix pmatrix bmatrix Bmatrix vmatrix Vmatrix smallmatrix \
+    subarray substack align";
+
+#[derive(Debug)]
+pub(super) struct Macro {
+    pub(super) parameters: usize,
+    /// The first argument, where it may be left out.
+    pub(super) default: Option<Vec<Token>>,
+    pub(super) body: Vec<Token>,
+    /// Whether mathematics may be in it.
+    pub(super) matters: bool,
+}
+
+/// Why something is not read, behind its name, and what would be.
+pub(super) type Refusal = (&'static str, &'static str);
+
+/// What a command means that the document defines.
+#[derive(Clone, Debug)]
+pub(super) enum Meaning {
+    Macro(Rc<Macro>),
+    /// The meaning that a command or character had when `\let` named it.
+    Same(Kind),
+    /// A definition that is not read, and whether mathematics may be in it.
+    Unread(Refusal, bool),
+    Verbatim,
+}
+
+/// A group, environment, formula or cell that is open.
+struct Scope {
+    opener: Token,
+    /// What ends it; nothing for a cell, which ends with its column, row or environment.
+    closer: Option<Kind>,
+    has_at_letters: bool,
+    /// The names that are defined until it ends.
+    names: Vec<String>,
+}
 
 pub(super) struct Expander<'t> {
     pub(super) file: &'t str,
     pub(super) lexer: Lexer<'t>,
     /// Tokens before those of the lexer, the next one last.
     pub(super) pending: Vec<Token>,
-    pub(super) scopes: Scopes,
+    /// Of each name its meanings, the current one last, and how many scopes were open around each.
+    meanings: HashMap<String, Vec<(usize, Meaning)>>,
+    open: Vec<Scope>,
+    /// How many scopes are open around the formula that is read.
+    formula: Option<usize>,
+    /// Whether something was defined for all the rest among the rows of a formula, which amsmath reads twice.
+    pub(super) has_changed_rows: bool,
     /// How many branches of conditionals are being read.
     pub(super) branches: usize,
     budget: usize,
@@ -44,7 +75,10 @@ impl<'t> Expander<'t> {
             file,
             lexer: Lexer::new(text),
             pending: tokens,
-            scopes: Scopes::default(),
+            meanings: HashMap::new(),
+            open: Vec::new(),
+            formula: None,
+            has_changed_rows: false,
             branches: 0,
             budget: MAX_EXPANDED,
             is_global: false,
@@ -53,42 +87,52 @@ impl<'t> Expander<'t> {
     }
 
     /// The next token that is printed, or opens or closes a group.
-    pub(super) fn next(&mut self) -> Result<Option<Token>, ImportError> {
+    pub(super) fn next(&mut self) -> Read<Option<Token>> {
         while let Some(token) = self.raw() {
-            let printed = match self.scopes.meaning(token.name()).cloned() {
+            let printed = match self.meaning(token.name()).cloned() {
                 Some(Meaning::Macro(found)) => self.expand(&token, &found).map(|()| None)?,
                 Some(Meaning::Unread(refusal, matters)) => self.unread(&token, refusal, matters)?,
-                Some(Meaning::Same(kind)) => self.primitive(token.with(kind))?,
+                Some(Meaning::Same(kind)) => self.command(token.with(kind))?,
                 // The end of an environment that the document defines, behind what its end printed.
                 _ if matches!(token.kind, Kind::End(_)) => {
-                    self.scopes.pass(self.file, &token)?;
+                    self.pass(&token)?;
                     None
                 }
-                Some(Meaning::Verbatim) | None => self.primitive(token)?,
+                Some(Meaning::Verbatim) | None => self.command(token)?,
             };
             if let Some(token) = printed {
                 (self.is_global, self.is_negated) = (false, false);
-                self.scopes.pass(self.file, &token)?;
+                self.pass(&token)?;
                 return Ok(Some(token));
             }
         }
         Ok(None)
     }
 
+    /// The tokens of a formula whose beginning was just read, up to its end or a token that `ends` it, which is passed.
+    pub(super) fn formula(&mut self, ends: fn(&Token) -> bool) -> Read<Option<Vec<Token>>> {
+        let around = self.open.iter().rposition(|scope| scope.closer.is_some());
+        let around = around.unwrap_or(0);
+        self.formula = Some(around);
+        let mut tokens = Vec::new();
+        while let Some(token) = self.next()? {
+            if self.open.len() <= around || ends(&token) {
+                self.leave_to(around);
+                self.formula = None;
+                return Ok(Some(tokens));
+            }
+            tokens.push(token);
+        }
+        Ok(None)
+    }
+
     pub(super) fn raw(&mut self) -> Option<Token> {
-        self.pending.pop().or_else(|| {
-            self.lexer.has_at_letters = self.scopes.has_at_letters;
-            self.lexer.next()
-        })
+        self.pending.pop().or_else(|| self.lexer.next())
     }
 
     pub(super) fn code(&mut self) -> Option<Token> {
-        loop {
-            let token = self.raw()?;
-            if !matches!(token.kind, Kind::Comment(_) | Kind::Paragraph) {
-                return Some(token);
-            }
-        }
+        let is_code = |token: &Token| !matches!(token.kind, Kind::Comment(_) | Kind::Paragraph);
+        std::iter::from_fn(|| self.raw()).find(is_code)
     }
 
     pub(super) fn takes(&mut self, wanted: &Kind) -> bool {
@@ -98,12 +142,14 @@ impl<'t> Expander<'t> {
         found
     }
 
-    pub(super) fn refuse<T>(
-        &self,
-        token: &Token,
-        why: &str,
-        expected: &str,
-    ) -> Result<T, ImportError> {
+    pub(super) fn is_brace_next(&mut self) -> bool {
+        let next = self.code();
+        let is_brace = next.as_ref().is_some_and(|token| token.kind == Kind::Open);
+        self.pending.extend(next);
+        is_brace
+    }
+
+    pub(super) fn refuse<T>(&self, token: &Token, why: &str, expected: &str) -> Read<T> {
         let found = format!("{}{why}", token.quoted());
         Err(ImportError::at(self.file, token.place, found, expected))
     }
@@ -114,13 +160,11 @@ impl<'t> Expander<'t> {
         token: &Token,
         (why, expected): Refusal,
         matters: bool,
-    ) -> Result<Option<Token>, ImportError> {
-        if self.scopes.formula.is_some() {
-            let found = format!("{}{why}", token.quoted());
-            return Ok(Some(token.with(Kind::Unread(found.into(), expected))));
-        }
-        match matters {
-            true => self.refuse(token, why, expected),
+    ) -> Read<Option<Token>> {
+        let found = || format!("{}{why}", token.quoted()).into();
+        match self.formula.is_some() {
+            true => Ok(Some(token.with(Kind::Unread(found(), expected)))),
+            false if matters => self.refuse(token, why, expected),
             false => Ok(None),
         }
     }
@@ -138,19 +182,13 @@ impl<'t> Expander<'t> {
         }
     }
 
-    pub(super) fn skip_group(&mut self) {
-        if self.takes(&Kind::Open) {
-            self.until(&Kind::Close);
-        }
-    }
-
     pub(super) fn optional(&mut self) -> Option<Vec<Token>> {
         let is_next = self.takes(&Kind::Character('['));
         is_next.then(|| self.until(&Kind::Character(']'))).flatten()
     }
 
     /// The tokens up to `end` outside of braces, which is passed.
-    fn until(&mut self, end: &Kind) -> Option<Vec<Token>> {
+    pub(super) fn until(&mut self, end: &Kind) -> Option<Vec<Token>> {
         let mut tokens = Vec::new();
         let mut depth = 0;
         loop {
@@ -166,8 +204,26 @@ impl<'t> Expander<'t> {
         }
     }
 
+    /// The groups that follow, behind at most so many other tokens; nothing is passed if there is none.
+    pub(super) fn following_groups(&mut self, most: usize) -> Option<Vec<Token>> {
+        let mut before = Vec::new();
+        while !self.is_brace_next() {
+            let token = self.code();
+            let is_last = before.len() == most || token.is_none();
+            before.extend(token);
+            if is_last {
+                self.pending.extend(before.into_iter().rev());
+                return None;
+            }
+        }
+        while self.is_brace_next() {
+            before.extend(self.argument().unwrap_or_default());
+        }
+        Some(before)
+    }
+
     /// Puts the body of a macro, with its arguments, before what comes next; it stands at the place of `token`.
-    fn expand(&mut self, token: &Token, found: &Rc<Macro>) -> Result<(), ImportError> {
+    fn expand(&mut self, token: &Token, found: &Macro) -> Read<()> {
         let mut arguments = Vec::with_capacity(found.parameters);
         if let Some(default) = &found.default {
             arguments.push(self.optional().unwrap_or_else(|| default.clone()));
@@ -179,11 +235,11 @@ impl<'t> Expander<'t> {
             };
             arguments.push(argument);
         }
-        let before = self.pending.len();
+        let (before, place) = (self.pending.len(), token.place);
         let mut parts = found.body.iter().rev().peekable();
         let is_sign = |part: &&Token| part.kind == Kind::Character('#');
         while let Some(part) = parts.next() {
-            match &part.kind {
+            match part.kind {
                 // `##1` is the parameter of a definition inside.
                 Kind::Parameter(_) if parts.next_if(is_sign).is_some() => {
                     self.pending.push(part.clone());
@@ -192,13 +248,10 @@ impl<'t> Expander<'t> {
                     let argument = arguments.get(number.wrapping_sub(1)).into_iter().flatten();
                     self.pending.extend(argument.rev().cloned());
                 }
-                _ => {
-                    let place = token.place;
-                    self.pending.push(Token {
-                        place,
-                        ..part.clone()
-                    });
-                }
+                _ => self.pending.extend([Token {
+                    place,
+                    ..part.clone()
+                }]),
             }
             if self.pending.len() - before > self.budget {
                 break;
@@ -206,182 +259,128 @@ impl<'t> Expander<'t> {
         }
         let made = 1 + self.pending.len() - before;
         let Some(rest) = self.budget.checked_sub(made) else {
-            return self.refuse(
-                token,
-                ", a macro that expands without end",
-                "macros that end",
-            );
+            let why = ", a macro that expands without end";
+            return self.refuse(token, why, "macros that end");
         };
         self.budget = rest;
         Ok(())
     }
+}
 
-    fn primitive(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
-        let name = token.name();
-        match name {
-            "" => return Ok(Some(token)),
-            "begin" => return self.begin(token),
-            "end" => return self.end(token),
-            "label" => return Ok(Some(self.named(token, Kind::Label))),
-            "begingroup" | "endgroup" => self.scopes.pass(self.file, &token)?,
-            "bgroup" => return Ok(Some(token.with(Kind::Open))),
-            "egroup" => return Ok(Some(token.with(Kind::Close))),
-            "global" => self.is_global = true,
-            "unless" => self.is_negated = true,
-            "long" | "outer" | "protected" | "expandafter" | "protect" | "ensuremath" => {}
-            "textcolor" | "mathcolor" => {
-                self.optional();
-                self.argument();
-            }
-            "makeatletter" | "makeatother" => self.scopes.has_at_letters = name == "makeatletter",
-            "catcode" => return self.category(token).map(|()| None),
-            "csname" => {
-                let name = self.name_to("endcsname");
-                self.pending.push(token.with(Kind::Command(name)));
-            }
-            "verb" | "lstinline" if self.pending.is_empty() => self.lexer.skip_verb(),
-            "url" | "href" | "nolinkurl"
-                if self.lexer.rest.starts_with('{') && self.pending.is_empty() =>
-            {
-                self.lexer.skip_verb();
-            }
-            "endinput" => self.lexer.rest = self.lexer.line(),
-            "stop" | "bye" => self.stop(),
-            _ if has(NOT_FOLLOWED, name) => {
-                return self.refuse(&token, "", "definitions where they hold");
-            }
-            _ if has(OTHER_FILES, name) => {
-                let whole = format!("latexpand {} > whole.tex", self.file);
-                let expected = format!("the document in one file: {whole}");
-                return self.refuse(&token, ", which prints a file that is not read", &expected);
-            }
-            _ if has(PHANTOMS, name) => {
-                self.argument();
-                return Ok(Some(token.with(Kind::command(","))));
-            }
-            _ if has(NOT_PRINTED, name) => drop(self.argument()),
-            _ if has(BY_COMMAND, name) => {
-                return Ok(Some(token.with(Kind::Begin(name.to_owned()))));
-            }
-            _ => match name.strip_prefix("end") {
-                Some(name) if has(BY_COMMAND, name) => {
-                    return Ok(Some(token.with(Kind::End(name.to_owned()))));
-                }
-                _ if self.follows_definition(&token)? => {}
-                _ => return self.condition(token),
-            },
-        }
-        Ok(None)
+/// Scopes: definitions hold until the group, environment, formula or cell around them ends.
+impl Expander<'_> {
+    pub(super) fn meaning(&self, name: &str) -> Option<&Meaning> {
+        let found = self.meanings.get(name).filter(|_| !name.is_empty());
+        found?.last().map(|(_, meaning)| meaning)
     }
 
-    /// `\catcode`\@=11`, which makes `@` a letter; other characters stay what they are here.
-    fn category(&mut self, token: Token) -> Result<(), ImportError> {
-        self.takes(&Kind::Character('`'));
-        let is_at = |token: Token| token.is_command("@") || token.kind == Kind::Character('@');
-        if !self.code().is_some_and(is_at) {
-            let expected = "characters as LaTeX reads them; `\\makeatletter` for `@`";
-            return self.refuse(&token, "", expected);
+    /// Whether mathematics is read; unknown in a group inside a formula, which may be text.
+    pub(super) fn in_mathematics(&self) -> Option<bool> {
+        let Some(around) = self.formula else {
+            return Some(false);
+        };
+        let is_row = |scope: &Scope| scope.closer.is_none();
+        (self.open[around..].iter().skip(1).all(is_row)).then_some(true)
+    }
+
+    /// Gives a meaning to a name until the innermost scope ends, or behind `\global` for all the rest.
+    pub(super) fn define(&mut self, name: String, meaning: Meaning) {
+        let for_all = std::mem::take(&mut self.is_global);
+        let level = if for_all { 0 } else { self.open.len() };
+        let formula = &self.open[self.formula.unwrap_or(self.open.len())..];
+        self.has_changed_rows |= for_all && formula.iter().any(|scope| scope.closer.is_none());
+        let meanings = self.meanings.entry(name.clone()).or_default();
+        meanings.retain(|(earlier, _)| *earlier < level);
+        meanings.push((level, meaning));
+        if let (false, Some(scope)) = (for_all, self.open.last_mut()) {
+            scope.names.push(name);
         }
-        self.takes(&Kind::Character('='));
-        let [first, second] = ['1', '1'].map(|digit| self.takes(&Kind::Character(digit)));
-        self.takes(&Kind::Character('2'));
-        self.scopes.has_at_letters = first && second;
+    }
+
+    pub(super) fn enter(&mut self, opener: Token, closer: Option<Kind>) {
+        self.open.push(Scope {
+            opener,
+            closer,
+            has_at_letters: self.lexer.has_at_letters,
+            names: Vec::new(),
+        });
+    }
+
+    fn leave_to(&mut self, depth: usize) {
+        for scope in self.open.drain(depth.min(self.open.len())..).rev() {
+            self.lexer.has_at_letters = scope.has_at_letters;
+            for name in scope.names {
+                let meanings = self.meanings.entry(name).or_default();
+                meanings.pop_if(|(level, _)| *level > depth);
+            }
+        }
+    }
+
+    /// Opens and closes what a printed token opens and closes. What closes something else is refused, in a formula only
+    /// with `\begingroup`, which its reader does not see.
+    pub(super) fn pass(&mut self, token: &Token) -> Read<()> {
+        let innermost = self.open.last();
+        let is_open = innermost.is_some_and(|scope| scope.opener.kind == token.kind);
+        let in_cell = innermost.is_some_and(|scope| scope.closer.is_none());
+        let closer = match (&token.kind, token.name()) {
+            (Kind::Open, _) => Kind::Close,
+            (kind @ (Kind::Dollar | Kind::Display), _) if !is_open => kind.clone(),
+            (Kind::Begin(name), _) => Kind::End(name.clone()),
+            (_, "begingroup") => Kind::command("endgroup"),
+            (_, "[") => Kind::command("]"),
+            (_, "(") => Kind::command(")"),
+            (_, "left") if self.formula.is_some() => Kind::command("right"),
+            (_, "right") if self.formula.is_none() => return Ok(()),
+            (Kind::Close | Kind::End(_) | Kind::Dollar | Kind::Display, _)
+            | (_, "endgroup" | "]" | ")" | "right") => return self.leave(token),
+            (Kind::Align | Kind::Break, _) if in_cell => {
+                self.leave_to(self.open.len() - 1);
+                self.enter(token.clone(), None);
+                return Ok(());
+            }
+            _ => return Ok(()),
+        };
+        self.enter(token.clone(), Some(closer));
+        if matches!(&token.kind, Kind::Begin(name) if has_cells(name)) {
+            self.enter(token.clone(), None);
+        }
         Ok(())
     }
 
-    fn stop(&mut self) {
-        self.pending.clear();
-        self.lexer.rest = "";
-    }
-
-    /// Reads `{name}` behind a command and makes its kind of token of it.
-    fn named(&mut self, token: Token, kind: fn(String) -> Kind) -> Token {
-        match self.takes(&Kind::Open) {
-            true => {
-                let name = self.until(&Kind::Close).unwrap_or_default();
-                token.with(kind(spelled(&name)))
+    fn leave(&mut self, token: &Token) -> Read<()> {
+        let closes = |scope: &Scope| scope.closer.as_ref() == Some(&token.kind);
+        let is_group = |scope: &Scope| scope.opener.is_command("begingroup");
+        let place = self.open.iter().rposition(closes);
+        let innermost = self
+            .open
+            .iter()
+            .rev()
+            .find_map(|scope| Some((scope, scope.closer.as_ref()?)));
+        let is_left_to_reader = match (place, self.formula) {
+            (Some(place), Some(first)) => {
+                place >= first && !self.open[place..].iter().any(is_group)
             }
-            false => token,
-        }
-    }
-
-    /// Whether the document defines an environment with contents that are read.
-    fn is_environment(&self, name: &str) -> bool {
-        let meaning = self.scopes.meaning(name);
-        matches!(meaning, Some(Meaning::Macro(_) | Meaning::Unread(..)))
-    }
-
-    fn begin(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
-        let token = self.named(token, Kind::Begin);
-        let Kind::Begin(name) = &token.kind else {
-            return Ok(Some(token));
+            (None, Some(_)) => !token.is_command("endgroup"),
+            (_, None) => false,
         };
-        let is_verbatim = match self.scopes.meaning(name) {
-            None => is_one_of(VERBATIM, name),
-            Some(meaning) => matches!(meaning, Meaning::Verbatim),
-        };
-        if is_verbatim {
-            if !self.pending.is_empty() || !self.lexer.skip_verbatim(name) {
-                let expected = Kind::End(name.clone()).quoted();
-                return self.refuse(&token, " without its end", &expected);
-            }
-            return match name == "comment" && !self.lexer.line().trim().is_empty() {
-                true => {
-                    let expected = "`\\end{comment}` in a line of its own";
-                    self.refuse(&token, " with text behind its end", expected)
+        if !innermost.is_some_and(|(scope, _)| closes(scope)) && !is_left_to_reader {
+            let expected = match innermost {
+                Some((Scope { opener, .. }, closer)) => {
+                    let line = opener.place.0;
+                    format!("{} for {} in line {line}", closer.quoted(), opener.quoted())
                 }
-                false => Ok(None),
+                None => format!("what {} closes before it", token.quoted()),
             };
+            return self.refuse(token, "", &expected);
         }
-        if name == "lrbox" {
-            return self.refuse(&token, "", "text that is printed where it stands");
+        if let Some(place) = place {
+            self.leave_to(place);
         }
-        if self.is_environment(name) {
-            let end = Kind::End(name.clone());
-            self.pending.push(token.with(Kind::command(name)));
-            self.scopes.enter(token, Some(end));
-            return Ok(None);
-        }
-        Ok(Some(token))
-    }
-
-    fn end(&mut self, token: Token) -> Result<Option<Token>, ImportError> {
-        let token = self.named(token, Kind::End);
-        match &token.kind {
-            Kind::End(name) if name == "document" => {
-                self.stop();
-                Ok(None)
-            }
-            Kind::End(name) if self.is_environment(name) => {
-                let end = format!("end{name}");
-                let is_defined = self.scopes.meaning(&end).is_some();
-                let end = token.with(Kind::Command(end));
-                self.pending.push(token);
-                self.pending.extend(is_defined.then_some(end));
-                Ok(None)
-            }
-            _ => Ok(Some(token)),
-        }
-    }
-
-    /// What is spelled before the command `end`, which is passed.
-    pub(super) fn name_to(&mut self, end: &str) -> String {
-        let tokens = std::iter::from_fn(|| self.code().filter(|token| !token.is_command(end)));
-        spelled(&tokens.collect::<Vec<_>>())
+        Ok(())
     }
 }
 
-pub(super) fn spelled<'t>(tokens: impl IntoIterator<Item = &'t Token>) -> String {
-    let mut text = String::new();
-    for token in tokens {
-        if token.is_spaced && !text.is_empty() {
-            text.push(' ');
-        }
-        match &token.kind {
-            Kind::Command(name) => text.extend(["\\", name]),
-            Kind::Character(character) => text.push(*character),
-            kind => text.push_str(kind.quoted().trim_matches('`')),
-        }
-    }
-    text
+fn has_cells(name: &str) -> bool {
+    let mut lists = [LAYOUTS, CASES, WITH_CELLS].into_iter();
+    lists.any(|list| is_one_of(list, name)) && !is_one_of(WITHOUT_CELLS, name)
 }

@@ -3,8 +3,10 @@
 //! What is ambiguous in print is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash
 //! (`2/3z_1`, `z_1/2u_1`), a number after a variable. Nesting is limited, so the machine's stack is safe.
 
+use super::super::Read;
 use super::super::equations::Equation;
-use super::reader::{BARE, Last, Read, Reader, has};
+use super::reader::{BARE, Last, Reader};
+use super::token::has;
 use super::token::{Kind, Token};
 use super::variables::{Symbol, function};
 use crate::model::LatentVariable;
@@ -115,8 +117,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads terms with their signs up to something that ends a sum; where it `leads`, integers that begin a term are
-    /// coefficients.
+    /// Reads terms with their signs; where it `leads`, integers that begin a term are coefficients.
     pub(super) fn sum(&mut self, leads: bool) -> Read<()> {
         let mut is_first = true;
         loop {

@@ -14,8 +14,8 @@ const STRETCHES: [(&str, &str); 6] = [
     ("<script", "</script>"),
 ];
 
-/// Tokens of the displays (`math` fences, `$$`, `\[`) and of the mathematics in the lines (`$`, `\(`), with headings
-/// and the text around as comments. Code, comments, references and what stands before the text are passed over.
+/// Tokens of displays (`math` fences, `$$`, `\[`) and of mathematics in lines (`$`, `\(`), with headings and text as
+/// comments. Code, comments, references and metadata are passed over.
 pub(super) fn tokens(text: &str) -> Vec<Token> {
     let mut lines = text.lines().map(str::trim_end);
     let has_metadata = lines.next() == Some("---") && lines.next().is_some_and(|l| l.contains(':'));

@@ -5,10 +5,11 @@
 //! them, unless the only equations are in its lines; in a display that is read, whatever has no meaning here is an
 //! error.
 //!
-//! Read `token.rs` and `markdown.rs` (text to tokens), `expander.rs` with `definitions.rs`, `conditionals.rs` and
-//! `scopes.rs` (what of them is printed), `document.rs` (formulas), `derivatives.rs`, `sections.rs` (equations and
-//! phases), `reader.rs`, `digits.rs`, `expression.rs`, `variables.rs` and `numbers.rs` (one right side) in this order.
+//! Read `token.rs` and `markdown.rs` (text to tokens), `expander.rs` with `commands.rs` and `definitions.rs` (what of
+//! them is printed), `sections.rs` (displays, equations and phases), `derivatives.rs`, `reader.rs`, `expression.rs`,
+//! `variables.rs` and `numbers.rs` (one right side) in this order.
 
+mod commands;
 mod definitions;
 mod derivatives;
 mod expander;
@@ -16,7 +17,6 @@ mod expression;
 mod markdown;
 mod numbers;
 mod reader;
-mod scopes;
 mod sections;
 mod token;
 mod variables;

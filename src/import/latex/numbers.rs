@@ -1,13 +1,15 @@
 //! Numbers (literals, powers of ten, `\num`) and roots (`\sqrt{z_1}`, `\sqrt[3]{z_1}`).
 //!
-//! Numbers, of the digits that print next to each other.
-//!
 //! Braces, fonts and the ends of macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single
 //! digit as an argument (`x^12`, `\frac12`), the reader ends behind it, and so does the number.
 
+use std::ops::Range;
+
+use super::super::Read;
 use super::definitions::changes_digits;
 use super::expression::WORDS;
-use super::reader::{Digits, FONTS, INVISIBLE_WITH_ARGUMENT, Last, Read, Reader, has};
+use super::reader::{Digits, FONTS, INVISIBLE_WITH_ARGUMENT, Last, Reader};
+use super::token::has;
 use super::token::{Kind, Token};
 use super::variables::function;
 
@@ -15,8 +17,7 @@ use super::variables::function;
 const MAX_ODD_RADICAND: usize = 1000;
 
 impl Reader<'_> {
-    /// The literal of a number: a power of ten behind it goes into it, and an integer that the document has rounded
-    /// gets a point or an exponent, so that it counts as rounded.
+    /// The literal of a number with its power of ten; a rounded integer gets a point or an exponent.
     pub(super) fn literal(&mut self, text: &str, leads: bool) -> String {
         if let Some(exponent) = self.power_of_ten()
             && !text.contains(['e', 'E'])
@@ -56,15 +57,20 @@ impl Reader<'_> {
         self.at = ten.behind;
         self.takes(&Kind::Superscript).then_some(())?;
         let behind = self.after_argument(self.at);
-        let seen = (self.at..behind).filter(|at| !self.is_around[*at]);
-        let characters = seen.filter_map(|at| match &self.tokens[at].kind {
-            Kind::Open | Kind::Close => None,
-            Kind::Character(c) => Some(*c),
-            _ => Some('?'),
-        });
-        let text: String = characters.collect();
+        let text = self.characters(self.at..behind);
         self.at = behind;
         text.parse().ok()
+    }
+
+    /// The characters in a range, braces and fonts aside, and `?` for anything else.
+    pub(super) fn characters(&self, places: Range<usize>) -> String {
+        let characters = places.filter_map(|at| match &self.tokens[at].kind {
+            Kind::Open | Kind::Close | Kind::Comment(_) => None,
+            Kind::Command(name) if has(FONTS, name) => None,
+            Kind::Character(character) => Some(*character),
+            _ => Some('?'),
+        });
+        characters.collect()
     }
 
     pub(super) fn number(&mut self, expected: &str) -> Read<String> {
@@ -98,14 +104,7 @@ impl Reader<'_> {
         self.peek();
         let first = self.at;
         let behind = self.after_argument(first);
-        let parts = self.tokens[first..behind]
-            .iter()
-            .map(|token| match &token.kind {
-                Kind::Open | Kind::Close | Kind::Comment(_) => Some(String::new()),
-                Kind::Character(character) => Some(character.to_string()),
-                _ => None,
-            });
-        let text = parts.collect::<Option<String>>().unwrap_or_default();
+        let text = self.characters(first..behind);
         let text = text.replace(',', ".").replace(['d', 'D', 'E'], "e");
         let is_negative = text.starts_with('-');
         let digits = text.trim_start_matches(['-', '+']);
@@ -128,8 +127,7 @@ impl Reader<'_> {
         Ok(Last::Number)
     }
 
-    /// A root at its command. Even ones have no value below zero, as powers do not; odd ones are
-    /// `abs(x)^(1/3)*sign(x)`.
+    /// A root at its command. Even ones have no value below zero; odd ones are `abs(x)^(1/3)*sign(x)`.
     pub(super) fn root(&mut self, place: (usize, usize)) -> Read<Last> {
         self.at += 1;
         let index = self.index()?;

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::super::ImportError;
 use super::super::equations::Piece;
+use super::super::{ImportError, Read};
 use super::expression::{LeftSide, WORDS};
 use super::numbers::around_digits;
-use super::token::{Kind, Token};
+use super::token::{Kind, Token, has};
 use super::variables::SymbolNames;
 
 const MAX_DEPTH: usize = 60;
@@ -61,12 +61,6 @@ pub(super) struct Reader<'a> {
 }
 
 pub(super) const BARE: &str = "parentheses around the argument of the function before";
-
-pub(super) type Read<T> = Result<T, ImportError>;
-
-pub(super) fn has(list: &str, word: &str) -> bool {
-    list.split_whitespace().any(|known| known == word)
-}
 
 pub(super) fn is_blank(kind: &Kind) -> bool {
     match kind {

@@ -1,31 +1,28 @@
 //! From a document's displays to sections of equations: one per phase.
-//!
-//! The displays of a document as they are printed.
 
-use super::super::ImportError;
 use super::super::equations::{Section, Sections, complete, text_of};
+use super::super::{ImportError, Read};
 use super::derivatives::with_dots;
 use super::expander::Expander;
 use super::expression::LeftSide;
 use super::markdown;
 use super::numbers::without_operator_braces;
-use super::reader::{Digits, Reader, has};
+use super::reader::{Digits, Reader};
+use super::token::has;
 use super::token::{Kind, Token, group_length};
 use super::variables::SymbolNames;
 
 /// Environments that arrange lines only if whole equations are in them.
 const DISTINCTIONS: &str = "cases dcases array";
 
-/// Reads the equations of a document.
-///
-/// `known` are names of phases, which labels may end in; the phase of a comment `Phase NAME` (a heading in Markdown)
-/// goes before that of a label.
+/// Reads the equations of a document. Labels may end in `known` names of phases; comments `Phase NAME` and headings go
+/// before them.
 pub(in crate::import) fn read(
     file: &str,
     bytes: &[u8],
     names: &SymbolNames,
     known: &[String],
-) -> Result<Sections, ImportError> {
+) -> Read<Sections> {
     let text = text_of(file, bytes)?;
     let is_markdown = file.ends_with(".md") || file.ends_with(".markdown");
     let items = match is_markdown {
@@ -95,7 +92,7 @@ fn left_sides(
 }
 
 /// Refuses equations in the lines of the text for coordinates that no display has: they would be dropped.
-fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(), ImportError> {
+fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Read<()> {
     let equations = document.sections.iter().flat_map(|s| &s.equations);
     let known: Vec<usize> = equations.map(|equation| equation.output).collect();
     let is_other = |side: &LeftSide| side.output.is_some_and(|output| !known.contains(&output));
@@ -114,53 +111,52 @@ fn refuse_others_in_lines(document: &Document<'_>, items: &[Item]) -> Result<(),
     }
 }
 
-/// The tokens without `\begin` and `\end` of environments that arrange lines, and without the brace that `\left\{` puts
-/// before them.
-fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
+/// The tokens without environments that arrange lines and the brace that `\left\{` puts before them.
+fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
     let mut flat: Vec<Token> = Vec::with_capacity(tokens.len());
-    let mut open: Vec<(&Token, &str)> = Vec::new();
+    let mut open: Vec<&Token> = Vec::new();
     let refused = |token: &Token, why: &str, expected: &str| {
         let found = format!("{}{why}", token.quoted());
         Err(ImportError::at(file, token.place, found, expected))
     };
-    let kind = |at: usize| tokens.get(at).map(|token| &token.kind);
-    let mut at = 0;
-    while let Some(token) = tokens.get(at) {
-        at += 1;
+    let is_distinction = |token: &Token| matches!(&token.kind, Kind::Begin(name) | Kind::End(name) if is_one_of(DISTINCTIONS, name));
+    let mut rest = tokens;
+    while let Some((token, behind)) = rest.split_first() {
+        rest = behind;
         match &token.kind {
             Kind::Begin(name)
-                if is_layout(name)
-                    || is_one_of(DISTINCTIONS, name) && has_left_side(&tokens[at..], name) =>
+                if is_layout(name) || is_distinction(token) && has_left_side(rest, name) =>
             {
-                open.push((token, name.as_str()));
+                open.push(token);
                 if flat.len() >= 2 && flat[flat.len() - 2].is_command("left") {
                     flat.truncate(flat.len() - 2);
                 }
-                if kind(at) == Some(&Kind::Character('[')) {
+                if rest
+                    .first()
+                    .is_some_and(|next| next.kind == Kind::Character('['))
+                {
                     // A vertical position such as [t].
-                    at += 3;
+                    rest = &rest[rest.len().min(3)..];
                 }
-                if is_one_of(WITH_COLUMNS, name) && kind(at) == Some(&Kind::Open) {
-                    let rest = &tokens[at..];
-                    at += group_length(rest.iter()).unwrap_or(rest.len());
+                let is_group = rest.first().is_some_and(|next| next.kind == Kind::Open);
+                if is_group && is_one_of(WITH_COLUMNS, name) {
+                    rest = &rest[group_length(rest.iter()).unwrap_or(rest.len())..];
                 }
             }
             Kind::End(name)
                 if is_layout(name)
-                    || is_one_of(DISTINCTIONS, name)
-                        && open
-                            .last()
-                            .is_some_and(|(_, open)| is_one_of(DISTINCTIONS, open)) =>
+                    || is_distinction(token)
+                        && open.last().is_some_and(|open| is_distinction(open)) =>
             {
-                if open.pop().is_none_or(|(_, open)| open != name) {
+                if open
+                    .pop()
+                    .is_none_or(|open| open.kind != Kind::Begin(name.clone()))
+                {
                     let expected = "environments that end in the order in which they begin";
                     return refused(token, "", expected);
                 }
-                if tokens
-                    .get(at)
-                    .is_some_and(|token| token.is_command("right"))
-                {
-                    at += 2;
+                if rest.first().is_some_and(|next| next.is_command("right")) {
+                    rest = &rest[rest.len().min(2)..];
                 }
             }
             _ => flat.push(token.clone()),
@@ -168,21 +164,19 @@ fn flattened(file: &str, tokens: &[Token]) -> Result<Vec<Token>, ImportError> {
     }
     match open.first() {
         None => Ok(flat),
-        Some((token, _)) => {
+        Some(token) => {
             let expected = "environments that end inside their display";
             refused(token, " without its end", expected)
         }
     }
 }
 
-/// Whether an environment only arranges lines. `subequations` is none of [`LAYOUTS`], which begin displays: it holds
-/// displays, and text between them.
+/// Whether an environment only arranges lines; `subequations` holds displays and text between them.
 fn is_layout(name: &str) -> bool {
     is_one_of(LAYOUTS, name) || is_one_of("subequations", name)
 }
 
-/// Whether the environment of this name whose contents begin here has equations in it: it is then no matrix, and on no
-/// right side, where it would tell cases apart.
+/// Whether the environment whose contents begin here holds equations: it is then no matrix and no right side.
 fn has_left_side(contents: &[Token], name: &str) -> bool {
     let end = Kind::End(name.to_owned());
     let mut inside = contents.iter().take_while(|token| token.kind != end);
@@ -227,7 +221,7 @@ impl Document<'_> {
         }
     }
 
-    fn display(&mut self, tokens: &[Token], alone: bool) -> Result<(), ImportError> {
+    fn display(&mut self, tokens: &[Token], alone: bool) -> Read<()> {
         let Some(dotted) = tokens.iter().find(|token| token.is_command("ddot")) else {
             return Ok(());
         };
@@ -306,14 +300,13 @@ impl Document<'_> {
             .filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
     }
 
-    /// The section that an equation belongs to: the open one, or a new one where a comment or label names another
-    /// phase, or where the left side is there already.
+    /// The open section, or a new one for another phase or a left side that is there already.
     fn section(
         &mut self,
         output: usize,
         place: (usize, usize),
         label: Option<String>,
-    ) -> Result<&mut Section, ImportError> {
+    ) -> Read<&mut Section> {
         let starts_phase = std::mem::take(&mut self.starts_phase);
         let named = self.phase.clone().filter(|_| starts_phase);
         let has_phase = self.phase.is_some();
@@ -375,7 +368,7 @@ pub(super) fn is_one_of(list: &str, name: &str) -> bool {
 }
 
 /// Finds the displays of the tokens, and of the text behind them.
-pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Result<Vec<Item>, ImportError> {
+pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Read<Vec<Item>> {
     let mut expander = Expander::new(file, tokens, text);
     let mut items = Vec::new();
     while let Some(token) = expander.next()? {
@@ -384,7 +377,7 @@ pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Result<Vec<It
             (Kind::Begin(name), _) if name == "document" => begin_document(file, &mut items)?,
             (Kind::Begin(name), _) if is_one_of(LAYOUTS, name) || is_one_of(CASES, name) => {
                 if is_one_of(WITH_COLUMNS, name) {
-                    expander.skip_group();
+                    let _ = expander.is_brace_next() && expander.argument().is_some();
                 }
                 items.push(display(&mut expander, &token)?);
             }
@@ -398,7 +391,7 @@ pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Result<Vec<It
 }
 
 /// Only comments count of what stands before `\begin{document}`; equations there are refused.
-fn begin_document(file: &str, items: &mut Vec<Item>) -> Result<(), ImportError> {
+fn begin_document(file: &str, items: &mut Vec<Item>) -> Read<()> {
     for item in &*items {
         let (Item::Display(tokens) | Item::Inline(tokens)) = item else {
             continue;
@@ -414,19 +407,19 @@ fn begin_document(file: &str, items: &mut Vec<Item>) -> Result<(), ImportError> 
 }
 
 /// The tokens of the formula that `start` opened, up to its end, which is passed.
-fn display(expander: &mut Expander, start: &Token) -> Result<Item, ImportError> {
-    let Some(tokens) = formula(expander, |_| false)? else {
+fn display(expander: &mut Expander, start: &Token) -> Read<Item> {
+    let Some(tokens) = expander.formula(|_| false)? else {
         return expander.refuse(start, " without its end", "the end of the display");
     };
     match unread(&tokens) {
         Some((token, expected)) => expander.refuse(token, "", expected),
-        None => Ok(Item::Display(tokens)),
+        None => Ok(Item::Display(plain(tokens))),
     }
 }
 
-fn inline(expander: &mut Expander) -> Result<Option<Item>, ImportError> {
-    let tokens = formula(expander, |token| token.kind == Kind::Paragraph)?;
-    Ok(tokens.map(Item::Inline))
+fn inline(expander: &mut Expander) -> Read<Option<Item>> {
+    let tokens = expander.formula(|token| token.kind == Kind::Paragraph)?;
+    Ok(tokens.map(|tokens| Item::Inline(plain(tokens))))
 }
 
 /// The first token of what is not followed, and what could be there.
@@ -437,20 +430,6 @@ pub(super) fn unread(tokens: &[Token]) -> Option<(&Token, &'static str)> {
     })
 }
 
-fn formula(
-    expander: &mut Expander,
-    ends: fn(&Token) -> bool,
-) -> Result<Option<Vec<Token>>, ImportError> {
-    let around = expander.scopes.formula_around();
-    expander.scopes.formula = Some(around);
-    let mut tokens = Vec::new();
-    while let Some(token) = expander.next()? {
-        if expander.scopes.depth() <= around || ends(&token) {
-            expander.scopes.leave_to(around);
-            expander.scopes.formula = None;
-            return Ok(Some(with_dots(&without_operator_braces(tokens))));
-        }
-        tokens.push(token);
-    }
-    Ok(None)
+fn plain(tokens: Vec<Token>) -> Vec<Token> {
+    with_dots(&without_operator_braces(tokens))
 }

@@ -3,6 +3,16 @@
 use std::collections::VecDeque;
 
 const MINUS: char = '\u{2212}';
+const RAISED: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+const LOWERED: &str = "₀₁₂₃₄₅₆₇₈₉";
+/// Letters with dots above them in one character.
+const DOTTED: [(char, char, &str); 5] = [
+    ('ż', 'z', "dot"),
+    ('ẋ', 'x', "dot"),
+    ('ẏ', 'y', "dot"),
+    ('ẍ', 'x', "ddot"),
+    ('ÿ', 'y', "ddot"),
+];
 
 /// One token and where it starts: line and column, from 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,6 +116,26 @@ impl Token {
             _ => "",
         }
     }
+}
+
+/// Whether a word is one of a list.
+pub(super) fn has(list: &str, word: &str) -> bool {
+    list.split_whitespace().any(|known| known == word)
+}
+
+pub(super) fn spelled<'t>(tokens: impl IntoIterator<Item = &'t Token>) -> String {
+    let mut text = String::new();
+    for token in tokens {
+        if token.is_spaced && !text.is_empty() {
+            text.push(' ');
+        }
+        match &token.kind {
+            Kind::Command(name) => text.extend(["\\", name]),
+            Kind::Character(character) => text.push(*character),
+            kind => text.push_str(kind.quoted().trim_matches('`')),
+        }
+    }
+    text
 }
 
 /// How many tokens there are to the brace that closes the first, an opening one; none without.
@@ -290,32 +320,19 @@ impl<'t> Lexer<'t> {
     /// The tokens of a letter with dots above it.
     fn dotted(&mut self) -> Option<Vec<Kind>> {
         let first = self.peek(0)?;
-        let (letter, dots) = match first {
-            'ż' => ('z', "dot"),
-            'ẋ' => ('x', "dot"),
-            'ẏ' => ('y', "dot"),
-            'ẍ' => ('x', "ddot"),
-            'ÿ' => ('y', "ddot"),
-            _ => match self.peek(1)? {
-                '\u{307}' => (first, "dot"),
-                '\u{308}' => (first, "ddot"),
-                _ => return None,
-            },
-        };
-        let marks = if letter == first {
-            '\u{307}'.len_utf8()
-        } else {
-            0
+        let whole = DOTTED.iter().find(|(dotted, ..)| *dotted == first);
+        let (letter, dots, marks) = match (whole, self.peek(1)) {
+            (Some((_, letter, dots)), _) => (*letter, *dots, 0),
+            (None, Some('\u{307}')) => (first, "dot", '\u{307}'.len_utf8()),
+            (None, Some('\u{308}')) => (first, "ddot", '\u{308}'.len_utf8()),
+            _ => return None,
         };
         self.pass(first.len_utf8() + marks);
-        let dots = Kind::command(dots);
-        Some(vec![dots, Kind::Character(letter)])
+        Some(vec![Kind::command(dots), Kind::Character(letter)])
     }
 
     /// `²`, `⁻¹` and `₁₀` as powers and subscripts in braces.
     fn raised(&mut self) -> Option<Vec<Kind>> {
-        const RAISED: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹";
-        const LOWERED: &str = "₀₁₂₃₄₅₆₇₈₉";
         let first = self.peek(0)?;
         let (digits, kind) = match LOWERED.contains(first) {
             true => (LOWERED, Kind::Subscript),

@@ -1,12 +1,11 @@
-//! Functions with their arguments, and variables with dots and subscripts.
-//!
-//! How a document writes the model's variables.
+//! Functions with their arguments, variables with dots and subscripts, and how a document names them.
 
 use std::collections::BTreeMap;
 
-use super::super::ImportError;
-use super::reader::{BARE, FONTS, INVISIBLE, Last, Read, Reader, has};
+use super::super::{ImportError, Read};
+use super::reader::{BARE, FONTS, INVISIBLE, Last, Reader};
 use super::token::Kind;
+use super::token::has;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 
 pub(super) struct Symbol {
@@ -35,14 +34,7 @@ impl Reader<'_> {
             return None;
         }
         let close = self.closing[self.at + 1];
-        let word: String = (self.tokens[self.at + 2..close].iter())
-            .filter_map(|token| match &token.kind {
-                Kind::Character(letter) => Some(*letter),
-                Kind::Command(inner) if has(FONTS, inner) => None,
-                Kind::Open | Kind::Close => None,
-                _ => Some('?'),
-            })
-            .collect();
+        let word = self.characters(self.at + 2..close);
         let name = match word.as_str() {
             "e" if self.kind(close + 1) == Some(&Kind::Superscript) => {
                 return Some(("e".to_owned(), close + 2));
@@ -338,17 +330,12 @@ pub(super) fn is_greek(command: &str) -> bool {
 /// Why a name for a variable was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{entry}`: expected `VARIABLE=NAME`, such as `z1=x`, `z2=theta` or `u1=F_lin,x`, each variable and name once"
+    "`{0}`: expected `VARIABLE=NAME`, such as `z1=x`, `z2=theta` or `u1=F_lin,x`, each variable and name once"
 )]
-pub struct NameError {
-    /// The entry as given.
-    pub entry: String,
-}
+pub struct NameError(String);
 
-/// Names that a document gives to latent coordinates and inputs; `z_1` and `u_1` unless renamed.
-///
-/// A name is written as in `romc compile --rename`: a letter, word or Greek letter's name, with an optional subscript
-/// (`x`, `theta`, `F_lin,x`). Velocities follow their coordinate.
+/// Names that a document gives to latent coordinates and inputs, as in `romc compile --rename` (`x`, `theta`,
+/// `F_lin,x`); `z_1` and `u_1` unless renamed. Velocities follow their coordinate.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SymbolNames {
     names: BTreeMap<String, LatentVariable>,
@@ -358,14 +345,11 @@ impl SymbolNames {
     /// Reads entries `VARIABLE=NAME`.
     ///
     /// # Errors
-    /// [`NameError`] for an entry without `=`, with a left side other than `z1` to `z64` or `u1` and so on, or with a
-    /// variable or name that was given before.
+    /// [`NameError`] for an entry of another form or variable, or one that was given before.
     pub fn parse<S: AsRef<str>>(entries: &[S]) -> Result<Self, NameError> {
         let mut names = BTreeMap::new();
         for entry in entries.iter().map(AsRef::as_ref) {
-            let refused = || NameError {
-                entry: entry.to_owned(),
-            };
+            let refused = || NameError(entry.to_owned());
             let (left, right) = entry.split_once('=').ok_or_else(refused)?;
             let variable = LatentVariable::from_name(left.trim(), MAX_LATENT_DIM)
                 .filter(|variable| !matches!(variable, LatentVariable::Dz(_)))
@@ -384,9 +368,7 @@ impl SymbolNames {
         Ok(Self { names })
     }
 
-    /// The variable of a name as `Symbol` spells it: `z_1`, `F_lin,x`.
-    ///
-    /// `alone` allows `z` and `u` without a subscript, for the first of each.
+    /// The variable of a name such as `z_1` or `F_lin,x`; `alone` allows `z` and `u` for the first of each.
     pub(super) fn variable(&self, name: &str, alone: bool) -> Option<LatentVariable> {
         if let Some(variable) = self.names.get(name) {
             return Some(*variable);

@@ -1,6 +1,4 @@
 //! The files of the LaTeX backend.
-//!
-//! What each symbol of the equations means.
 
 use std::fmt;
 
@@ -10,29 +8,22 @@ use super::math::{
     self, Block, comment_text, label, tex, tex_number, tex_symbol, tex_text, tex_unit,
 };
 use super::table::{self, TableBlock};
-use crate::equations::Equations;
+use crate::equations::{Equations, Unit};
 use crate::files::EmittedFile;
 use crate::model::{Activation, Identifier, LatentVariable, ReducedModel, ScaleFactors, StateMap};
 use crate::typeset::decimal::RoundingReport;
-use crate::typeset::words::{self, Plain, Spelling};
+use crate::typeset::words::{self, Spelling};
 use crate::typeset::{
-    Decimal, EquationSystem, Form, Math, NumberStyle, PrintOptions, RobotTypeset, Rounding,
-    SymbolTable, Typeset, TypesetError, rendered,
+    Decimal, EquationSystem, Form, NumberStyle, PrintOptions, RobotTypeset, Rounding, Typeset,
+    TypesetError, rendered,
 };
 
 /// The LaTeX files of a model; NAME is its identifier:
 ///
-/// - `NAME.tex`: the equations of each phase, to be taken in by `\input`;
-/// - `NAME_PHASE.tex`: the same equations, one phase a file, to be placed one by one;
-/// - `NAME-table.tex`: the coefficients as booktabs tables;
-/// - `NAME-nomenclature.tex`: what the symbols mean;
-/// - `NAME-robot.tex`, if the model has encoder and decoder: what the latent coordinates
-///   are made of, and the accelerations of the robot, in SI units;
-/// - `NAME-preview.tex`: a document that shows them all, in two columns where the width asked for is
-///   at most `TWO_COLUMNS_EM`.
-///
-/// The first lines of `NAME.tex` say how coefficients were rounded, the largest error that this made, and which terms
-/// vanished by it. Files with labels list them.
+/// - `NAME.tex`: the equations of each phase, below how rounding changed them; `NAME_PHASE.tex`: those of one phase;
+/// - `NAME-table.tex`: the coefficients as booktabs tables; `NAME-nomenclature.tex`: what the symbols mean;
+/// - `NAME-robot.tex`, with encoder and decoder: the latent coordinates and robot accelerations in SI units;
+/// - `NAME-preview.tex`: a document that shows them all, in two columns for narrow equations.
 ///
 /// # Errors
 /// [`TypesetError`] if a coefficient is too large for a float in robot coordinates.
@@ -66,10 +57,8 @@ pub fn emit(
         blocks,
     };
     files.push(file(format!("{stem}-table.tex"), &coefficients)?);
-    let nomenclature = Document::Nomenclature {
-        header: header.short("A table as wide as the line; needs amsmath."),
-        entries: entries(system, &options.symbols, options.numbers),
-    };
+    let of_symbols = header.short("A table as wide as the line; needs amsmath.");
+    let nomenclature = nomenclature(system, of_symbols, options);
     files.push(file(format!("{stem}-nomenclature.tex"), &nomenclature)?);
     let is_physical = system.latent_units().is_some();
     if let Some(robot) = &robot {
@@ -84,7 +73,7 @@ pub fn emit(
         phases: (systems.iter().enumerate())
             .map(|(place, system)| (system.introduction.as_str(), model.phase_identifier(place)))
             .collect(),
-        rounding: words::rounding::<Tex>(options.rounding, &typeset.rounding),
+        rounding: words::rounding(&TEX, options.rounding, &typeset.rounding),
         siunitx: options.numbers == NumberStyle::Siunitx,
         two_columns: is_narrow(width_em),
         has_robot: robot.is_some(),
@@ -126,7 +115,20 @@ enum Document<'a> {
         blocks: Vec<TableBlock>,
     },
     #[template(path = "latex/nomenclature.askama")]
-    Nomenclature { header: String, entries: Vec<Entry> },
+    Nomenclature {
+        header: String,
+        /// Symbol, unit and meaning of each latent coordinate.
+        positions: Vec<(String, Option<String>, String)>,
+        velocities: String,
+        /// Symbol, unit and number of each input in physical units.
+        inputs: Vec<(String, String, usize)>,
+        all_inputs: String,
+        is_physical: bool,
+        /// The map of velocities: the weights of an affine encoder, the Jacobian of another.
+        map: Option<&'static str>,
+        layers: Option<String>,
+        factors: Vec<(char, String)>,
+    },
     #[template(path = "latex/preview.askama")]
     Preview {
         header: String,
@@ -151,17 +153,10 @@ pub(super) fn is_narrow(width_em: f64) -> bool {
 }
 
 /// Running text of LaTeX.
-struct Tex;
-
-impl Spelling for Tex {
-    fn text(text: &str) -> String {
-        tex_text(text)
-    }
-
-    fn math(math: &Math, _: &str) -> String {
-        format!("${}$", tex(math, NumberStyle::Plain))
-    }
-}
+const TEX: Spelling = Spelling {
+    text: tex_text,
+    math: |math, _| format!("${}$", tex(math, NumberStyle::Plain)),
+};
 
 struct System {
     comment: String,
@@ -248,7 +243,7 @@ impl Header<'_> {
             NumberStyle::Siunitx => "amsmath and siunitx",
         };
         let short = self.short(&format!("For \\input; needs {packages}."));
-        let rounding = words::rounding::<Plain>(self.options.rounding, report);
+        let rounding = words::rounding(&words::PLAIN, self.options.rounding, report);
         let dropped = report.dropped.iter().map(|term| {
             let names = [&term.phase, &term.output, &term.term].map(|name| comment_text(name));
             let ([phase, output, text], xi) = (names, term.coefficient);
@@ -275,97 +270,56 @@ fn file(path: String, template: &Document<'_>) -> Result<EmittedFile, TypesetErr
 const STRONGEST: usize = 3;
 /// Weights below this share of the row's largest are not named.
 const NEGLIGIBLE: f64 = 0.1;
-/// One line of the list of symbols as LaTeX: the symbol, in dollars, and what it is.
-pub(super) type Entry = (String, String);
 
-fn entry(symbol: impl Into<String>, meaning: impl Into<String>) -> Entry {
-    (symbol.into(), meaning.into())
-}
-
-const ROBOT_STATE: &str = r"$\mathbf{x}$, $\mathbf{u}$";
-const ENCODER: &str = r"$\mathbf{W}_e$, $\mathbf{b}_e$";
-
-pub(super) fn entries(
+/// The list of symbols with what each means.
+fn nomenclature<'a>(
     system: &Equations<'_>,
-    symbols: &SymbolTable,
-    numbers: NumberStyle,
-) -> Vec<Entry> {
+    header: String,
+    options: &PrintOptions,
+) -> Document<'a> {
     let (model, units) = (system.model(), system.latent_units());
-    let dim = model.latent_dim();
+    let (dim, numbers) = (model.latent_dim(), options.numbers);
+    let symbol = |variable| format!("${}$", tex_symbol(&options.symbols.symbol(variable)));
+    // `$z_1, \dots, z_6$`, or all of up to three.
+    let range = |of: fn(usize) -> LatentVariable| match dim {
+        ..=3 => (0..dim)
+            .map(|index| symbol(of(index)))
+            .collect::<Vec<_>>()
+            .join(", "),
+        _ => format!(r"{}, \dots, {}", symbol(of(0)), symbol(of(dim - 1))),
+    };
     let position = |index| {
-        let unit = units.map(|units| format!("${}$; ", tex_unit(units.position[index])));
-        let meaning = unit.unwrap_or_default() + &coordinate(model, index, numbers);
-        entry(symbol(symbols, LatentVariable::Z(index)), meaning)
+        let unit = units.map(|units| tex_unit(units.position[index]));
+        (
+            symbol(LatentVariable::Z(index)),
+            unit,
+            coordinate(model, index, numbers),
+        )
     };
-    let mut list: Vec<Entry> = (0..dim).map(position).collect();
-    let velocity_range = range(symbols, LatentVariable::Dz, dim);
-    if let Some(units) = units {
-        list.push(entry(
-            velocity_range,
-            r"their derivatives by time, $\dot{\mathbf{z}} = \mathbf{W}_e \dot{\mathbf{x}}$, per second",
-        ));
-        list.extend((0..dim).map(|index| {
-            let (unit, number) = (tex_unit(units.input[index]), index + 1);
-            let meaning =
-                format!("${unit}$; the input that does work along latent coordinate {number}");
-            entry(symbol(symbols, LatentVariable::U(index)), meaning)
-        }));
-        list.push(entry(
-            ROBOT_STATE,
-            r"robot state and generalised input in SI units; $\mathbf{u} = \mathbf{L}\,\mathbf{u}_{\mathrm{lat}}$ with the constant matrix $\mathbf{L}$ of the generated code",
-        ));
-        list.push(entry(
-            ENCODER,
-            r"encoder in these units, $\mathbf{z} = \mathbf{W}_e \mathbf{x} + \mathbf{b}_e$",
-        ));
-        return list;
-    }
-    let [velocities, inputs] = velocities_and_inputs(model);
-    list.push(entry(velocity_range, velocities));
-    list.push(entry(range(symbols, LatentVariable::U, dim), inputs));
-    if let Ok(encoder) = model.encoder_map() {
-        let state = "robot state and generalised input in SI units";
-        list.push(entry(ROBOT_STATE, state));
-        list.push(match model.encoder() {
-            Ok(_) => entry(
-                ENCODER,
-                r"encoder, $\mathbf{z} = \mathbf{W}_e (\mathbf{s}_x \mathbf{x}) + \mathbf{b}_e$",
-            ),
-            Err(_) => layers(encoder),
-        });
-        list.extend(scale_factors(model, numbers));
-    }
-    list
-}
-
-fn velocities_and_inputs(model: &ReducedModel) -> [String; 2] {
-    // the map of velocities: the weights of an affine encoder, the Jacobian of another
-    let map = match (model.encoder(), model.encoder_map()) {
-        (Ok(_), _) => Some(r"\mathbf{W}_e"),
-        (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
-        (Err(_), Err(_)) => None,
+    let input = |(index, unit): (usize, &Unit)| {
+        (symbol(LatentVariable::U(index)), tex_unit(*unit), index + 1)
     };
-    let [mut velocities, mut inputs] = ["latent velocities", "latent inputs"].map(str::to_owned);
-    if let Some(map) = map {
-        velocities +=
-            &format!(r", $\dot{{\mathbf{{z}}}} = {map} (\mathbf{{s}}_x \dot{{\mathbf{{x}}}})$");
-        inputs += &format!(
-            r", $\mathbf{{u}}_{{\mathrm{{lat}}}} = ({map}^{{\mathsf{{T}}}})^{{+}} (\mathbf{{s}}_u \mathbf{{u}})$, lifted by $\mathbf{{s}}_u \mathbf{{u}} = {map}^{{\mathsf{{T}}}} \mathbf{{u}}_{{\mathrm{{lat}}}}$"
-        );
-    }
-    [velocities, inputs]
-}
-
-fn symbol(symbols: &SymbolTable, variable: LatentVariable) -> String {
-    format!("${}$", tex_symbol(&symbols.symbol(variable)))
-}
-
-/// `$z_1, \dots, z_6$`, or all of up to three.
-fn range(symbols: &SymbolTable, of: fn(usize) -> LatentVariable, dim: usize) -> String {
-    let show = |index| symbol(symbols, of(index));
-    match dim {
-        ..=3 => (0..dim).map(show).collect::<Vec<_>>().join(", "),
-        _ => format!(r"{}, \dots, {}", show(0), show(dim - 1)),
+    let inputs = units
+        .iter()
+        .flat_map(|units| units.input.iter().enumerate().map(input));
+    Document::Nomenclature {
+        header,
+        positions: (0..dim).map(position).collect(),
+        velocities: range(LatentVariable::Dz),
+        inputs: inputs.collect(),
+        all_inputs: range(LatentVariable::U),
+        is_physical: units.is_some(),
+        map: match (model.encoder(), model.encoder_map()) {
+            (Ok(_), _) => Some(r"\mathbf{W}_e"),
+            (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
+            (Err(_), Err(_)) => None,
+        },
+        layers: (model
+            .encoder_map()
+            .ok()
+            .filter(|_| model.encoder().is_err()))
+        .map(layers),
+        factors: scale_factors(model, numbers),
     }
 }
 
@@ -392,7 +346,7 @@ fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String 
 }
 
 /// A nonlinear encoder by the widths of its layers; its weights stay in the model file.
-fn layers(encoder: &StateMap) -> Entry {
+fn layers(encoder: &StateMap) -> String {
     let widths = encoder.layers().iter().map(|layer| {
         let width = layer.map.output_dim();
         match layer.activation {
@@ -401,31 +355,21 @@ fn layers(encoder: &StateMap) -> Entry {
         }
     });
     let (inputs, widths) = (encoder.input_dim(), widths.collect::<Vec<_>>().join(", "));
-    entry(
-        r"$\mathbf{E}$, $\mathbf{J}$",
-        format!(
-            r"nonlinear encoder, $\mathbf{{z}} = \mathbf{{E}}(\mathbf{{s}}_x \mathbf{{x}})$, and its Jacobian at $\mathbf{{s}}_x \mathbf{{x}}$; inputs {inputs}, layers {widths}"
-        ),
-    )
+    format!("inputs {inputs}, layers {widths}")
 }
 
-fn scale_factors(model: &ReducedModel, numbers: NumberStyle) -> Vec<Entry> {
-    let Ok(scaling) = model.scaling() else {
-        return Vec::new();
+fn scale_factors(model: &ReducedModel, numbers: NumberStyle) -> Vec<(char, String)> {
+    let value = |factors: &ScaleFactors| match factors {
+        ScaleFactors::Uniform(factor) => {
+            format!(
+                "${}$ for all",
+                tex_number(&Decimal::exact(*factor), numbers)
+            )
+        }
+        ScaleFactors::PerCoordinate(_) => "one per coordinate".to_owned(),
     };
-    let factors = [("x", &scaling.state), ("u", &scaling.input)];
-    let line = |(symbol, factors): (&str, &ScaleFactors)| {
-        let value = match factors {
-            ScaleFactors::Uniform(factor) => {
-                let factor = tex_number(&Decimal::exact(*factor), numbers);
-                format!("${factor}$ for all")
-            }
-            ScaleFactors::PerCoordinate(_) => "one per coordinate".to_owned(),
-        };
-        entry(
-            format!(r"$\mathbf{{s}}_{symbol}$"),
-            format!(r"scale factors of $\mathbf{{{symbol}}}$: {value}"),
-        )
-    };
-    factors.into_iter().map(line).collect()
+    let scaling = model.scaling().into_iter();
+    scaling
+        .flat_map(|of| [('x', value(&of.state)), ('u', value(&of.input))])
+        .collect()
 }

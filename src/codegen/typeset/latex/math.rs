@@ -1,8 +1,4 @@
-//! The LaTeX spelling of the typeset tree, for math mode.
-//!
-//! Equations as lines of a `cases` or `align` environment.
-//!
-//! The one way for text of a model file into a TeX file.
+//! The LaTeX spelling of the typeset tree, of equations in `cases` or `align`, and of text from outside.
 
 use crate::equations::Unit;
 use crate::files::is_invisible;
@@ -49,8 +45,7 @@ pub(crate) fn tex(math: &Math, numbers: NumberStyle) -> String {
     }
 }
 
-/// Signed terms one after the other: `0.36 - 0.16\dot{z}_1`; the first sign may be a binary operator that continues a
-/// line above.
+/// Signed terms one after the other; the first sign may be an operator that continues a line above.
 pub(crate) fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool) -> String {
     let mut text = String::new();
     for (place, term) in terms.iter().enumerate() {
@@ -240,8 +235,7 @@ pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 
-/// The right side of an equation, one entry per line. Lines are aligned behind the widest left side, in em, or stand
-/// behind a brace, at the equation's own left side.
+/// The lines of a right side: aligned behind the widest left side, in em, or behind a brace at their own left side.
 fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions) -> Vec<String> {
     let numbers = options.numbers;
     if equation.terms.is_empty() {
@@ -257,10 +251,8 @@ fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions
     lines.enumerate().map(side).collect()
 }
 
-/// Text from outside, printed so that TeX shows its characters and runs none of them: every special character becomes a
-/// command, control characters and line ends become a space, and characters that pdfTeX does not know by default their
-/// code point in brackets. The result never contains a line break, so it is as safe inside a comment as in the running
-/// text.
+/// Text from outside, printed so that TeX shows its characters and runs none of them: in one line, with commands for
+/// special characters and code points for those that pdfTeX does not know.
 ///
 /// ```
 /// use romc::typeset::latex::tex_text;
@@ -284,8 +276,7 @@ pub fn tex_text(text: &str) -> String {
     tex
 }
 
-/// Text from outside for a `%` comment: as it is, but on one line and without what changes how its reader sees the
-/// line. TeX skips the rest of a comment's line without looking at it, so only a line end could let something out.
+/// Text from outside for a `%` comment: on one line, without characters that hide others.
 pub(crate) fn comment_text(text: &str) -> String {
     text.replace(is_invisible, " ")
 }

@@ -26,8 +26,8 @@ pub(super) struct TableBlock {
     pub long: bool,
 }
 
-/// Cuts the table into blocks that fit into a column of text. Phases share a block when all of them fit, and stay apart
-/// otherwise. In one of two columns no table breaks across pages: there long ones are cut between rows, too.
+/// Cuts the table into blocks as wide as a column of text: phases share one if all fit. Narrow ones are cut between
+/// rows as well, as no table breaks across pages there.
 pub(super) fn blocks(
     table: &CoefficientTable,
     model_name: &str,

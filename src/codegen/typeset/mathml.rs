@@ -1,9 +1,5 @@
-//! Equations as `math` elements, and a page that shows them.
-//!
-//! The one way for text of a model file into a page. In romc's own sentences and tables a few symbols become
-//! mathematics.
-//!
-//! The MathML spelling of the typeset tree (MathML Core), without the `math` element around it.
+//! Equations for pages: the typeset tree as MathML Core, which browsers draw without scripts, a page that shows it, and
+//! the one way for text from outside into a page.
 
 use std::fmt;
 
@@ -24,48 +20,34 @@ use crate::typeset::{
 /// What a continued line is set in by, in em.
 const INDENT: f64 = 2.0;
 
-/// One phase as a `math` element: a brace before its equations, each broken into lines of `width_em`. The LaTeX of the
-/// same equations stands in an annotation, where tools for copying find it.
+/// One phase as a `math` element with lines of `width_em`; an annotation for copying has its LaTeX.
 pub fn system(system: &EquationSystem, width_em: f64) -> String {
-    let mut rows = String::new();
+    let mut rows = Vec::new();
     for equation in &system.equations {
-        let left = mathml_symbol(&equation.left);
-        let first = symbol_width(&equation.left) + EQUALS;
-        let lines = break_lines(&equation.terms, width_em, first, INDENT);
         let relation = if equation.is_approximate { "≈" } else { "=" };
-        let mut head = format!("{left}<mo>{relation}</mo>");
-        if lines.is_empty() {
-            rows.push_str(&row(&head, &mathml(&equation.right()), 0.0));
-        }
-        for (place, terms) in lines.into_iter().enumerate() {
-            let continues = place > 0;
-            let indent = if continues { INDENT } else { 0.0 };
-            rows.push_str(&row(&head, &mathml_terms(terms, continues), indent));
-            head.clear();
-        }
+        let head = format!("{}<mo>{relation}</mo>", mathml_symbol(&equation.left));
+        let first = symbol_width(&equation.left) + EQUALS;
+        let mut lines = break_lines(&equation.terms, width_em, first, INDENT).into_iter();
+        let whole = || mathml(&equation.right());
+        let first = lines.next().map(|terms| mathml_terms(terms, false));
+        rows.push((head, first.unwrap_or_else(whole), 0.0));
+        rows.extend(lines.map(|terms| (String::new(), mathml_terms(terms, true), INDENT)));
     }
-    let tex = tex_cases(system, width_em);
-    format!(
-        "<math display=\"block\"><semantics><mrow><mo fence=\"true\" form=\"prefix\" \
-         stretchy=\"true\">{{</mo><mtable displaystyle=\"true\">{rows}</mtable></mrow>\
-         <annotation encoding=\"application/x-tex\">{}</annotation></semantics></math>",
-        HtmlText(&tex)
-    )
+    let tex = &tex_cases(system, width_em);
+    let tex = HtmlText(tex);
+    let rendered = Lines { rows, tex }.render();
+    rendered.expect("strings take all that is written")
 }
 
-fn row(left: &str, right: &str, indent: f64) -> String {
-    let space = match indent > 0.0 {
-        true => format!("<mspace width=\"{indent}em\"/>"),
-        false => String::new(),
-    };
-    format!(
-        "<mtr><mtd style=\"text-align:right;padding-right:0\"><mrow>{left}</mrow></mtd>\
-         <mtd style=\"text-align:left;padding-left:0\"><mrow>{space}{right}</mrow></mtd></mtr>"
-    )
+/// Lines of a system with their sides and indentation in em, and its LaTeX.
+#[derive(Template)]
+#[template(path = "mathml/system.askama", config = "templates/askama.toml")]
+struct Lines<'a> {
+    rows: Vec<(String, String, f64)>,
+    tex: HtmlText<'a>,
 }
 
-/// The page `NAME.html`: each phase's equations and the table of coefficients, without scripts or anything from
-/// elsewhere.
+/// The page `NAME.html`: equations and the table of coefficients, without scripts or anything from elsewhere.
 ///
 /// # Errors
 /// [`TypesetError::Template`].
@@ -73,7 +55,7 @@ pub fn emit(
     equations: &Equations<'_>,
     options: &PrintOptions,
 ) -> Result<Vec<EmittedFile>, TypesetError> {
-    let page = Page::new::<Html>(equations, options);
+    let page = Page::new(equations, options, &HTML);
     let path = format!("{}.html", equations.model().identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
@@ -85,18 +67,10 @@ struct Document<'a> {
 }
 
 /// Text and mathematics for the content of an element.
-#[derive(Clone, Copy, Debug)]
-pub struct Html;
-
-impl Spelling for Html {
-    fn text(text: &str) -> String {
-        HtmlText(text).to_string()
-    }
-
-    fn math(math: &Math, _: &str) -> String {
-        format!("<math>{}</math>", mathml(math))
-    }
-}
+pub const HTML: Spelling = Spelling {
+    text: |text| HtmlText(text).to_string(),
+    math: |math, _| format!("<math>{}</math>", mathml(math)),
+};
 
 fn after_comma(unit: &Option<Unit>) -> String {
     unit.map_or(String::new(), |unit| format!(", {unit}"))
@@ -147,8 +121,7 @@ const SYMBOLS: [(&str, &str); 14] = [
     ("lambda", "<mi>λ</mi>"),
 ];
 
-/// Text for the content of an element: known symbols become `math` elements, a hyphen before a digit a minus, `s^2` a
-/// raised digit, `us` microseconds, a lone hyphen a dash.
+/// Text in which known symbols become `math` elements, hyphens before digits minus signs, and units their signs.
 ///
 /// ```
 /// use romc::typeset::mathml::HtmlProse;
