@@ -9,7 +9,7 @@ use num_traits::{One, Signed, ToPrimitive, Zero};
 
 pub(super) use num_rational::BigRational as Rational;
 
-use crate::{ExprId, Number, SymbolId};
+use crate::{ExprId, Function, Number, SymbolId};
 
 /// Most terms of a form, and most products of terms that one multiplication makes.
 const MAX_TERMS: usize = 2_000;
@@ -23,11 +23,8 @@ pub(super) enum Atom {
     Sum(CanonicalForm),
     /// `form^(1/index)`, to powers below the index.
     Root(CanonicalForm, u32),
-    Log(CanonicalForm),
-    Abs(CanonicalForm),
-    Sign(CanonicalForm),
-    Tan(CanonicalForm),
-    Tanh(CanonicalForm),
+    /// A function that is no exponential and no root.
+    Call(Function, CanonicalForm),
     /// An expression that is too large to take apart, or has no value.
     Opaque(ExprId),
 }

@@ -6,6 +6,7 @@ use num_traits::Signed;
 
 use super::forms::CanonicalForms;
 use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, nearest, ratio};
+use crate::Function;
 use crate::number::power;
 
 /// Largest power of a sum that is multiplied out, and of a single term.
@@ -67,7 +68,7 @@ impl CanonicalForms<'_> {
                         return Some((with_power(rest), self.power(&base, whole)));
                     }
                 }
-                Atom::Abs(base) => {
+                Atom::Call(Function::Abs, base) => {
                     let rest = power.rem_euclid(2);
                     if rest != power {
                         return Some((with_power(rest), self.power(&base, power - rest)));
@@ -78,9 +79,12 @@ impl CanonicalForms<'_> {
                     if let Some(shared) = shared {
                         // |x| / x = sign(x).
                         let rest = monomial.without(atom).times(&Monomial::atom(shared, 1));
-                        return Some((rest, Some(self.atom(Atom::Sign(base)))));
+                        return Some((rest, Some(self.call(Function::Sign, base))));
                     }
-                    let sign = self.numbers.get(&Atom::Sign(base.clone())).copied();
+                    let sign = self
+                        .numbers
+                        .get(&Atom::Call(Function::Sign, base.clone()))
+                        .copied();
                     let sign = sign.map_or((0, 0), |sign| (sign, monomial.power_of(sign)));
                     if sign.1 > 0 {
                         // |x| sign(x) = x, |x| sign(x)^2 = |x|.
@@ -91,23 +95,22 @@ impl CanonicalForms<'_> {
                         });
                     }
                 }
-                Atom::Sign(_) if !(0..=2).contains(&power) => {
+                Atom::Call(Function::Sign, _) if !(0..=2).contains(&power) => {
                     let rest = 2 - power.rem_euclid(2);
                     return Some((with_power(rest), Some(CanonicalForm::one())));
                 }
-                Atom::Sign(base) => {
+                Atom::Call(Function::Sign, base) => {
                     let shared = base.as_atom().filter(|base| monomial.power_of(*base) != 0);
                     if let Some(shared) = shared {
                         // x sign(x) = |x|, x sign(x)^2 = x, sign(x)/x as it is.
                         let rest = monomial.without(atom);
                         let is_over = monomial.power_of(shared) > 0;
-                        let magnitude = Atom::Abs(base);
                         return Some(match power {
                             2 => (rest, Some(CanonicalForm::one())),
                             _ if !is_over => continue,
                             _ => {
                                 let rest = rest.times(&Monomial::atom(shared, -1));
-                                (rest, Some(self.atom(magnitude)))
+                                (rest, Some(self.call(Function::Abs, base)))
                             }
                         });
                     }
