@@ -1,6 +1,6 @@
 //! Products, powers, quotients and square roots of normal forms, with the powers of atoms in their ranges.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use num_traits::Signed;
 
@@ -12,6 +12,8 @@ use crate::number::power;
 /// Largest power of a sum that is multiplied out, and of a single term.
 const MAX_SUM_POWER: u32 = 40;
 const MAX_TERM_POWER: u32 = 2_000;
+/// Most products of terms that one multiplication makes.
+const MAX_PRODUCTS: usize = 40_000;
 const MAX_STEPS: usize = 200_000;
 /// Most terms of a square or dividend.
 const MAX_SQUARE: usize = 60;
@@ -22,8 +24,12 @@ impl CanonicalForms<'_> {
         a: &CanonicalForm,
         b: &CanonicalForm,
     ) -> Option<CanonicalForm> {
-        let products = a.products(b)?;
-        self.settled(products)
+        if a.terms.len().checked_mul(b.terms.len())? > MAX_PRODUCTS {
+            return None;
+        }
+        let pairs = (a.terms.iter()).flat_map(|of_a| b.terms.iter().map(move |of_b| (of_a, of_b)));
+        let products = pairs.map(|((m, c), (n, d))| (c.times(d), m.times(n)));
+        self.settled(products.collect())
     }
 
     /// The sum of terms, with the powers of roots, magnitudes and signs in their ranges.
@@ -125,18 +131,19 @@ impl CanonicalForms<'_> {
         if exponent == 0 {
             return Some(CanonicalForm::one());
         }
-        let base = if exponent < 0 {
-            self.reciprocal(base)?
-        } else {
-            base.clone()
+        let base = match exponent < 0 {
+            true => self.reciprocal(base)?,
+            false => base.clone(),
         };
         let count = exponent.unsigned_abs();
-        let limit = if base.terms.len() > 1 {
-            MAX_SUM_POWER
-        } else {
-            MAX_TERM_POWER
-        };
-        if count > limit {
+        let is_sum = base.terms.len() > 1;
+        if count
+            > if is_sum {
+                MAX_SUM_POWER
+            } else {
+                MAX_TERM_POWER
+            }
+        {
             return None;
         }
         power(CanonicalForm::one(), base, count.into(), |a, b| {
@@ -252,13 +259,8 @@ struct Order {
 
 impl Order {
     fn of(form: &CanonicalForm) -> Self {
-        let all = form
-            .terms
-            .keys()
-            .flat_map(|monomial| monomial.exponent.terms.keys());
-        let distinct: BTreeSet<&Monomial> = all.collect();
-        let weighted = (distinct.into_iter().enumerate())
-            .map(|(place, of)| (of.clone(), (place as f64 + 2.7).sqrt()));
+        let distinct = form.exponents().into_iter().enumerate();
+        let weighted = distinct.map(|(place, of)| (of.clone(), (place as f64 + 2.7).sqrt()));
         Self {
             exponents: weighted.collect(),
         }

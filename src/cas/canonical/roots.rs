@@ -1,7 +1,5 @@
 //! Roots, logarithms, exponentials and magnitudes of normal forms.
 
-use std::collections::BTreeSet;
-
 use num_bigint::{BigInt, BigUint};
 use num_integer::Integer;
 use num_traits::{ToPrimitive, Zero};
@@ -93,11 +91,7 @@ impl CanonicalForms<'_> {
         &mut self,
         form: &CanonicalForm,
     ) -> Option<(CanonicalForm, Option<CanonicalForm>)> {
-        let all = form
-            .terms
-            .keys()
-            .flat_map(|monomial| monomial.exponent.terms.keys());
-        let names: BTreeSet<&Monomial> = all.collect();
+        let names = form.exponents();
         let power = |monomial: &Monomial, name: &Monomial| {
             let found = monomial.exponent.terms.get(name);
             found.map_or_else(Rational::zero, |power| power.re.clone())
