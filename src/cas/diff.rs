@@ -90,7 +90,7 @@ impl ExprPool {
             }
             Node::Apply(function, argument) => {
                 let d_argument = inner(self, argument);
-                let outer = (function.row().derivative)(self, argument, expr);
+                let outer = function.derivative(self, argument, expr);
                 self.product(&[outer, d_argument])
             }
         }

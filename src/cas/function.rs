@@ -33,6 +33,8 @@ pub(super) struct Row {
     /// Names in the term grammar; the first is printed.
     names: &'static [&'static str],
     pub(super) parity: Parity,
+    /// Whether the argument is an angle.
+    is_circular: bool,
     value: fn(f64) -> f64,
     pub(super) image: fn(Interval) -> Interval,
     /// Whether slopes are bounded on an interval of arguments, and no jump lies in it.
@@ -46,6 +48,7 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["sin"],
         parity: Parity::Odd,
+        is_circular: true,
         value: f64::sin,
         image: |x| x.oscillation(f64::sin, 0.5),
         is_lipschitz: |_| true,
@@ -54,6 +57,7 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["cos"],
         parity: Parity::Even,
+        is_circular: true,
         value: f64::cos,
         image: |x| x.oscillation(f64::cos, 0.0),
         is_lipschitz: |_| true,
@@ -65,9 +69,10 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["tan"],
         parity: Parity::Odd,
+        is_circular: true,
         value: f64::tan,
-        image: Interval::tan,
-        is_lipschitz: |x| x.tan() != Interval::ENTIRE,
+        image: |x| x.branch(f64::tan),
+        is_lipschitz: |x| x.branch(f64::tan) != Interval::ENTIRE,
         derivative: |pool, _, value| {
             let square = pool.powi(value, 2);
             pool.add(ExprId::ONE, square)
@@ -76,6 +81,7 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["tanh"],
         parity: Parity::Odd,
+        is_circular: false,
         value: f64::tanh,
         image: |x| {
             x.increasing(f64::tanh)
@@ -90,6 +96,7 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["exp"],
         parity: Parity::Neither,
+        is_circular: false,
         value: f64::exp,
         image: Interval::exp,
         is_lipschitz: |_| true,
@@ -98,6 +105,7 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["log", "ln"],
         parity: Parity::Neither,
+        is_circular: false,
         value: f64::ln,
         image: Interval::log,
         is_lipschitz: |x| x.lo() > 0.0,
@@ -106,6 +114,7 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["sqrt"],
         parity: Parity::Neither,
+        is_circular: false,
         value: f64::sqrt,
         image: Interval::sqrt,
         is_lipschitz: |x| x.lo() > 0.0,
@@ -117,6 +126,7 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["abs"],
         parity: Parity::Even,
+        is_circular: false,
         value: f64::abs,
         image: Interval::abs,
         is_lipschitz: |_| true,
@@ -125,6 +135,7 @@ const ROWS: [Row; 9] = [
     Row {
         names: &["sign", "sgn"],
         parity: Parity::Odd,
+        is_circular: false,
         // f64::signum gives 1 for zero.
         value: |x| if x == 0.0 { 0.0 } else { x.signum() },
         image: Interval::sign,
@@ -158,6 +169,16 @@ impl Function {
     /// The value at `argument`; NaN or infinite where the function has none.
     pub fn evaluate(self, argument: f64) -> f64 {
         (self.row().value)(argument)
+    }
+
+    /// Whether the argument is an angle.
+    pub fn is_circular(self) -> bool {
+        self.row().is_circular
+    }
+
+    /// `f'(argument)`, where `value` is `f(argument)`.
+    pub(super) fn derivative(self, pool: &mut ExprPool, argument: ExprId, value: ExprId) -> ExprId {
+        (self.row().derivative)(pool, argument, value)
     }
 
     /// Whether it is zero where its argument is; in floats, nowhere else: none is a multiple of pi.

@@ -206,15 +206,13 @@ impl Interval {
         inside.increasing(f64::ln)
     }
 
-    /// `tan(x)`: all reals if a pole may lie inside.
-    pub(crate) fn tan(self) -> Interval {
-        if self.is_empty() {
-            return self;
+    /// The image under a function that increases between poles at `(k + 1/2) pi`: all reals if one may lie inside.
+    pub(crate) fn branch(self, function: impl Fn(f64) -> f64) -> Interval {
+        let is_large = self.magnitude() > LARGEST_ANGLE;
+        match !self.is_empty() && (is_large || self.contains_angle(1.0, 0.5)) {
+            true => Interval::ENTIRE,
+            false => self.increasing(function),
         }
-        if self.magnitude() > LARGEST_ANGLE || self.contains_angle(1.0, 0.5) {
-            return Interval::ENTIRE;
-        }
-        self.increasing(f64::tan)
     }
 
     pub(super) fn increasing(self, function: impl Fn(f64) -> f64) -> Interval {

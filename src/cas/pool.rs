@@ -47,15 +47,9 @@ pub struct ExprPool {
 struct Symbol {
     key: SymbolKey,
     expr: ExprId,
-    meaning: Meaning,
-}
-
-#[derive(Clone, Debug)]
-enum Meaning {
-    Variable,
-    Selection([ExprId; 3]),
+    selection: Option<[ExprId; 3]>,
     /// See [`ExprPool::decimal`]; with the nearest float.
-    Decimal(Coefficient, f64),
+    decimal: Option<(Coefficient, f64)>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -159,7 +153,7 @@ impl ExprPool {
 
     /// The variable of that name, made at its first mention.
     pub fn symbol_id(&mut self, name: &str) -> SymbolId {
-        self.symbol_for(name, Meaning::Variable)
+        self.symbol_for(name, None, None)
     }
 
     /// A variable that takes the place of a part while expressions are rewritten; no file has one of its name.
@@ -171,7 +165,7 @@ impl ExprPool {
     /// that of `other` elsewhere.
     pub(super) fn selection_symbol(&mut self, parts: [ExprId; 3]) -> ExprId {
         let name = format!("selection {:?}", parts.map(ExprId::index));
-        let id = self.symbol_for(&name, Meaning::Selection(parts));
+        let id = self.symbol_for(&name, Some(parts), None);
         self.symbol_expr(id)
     }
 
@@ -181,39 +175,39 @@ impl ExprPool {
         let coefficient = Coefficient::parse(text, is_rounded)?;
         let value = coefficient.to_f64();
         let name = format!("{}{text}", if is_rounded { '~' } else { '#' });
-        let id = self.symbol_for(&name, Meaning::Decimal(coefficient, value));
+        let id = self.symbol_for(&name, None, Some((coefficient, value)));
         Some(self.symbol_expr(id))
     }
 
     /// The number that a symbol of [`ExprPool::decimal`] stands for, and the nearest float.
     pub fn decimal_of(&self, symbol: SymbolId) -> Option<(&Coefficient, f64)> {
-        match &self.symbols[symbol.index()].meaning {
-            Meaning::Decimal(coefficient, value) => Some((coefficient, *value)),
-            Meaning::Variable | Meaning::Selection(_) => None,
-        }
+        let decimal = self.symbols[symbol.index()].decimal.as_ref();
+        decimal.map(|(coefficient, value)| (coefficient, *value))
     }
 
     /// The parts of a symbol that stands for a selection of [`ExprPool::slope`]: test, value where the test is zero,
     /// value elsewhere.
     pub fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
-        match self.symbols[symbol.index()].meaning {
-            Meaning::Selection(parts) => Some(parts),
-            Meaning::Variable | Meaning::Decimal(..) => None,
-        }
+        self.symbols[symbol.index()].selection
     }
 
-    fn symbol_for(&mut self, name: &str, meaning: Meaning) -> SymbolId {
+    fn symbol_for(
+        &mut self,
+        name: &str,
+        selection: Option<[ExprId; 3]>,
+        decimal: Option<(Coefficient, f64)>,
+    ) -> SymbolId {
         if let Some(&id) = self.symbol_ids.get(name) {
             return id;
         }
-        let id = SymbolId(
-            u32::try_from(self.symbols.len()).expect("a pool holds fewer than 2^32 symbols"),
-        );
+        let count = u32::try_from(self.symbols.len());
+        let id = SymbolId(count.expect("a pool holds fewer than 2^32 symbols"));
         self.symbol_ids.insert(name.to_owned(), id);
         self.symbols.push(Symbol {
             key: SymbolKey::of(name),
             expr: ExprId::ZERO,
-            meaning,
+            selection,
+            decimal,
         });
         self.symbols[id.index()].expr = self.intern(Node::Symbol(id));
         id
@@ -386,9 +380,8 @@ impl ExprPool {
         }
         // Interning the rest first keeps operands at smaller ids.
         let rest = self.rest_of(&node);
-        let id = ExprId(
-            u32::try_from(self.nodes.len()).expect("a pool holds fewer than 2^32 expressions"),
-        );
+        let count = u32::try_from(self.nodes.len());
+        let id = ExprId(count.expect("a pool holds fewer than 2^32 expressions"));
         let facts = Facts {
             rest: rest.unwrap_or(id),
             itself: id,

@@ -209,11 +209,7 @@ impl ExprPool {
     }
 
     pub(super) fn has_waves(&self, region: ExprId) -> bool {
-        self.atoms_of(region).into_iter().any(|atom| {
-            matches!(
-                self.node(atom),
-                Node::Apply(Function::Sin | Function::Cos | Function::Tan, _)
-            )
-        })
+        let mut atoms = self.atoms_of(region).into_iter();
+        atoms.any(|atom| matches!(self.node(atom), Node::Apply(f, _) if f.is_circular()))
     }
 }

@@ -5,7 +5,7 @@
 
 use super::certificate::{Change, ChangeKind, Effect};
 use super::ranges::Ranges;
-use super::workspace::{Workspace, has_function};
+use super::workspace::has_function;
 use crate::symbolic::Interval;
 use crate::typeset::rounded;
 
@@ -25,30 +25,14 @@ pub(super) fn is_same_decimal(before: f64, after: f64) -> bool {
 
 /// A replacement of a term `theta`: `theta = sum r_k theta_k + error`.
 #[derive(Clone, Debug, PartialEq)]
-struct Rewrite {
+pub(super) struct Rewrite {
     kind: ChangeKind,
     /// Rows and factors `r_k`.
     parts: Vec<(usize, f64)>,
     error: Interval,
 }
 
-#[derive(Debug)]
-pub(super) struct Terms<'a> {
-    workspace: &'a Workspace,
-    pub ranges: Ranges,
-    known: Vec<Option<Vec<Rewrite>>>,
-}
-
-impl<'a> Terms<'a> {
-    pub(crate) fn new(workspace: &'a Workspace, ranges: Ranges) -> Self {
-        let known = vec![None; workspace.len()];
-        Self {
-            workspace,
-            ranges,
-            known,
-        }
-    }
-
+impl Ranges<'_> {
     fn effect(&self, row: usize, before: f64, after: f64) -> Effect {
         let term = self.workspace.text(row).to_owned();
         Effect {
@@ -61,14 +45,14 @@ impl<'a> Terms<'a> {
 
     /// All replacements of a term, simplest first; none for a term without finite values in the box.
     fn rewrites(&mut self, row: usize) -> &[Rewrite] {
-        if self.known[row].is_none() {
-            self.known[row] = Some(self.found(row));
+        if self.rewrites[row].is_none() {
+            self.rewrites[row] = Some(self.found(row));
         }
-        self.known[row].as_deref().expect("found now or before")
+        self.rewrites[row].as_deref().expect("found now or before")
     }
 
     fn found(&mut self, row: usize) -> Vec<Rewrite> {
-        let range = self.ranges.term(row);
+        let range = self.term(row);
         if range.is_empty() || !range.magnitude().is_finite() {
             return Vec::new();
         }
@@ -87,7 +71,7 @@ impl<'a> Terms<'a> {
         let negated = (parts.iter()).map(|&(row, factor)| (row, Interval::point(-factor)));
         let one = (row, Interval::point(1.0));
         let difference: Vec<_> = std::iter::once(one).chain(negated).collect();
-        let error = self.ranges.combination(&difference);
+        let error = self.combination(&difference);
         if error.magnitude().is_finite() {
             let kind = ChangeKind::Linear;
             let with_constant = self.centred(kind, parts.clone(), error);
@@ -114,35 +98,34 @@ impl<'a> Terms<'a> {
 
     /// Slopes of the chords along each variable through the middle of the box, exact for products.
     fn slopes(&mut self, row: usize) -> Option<Vec<(usize, f64)>> {
-        let expr = self.ranges.expr(row);
-        let sides = self.ranges.sides(expr);
-        let pool = self.ranges.pool();
-        let is_affine = (sides.iter()).all(|&(symbol, _, _)| {
-            let slope = pool.derivative(expr, symbol);
-            pool.is_constant(slope)
+        let expr = self.expr(row);
+        let sides = self.restricted(expr);
+        let is_affine = sides.iter().all(|&(symbol, _)| {
+            let slope = self.pool.derivative(expr, symbol);
+            self.pool.is_constant(slope)
         });
         if is_affine || sides.len() > MAX_LINEAR_SYMBOLS {
             return None;
         }
-        let size = self.ranges.term(row).width();
+        let size = self.term(row).width();
         let mut parts = Vec::new();
-        for (moved, &(symbol, _, half)) in sides.iter().enumerate() {
+        for &(moved, range) in &sides {
+            let half = 0.5 * range.width();
             // where one variable is so many half widths from its centre and the others are at theirs
-            let mut value = |step: f64| {
-                self.ranges.pool().evaluate(expr, &|symbol| {
-                    let place = sides.iter().position(|(known, _, _)| *known == symbol);
-                    place.map_or(f64::NAN, |place| {
-                        let (_, centre, half) = sides[place];
-                        let step = if place == moved { step } else { 0.0 };
-                        centre + step * half
-                    })
+            let value = |step: f64| {
+                self.pool.evaluate(expr, &|symbol| {
+                    let side = sides.iter().find(|(known, _)| *known == symbol);
+                    let centre = side.map_or(f64::NAN, |(_, range)| range.middle());
+                    let step = if symbol == moved { step } else { 0.0 };
+                    centre + step * half
                 })
             };
             let rise = value(1.0) - value(-1.0);
             if half == 0.0 || rise.abs() <= WORTHWHILE * size {
                 continue;
             }
-            parts.push((self.workspace.variable(symbol)?, rise / (2.0 * half)));
+            let row = *self.workspace.rows.get(&Some(moved))?;
+            parts.push((row, rise / (2.0 * half)));
         }
         let is_line = !parts.is_empty() && parts.iter().all(|part| part.1.is_finite());
         is_line.then_some(parts)
@@ -169,7 +152,7 @@ impl Equation {
         }
     }
 
-    pub(crate) fn simplified(mut self, terms: &mut Terms<'_>, allowed: f64) -> Self {
+    pub(crate) fn simplified(mut self, terms: &mut Ranges<'_>, allowed: f64) -> Self {
         self.remove_terms(terms, REMOVAL_SHARE * allowed);
         self.fold_functions(terms, REMOVAL_SHARE * allowed);
         self.round(terms, allowed);
@@ -183,7 +166,7 @@ impl Equation {
     }
 
     /// Removes terms, the cheapest first: without replacement, or into terms that are there anyway.
-    fn remove_terms(&mut self, terms: &mut Terms<'_>, allowed: f64) {
+    fn remove_terms(&mut self, terms: &mut Ranges<'_>, allowed: f64) {
         loop {
             let mut best: Option<(f64, usize, usize)> = None;
             for row in self.active() {
@@ -209,12 +192,12 @@ impl Equation {
     }
 
     /// Replaces terms that call functions by the simplest form that fits, the cheapest first.
-    fn fold_functions(&mut self, terms: &mut Terms<'_>, allowed: f64) {
+    fn fold_functions(&mut self, terms: &mut Ranges<'_>, allowed: f64) {
         loop {
             let mut best: Option<Change> = None;
             for row in self.active() {
-                let expr = terms.ranges.expr(row);
-                if !has_function(terms.ranges.pool(), expr) {
+                let expr = terms.expr(row);
+                if !has_function(&terms.pool, expr) {
                     continue;
                 }
                 let rewrites = terms.rewrites(row).to_vec();
@@ -234,7 +217,7 @@ impl Equation {
     }
 
     /// Rounds coefficients: what costs least goes first, one digit after another, as long as all together fit.
-    fn round(&mut self, terms: &mut Terms<'_>, allowed: f64) {
+    fn round(&mut self, terms: &mut Ranges<'_>, allowed: f64) {
         let mut chosen: Vec<Option<Change>> = vec![None; self.xi.len()];
         // sums of floats select candidates; accepted changes are checked with intervals
         let (mut lo, mut hi) = (self.spent.lo(), self.spent.hi());
@@ -255,10 +238,10 @@ impl Equation {
         }
     }
 
-    fn roundings(&self, terms: &mut Terms<'_>) -> Vec<Change> {
+    fn roundings(&self, terms: &mut Ranges<'_>) -> Vec<Change> {
         let mut changes: Vec<Change> = Vec::new();
         for row in self.active() {
-            let range = terms.ranges.term(row);
+            let range = terms.term(row);
             if range.is_empty() || !range.magnitude().is_finite() {
                 continue;
             }
@@ -293,7 +276,7 @@ impl Equation {
     }
 
     /// The change that `rewrite` makes to the term in `row`.
-    fn change(&self, terms: &mut Terms<'_>, row: usize, rewrite: &Rewrite) -> Change {
+    fn change(&self, terms: &mut Ranges<'_>, row: usize, rewrite: &Rewrite) -> Change {
         let before = self.xi[row];
         let mut bound = Interval::point(before) * rewrite.error;
         let mut effects = Vec::new();
@@ -302,7 +285,7 @@ impl Equation {
             // what the sum of floats is off by
             let exact = Interval::point(before) * Interval::point(factor);
             let rounding = exact - (Interval::point(new) - Interval::point(old));
-            bound = bound + rounding * terms.ranges.term(part);
+            bound = bound + rounding * terms.term(part);
             effects.push(terms.effect(part, old, new));
         }
         Change {

@@ -1,7 +1,10 @@
 //! Ranges of terms and of their combinations over a box.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use super::equation::Rewrite;
+use super::workspace::Workspace;
+use crate::model::LatentVariable;
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
 /// Share of a coefficient's size by which constants of the algebra may be off, with room to spare: a merged or halved
@@ -14,50 +17,40 @@ const MAX_VISITS: usize = 50_000;
 
 type Part = (usize, Interval);
 
-#[derive(Clone, Debug)]
-pub(super) struct Ranges {
-    pool: ExprPool,
+/// The terms of a workspace over one box.
+#[derive(Debug)]
+pub(super) struct Ranges<'a> {
+    pub workspace: &'a Workspace,
+    pub pool: ExprPool,
     domain: Vec<(SymbolId, Interval)>,
-    terms: Vec<ExprId>,
     known: Vec<Option<Interval>>,
+    /// What may take each term's place, once it was asked for.
+    pub rewrites: Vec<Option<Vec<Rewrite>>>,
 }
 
-impl Ranges {
-    pub(crate) fn new(
-        pool: ExprPool,
-        domain: Vec<(SymbolId, Interval)>,
-        terms: Vec<ExprId>,
-    ) -> Self {
+impl<'a> Ranges<'a> {
+    pub(crate) fn new(workspace: &'a Workspace, domain: &[Interval]) -> Self {
+        let library = &workspace.library;
+        let variables = LatentVariable::all(library.latent_dim());
+        let symbols = variables.filter_map(|variable| library.symbol(variable));
         Self {
-            pool,
-            domain,
-            known: vec![None; terms.len()],
-            terms,
+            workspace,
+            pool: library.pool().clone(),
+            domain: symbols.zip(domain.iter().copied()).collect(),
+            known: vec![None; library.len()],
+            rewrites: vec![None; library.len()],
         }
     }
 
-    pub(crate) fn pool(&mut self) -> &mut ExprPool {
-        &mut self.pool
-    }
-
     pub(crate) fn expr(&self, row: usize) -> ExprId {
-        self.terms[row]
-    }
-
-    /// Centre and half width of each symbol's range that `expr` has, in floating point: where to look, not what to
-    /// prove.
-    pub(crate) fn sides(&self, expr: ExprId) -> Vec<(SymbolId, f64, f64)> {
-        let sides = self.restricted(expr).into_iter();
-        sides
-            .map(|(symbol, range)| (symbol, range.middle(), 0.5 * range.width()))
-            .collect()
+        self.workspace.library.terms()[row].expr()
     }
 
     pub(crate) fn term(&mut self, row: usize) -> Interval {
         if let Some(range) = self.known[row] {
             return range;
         }
-        let range = self.range(self.terms[row]);
+        let range = self.range(self.expr(row));
         self.known[row] = Some(range);
         range
     }
@@ -82,9 +75,9 @@ impl Ranges {
             }
             let mut summands = Vec::new();
             for &(row, delta) in &group {
-                let middle = delta.middle();
+                let (middle, expr) = (delta.middle(), self.expr(row));
                 let factor = self.pool.number(middle);
-                summands.push(self.pool.mul(factor, self.terms[row]));
+                summands.push(self.pool.mul(factor, expr));
                 let rest = delta - Interval::point(middle);
                 let slack = Interval::point(CONSTANT_ROUNDING) * (delta.hull(-delta));
                 total = total + (rest + slack) * self.term(row);
@@ -98,7 +91,7 @@ impl Ranges {
     fn alike(&self, parts: &[Part]) -> Vec<Vec<Part>> {
         let mut groups: BTreeMap<Vec<SymbolId>, Vec<Part>> = BTreeMap::new();
         for &(row, delta) in parts {
-            let symbols = self.pool.symbols_of(self.terms[row]).into_iter().collect();
+            let symbols = self.pool.symbols_of(self.expr(row)).into_iter().collect();
             groups.entry(symbols).or_default().push((row, delta));
         }
         groups.into_values().collect()
@@ -106,13 +99,12 @@ impl Ranges {
 
     /// Connected components: terms that share a variable, directly or through others.
     fn connected(&self, parts: &[Part]) -> Vec<Vec<Part>> {
-        let mut groups: Vec<(Vec<SymbolId>, Vec<Part>)> = Vec::new();
+        let mut groups: Vec<(BTreeSet<SymbolId>, Vec<Part>)> = Vec::new();
         for &(row, delta) in parts {
-            let mut symbols: Vec<SymbolId> =
-                self.pool.symbols_of(self.terms[row]).into_iter().collect();
+            let mut symbols = self.pool.symbols_of(self.expr(row));
             let mut members = vec![(row, delta)];
-            let (joined, apart): (Vec<_>, Vec<_>) = (groups.into_iter())
-                .partition(|(other, _)| other.iter().any(|symbol| symbols.contains(symbol)));
+            let (joined, apart): (Vec<_>, Vec<_>) =
+                (groups.into_iter()).partition(|(other, _)| !other.is_disjoint(&symbols));
             for (other, others) in joined {
                 symbols.extend(other);
                 members.extend(others);
@@ -123,12 +115,12 @@ impl Ranges {
         groups.into_iter().map(|(_, members)| members).collect()
     }
 
-    fn restricted(&self, expr: ExprId) -> Vec<(SymbolId, Interval)> {
+    /// The ranges of the symbols that an expression has.
+    pub(crate) fn restricted(&self, expr: ExprId) -> Vec<(SymbolId, Interval)> {
         let symbols = self.pool.symbols_of(expr);
-        let known = self.domain.iter().copied();
-        known
-            .filter(|(symbol, _)| symbols.contains(symbol))
-            .collect()
+        let mut sides = self.domain.clone();
+        sides.retain(|(symbol, _)| symbols.contains(symbol));
+        sides
     }
 
     /// All values of an expression over the box: bounded over ever smaller parts of the box, the parts that reach
@@ -144,11 +136,8 @@ impl Ranges {
         if !whole.magnitude().is_finite() || whole.is_empty() {
             return whole;
         }
-        let visits: usize = slopes
-            .iter()
-            .chain([&expr])
-            .map(|&part| self.pool.reachable(&[part]).len())
-            .sum();
+        let walked = slopes.iter().chain([&expr]);
+        let visits: usize = walked.map(|&part| self.pool.reachable(&[part]).len()).sum();
         let mut parts = vec![(domain.clone(), whole)];
         let mut reached = Interval::EMPTY;
         for _ in 1..MAX_BOXES.min(MAX_VISITS / visits.max(1)) {
@@ -169,11 +158,8 @@ impl Ranges {
             };
             let (cell, range) = parts.swap_remove(worst);
             for half in halves(&cell, &domain) {
-                let sharper = self
-                    .pool
-                    .bound_by_slopes(expr, &slopes, &half)
-                    .intersection(range);
-                parts.push((half, sharper));
+                let sharper = self.pool.bound_by_slopes(expr, &slopes, &half);
+                parts.push((half, sharper.intersection(range)));
             }
         }
         let all = parts.iter().map(|(_, range)| *range);
@@ -194,14 +180,12 @@ impl Ranges {
                 false => Interval::EMPTY,
             }
         };
-        ends.into_iter()
-            .map(at)
-            .fold(Interval::EMPTY, Interval::hull)
+        (ends.map(at).into_iter()).fold(Interval::EMPTY, Interval::hull)
     }
 
     /// Whether every symbol occurs once, so that interval evaluation is sharp.
     fn is_single_use(&self, expr: ExprId) -> bool {
-        let mut seen = std::collections::BTreeSet::new();
+        let mut seen = BTreeSet::new();
         let mut open = vec![expr];
         while let Some(part) = open.pop() {
             if let Node::Symbol(symbol) = self.pool.node(part)
@@ -235,58 +219,4 @@ fn halves(
         halves[1][side].1 = Interval::new(middle, range.hi());
     }
     halves
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn ranges(terms: &[&str], lo: f64, hi: f64) -> Ranges {
-        let mut pool = ExprPool::new();
-        let exprs: Vec<ExprId> = (terms.iter())
-            .map(|text| pool.parse(text, &|_| true).expect("terms parse"))
-            .collect();
-        let symbols: std::collections::BTreeSet<SymbolId> = exprs
-            .iter()
-            .flat_map(|&expr| pool.symbols_of(expr))
-            .collect();
-        let domain = symbols.into_iter().map(|s| (s, Interval::new(lo, hi)));
-        let domain = domain.collect();
-        Ranges::new(pool, domain, exprs)
-    }
-
-    #[test]
-    fn coefficients_anywhere_in_their_intervals_are_covered() {
-        let mut ranges = ranges(&["sin(x)", "x"], -1.0, 1.0);
-        let parts = [(0, Interval::new(0.9, 1.1)), (1, Interval::new(-1.0, -0.8))];
-        let range = ranges.combination(&parts);
-        let largest = 1.1 * 1f64.sin() - 0.8;
-        assert!(
-            range.contains(largest) && range.contains(-largest),
-            "{range}"
-        );
-    }
-
-    #[test]
-    fn many_terms_that_share_variables_are_bounded_no_worse_than_one_by_one() {
-        let texts = ["x", "sin(x)", "x*y", "y*cos(x)", "x^2*y", "y^2", "cos(x*y)"];
-        let mut ranges = ranges(&texts, -1.0, 2.0);
-        let parts = [0.3, -0.3, 0.2, -0.7, 0.1, 0.4, -0.9];
-        let parts: Vec<Part> = (parts.iter().enumerate())
-            .map(|(row, delta)| (row, Interval::point(*delta)))
-            .collect();
-        let one_by_one = (parts.iter())
-            .map(|&(row, delta)| delta * ranges.term(row))
-            .fold(Interval::point(0.0), |sum, range| sum + range);
-        let together = ranges.combination(&parts);
-        assert!(one_by_one.lo() < together.lo() && together.hi() < one_by_one.hi());
-        let corners = [(-1.0, -1.0), (2.0, 2.0), (-1.0, 2.0), (2.0, -1.0)];
-        for (x, y) in corners.into_iter().chain([(0.7, 1.3)]) {
-            let (sin, cos) = (f64::sin(x), f64::cos(x));
-            let values = [x, sin, x * y, y * cos, x * x * y, y * y, (x * y).cos()];
-            let products = parts.iter().zip(values);
-            let sum: f64 = products.map(|(part, v)| part.1.lo() * v).sum();
-            assert!(together.contains(sum), "{together} {sum}");
-        }
-    }
 }

@@ -9,8 +9,9 @@ use super::certificate::{
     BeforeAfter, Certificate, EquationCertificate, PhaseCertificate, Tolerance,
 };
 use super::domain::{Domain, Samples, SimplifyError, check_count};
-use super::equation::{Equation, Terms, is_same_decimal};
+use super::equation::{Equation, is_same_decimal};
 use super::measure::Differences;
+use super::ranges::Ranges;
 use super::workspace::Workspace;
 use crate::artifact;
 use crate::equations::Equations;
@@ -140,7 +141,7 @@ impl<'a> PhaseProblem<'a> {
         samples: Option<&Samples>,
         phase: usize,
     ) -> Result<Self, SimplifyError> {
-        let theta = domain.theta(phase, samples, workspace.library())?;
+        let theta = domain.theta(phase, samples, &workspace.library)?;
         let factors = equations.model().state_factors();
         let recorded = samples.map_or(0, |samples| samples.phases[phase].ncols());
         Ok(Self {
@@ -168,7 +169,7 @@ impl<'a> PhaseProblem<'a> {
         tolerance: Tolerance,
     ) -> Result<(DMatrix<f64>, PhaseCertificate), SimplifyError> {
         let mut xi = self.xi.clone();
-        let mut terms = (self.domain).map(|d| Terms::new(self.workspace, self.workspace.ranges(d)));
+        let mut terms = (self.domain).map(|d| Ranges::new(self.workspace, d));
         let mut equations = Vec::new();
         for output in 0..xi.ncols() {
             let rms = self.rms(output);
@@ -186,7 +187,7 @@ impl<'a> PhaseProblem<'a> {
         let certificate = PhaseCertificate {
             name: self.name.to_owned(),
             domain: self.domain.map(|ranges| {
-                let variables = LatentVariable::all(self.workspace.library().latent_dim());
+                let variables = LatentVariable::all(self.workspace.library.latent_dim());
                 let names = variables.map(|variable| variable.to_string());
                 names.zip(ranges.iter().copied()).collect()
             }),
@@ -205,12 +206,12 @@ impl<'a> PhaseProblem<'a> {
 
     /// Simplifies an equation, and encloses its difference from the original anew. Should that exceed what is allowed,
     /// although the changes' own bounds do not, the search gets less, and in the end the equation stays as it is.
-    fn search(&self, terms: &mut Terms<'_>, output: usize, allowed: f64) -> (Equation, Interval) {
+    fn search(&self, terms: &mut Ranges<'_>, output: usize, allowed: f64) -> (Equation, Interval) {
         let mut budget = allowed;
         for _ in 0..MAX_RETREATS {
             let equation = self.equation(output).simplified(terms, budget);
             let differences = Differences::between(&self.coefficients(output), &equation.xi);
-            let bound = differences.bound(&mut terms.ranges);
+            let bound = differences.bound(terms);
             if bound.magnitude() <= allowed {
                 return (equation, bound);
             }
@@ -298,10 +299,8 @@ fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyErr
 /// The variables that any `ddz` of a phase depends on, in the order of [`LatentVariable::all`].
 fn variables(system: &Equations<'_>, phase: usize) -> Vec<LatentVariable> {
     let summands = system.phases()[phase].ddz.iter().flatten();
-    let terms: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
-    let symbols: BTreeSet<SymbolId> = (terms.into_iter())
-        .flat_map(|term| system.pool().symbols_of(system.terms()[term].expr()))
-        .collect();
+    let exprs = summands.map(|summand| system.terms()[summand.term].expr());
+    let symbols: BTreeSet<SymbolId> = exprs.flat_map(|e| system.pool().symbols_of(e)).collect();
     LatentVariable::all(system.latent_dim())
         .filter(|variable| symbols.contains(&system.symbol(*variable)))
         .collect()

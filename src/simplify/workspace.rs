@@ -5,17 +5,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::DMatrix;
 
 use super::domain::SimplifyError;
-use super::ranges::Ranges;
 use crate::equations::Equations;
-use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
-use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
+use crate::model::{Library, ModelError, ReducedModel};
+use crate::symbolic::{ExprId, ExprPool, Node, SymbolId};
 
 #[derive(Clone, Debug)]
 pub(super) struct Workspace {
-    library: Library,
+    pub library: Library,
     /// Number of the equations' own terms; the others are appended.
     original: usize,
-    rows: BTreeMap<Option<SymbolId>, usize>,
+    /// The rows of variables, and of the constant under none.
+    pub rows: BTreeMap<Option<SymbolId>, usize>,
 }
 
 impl Workspace {
@@ -24,60 +24,40 @@ impl Workspace {
     pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, ModelError> {
         let own = equations.terms();
         let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
-        let mut pool = equations.pool().clone();
         let known: BTreeSet<ExprId> = own.iter().map(|term| term.expr()).collect();
-        for text in wanted(equations) {
-            let expr = pool
-                .parse(&text, &|_| true)
-                .expect("constants and variables parse");
-            if !known.contains(&expr) {
-                texts.push(text);
-            }
-        }
+        let wanted = wanted(equations).into_iter();
+        texts.extend(
+            wanted
+                .filter(|(expr, _)| !known.contains(expr))
+                .map(|(_, text)| text),
+        );
         let dim = equations.latent_dim();
         let library = Library::from_terms(dim, &texts)
             .or_else(|_| Library::from_terms(dim, &texts[..own.len()]))?;
+        let of = |expr| match library.pool().as_symbol(expr) {
+            None if expr == ExprId::ONE => Some(None),
+            symbol => symbol.map(Some),
+        };
+        let terms = library.terms().iter().enumerate();
+        let rows = terms.filter_map(|(row, term)| Some((of(term.expr())?, row)));
         Ok(Self {
             original: own.len(),
-            rows: rows(&library),
+            rows: rows.collect(),
             library,
         })
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.library.len()
-    }
-
-    pub(crate) fn library(&self) -> &Library {
-        &self.library
     }
 
     pub(crate) fn text(&self, row: usize) -> &str {
         self.library.terms()[row].text()
     }
 
-    pub(crate) fn variable(&self, symbol: SymbolId) -> Option<usize> {
-        self.rows.get(&Some(symbol)).copied()
-    }
-
     pub(crate) fn constant(&self) -> Option<usize> {
         self.rows.get(&None).copied()
     }
 
-    pub(crate) fn ranges(&self, domain: &[Interval]) -> Ranges {
-        let variables = LatentVariable::all(self.library.latent_dim());
-        let symbols = variables.filter_map(|variable| self.library.symbol(variable));
-        let terms = self.library.terms().iter().map(|term| term.expr());
-        Ranges::new(
-            self.library.pool().clone(),
-            symbols.zip(domain.iter().copied()).collect(),
-            terms.collect(),
-        )
-    }
-
     /// The coefficients of a phase with zeros for the appended terms, one row per term.
     pub(crate) fn coefficients(&self, equations: &Equations<'_>, phase: usize) -> DMatrix<f64> {
-        let added = self.len() - self.original;
+        let added = self.library.len() - self.original;
         let own = equations.coefficients(phase);
         own.insert_rows(self.original, added, 0.0)
     }
@@ -91,7 +71,7 @@ impl Workspace {
     ) -> Result<ReducedModel, SimplifyError> {
         let used = |row: &usize| xi.iter().any(|xi| xi.row(*row).iter().any(|&c| c != 0.0));
         let rows: Vec<usize> = (0..self.original)
-            .chain((self.original..self.len()).filter(used))
+            .chain((self.original..self.library.len()).filter(used))
             .collect();
         let library = if rows.len() == self.original {
             model.library().clone()
@@ -110,35 +90,22 @@ impl Workspace {
     }
 }
 
-/// The rows of variables, and of the constant under none.
-fn rows(library: &Library) -> BTreeMap<Option<SymbolId>, usize> {
-    let of = |expr| match library.pool().as_symbol(expr) {
-        None if expr == ExprId::ONE => Some(None),
-        symbol => symbol.map(Some),
-    };
-    let terms = library.terms().iter().enumerate();
-    terms
-        .filter_map(|(row, term)| Some((of(term.expr())?, row)))
-        .collect()
-}
-
-fn wanted(equations: &Equations<'_>) -> Vec<String> {
+/// `1` and every variable of the terms in use that are no variables themselves, with their texts.
+fn wanted(equations: &Equations<'_>) -> Vec<(ExprId, String)> {
     let pool = equations.pool();
     let phases = equations.phases().iter();
     let summands = phases.flat_map(|phase| &phase.ddz).flatten();
     let active: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
-    let mut texts = vec!["1".to_owned()];
+    let mut wanted = vec![(ExprId::ONE, "1".to_owned())];
     for term in active.into_iter().map(|term| &equations.terms()[term]) {
-        if pool.as_symbol(term.expr()).is_some() {
-            continue;
+        if pool.as_symbol(term.expr()).is_none() {
+            let symbols = pool.symbols_of(term.expr()).into_iter();
+            wanted.extend(symbols.map(|s| (pool.symbol_expr(s), pool.symbol_name(s).to_owned())));
         }
-        let symbols = pool.symbols_of(term.expr());
-        let names = symbols.iter().map(|&symbol| pool.symbol_name(symbol));
-        texts.extend(names.map(str::to_owned));
     }
     let mut seen = BTreeSet::new();
-    texts.retain(|text| seen.insert(text.clone()));
-    texts
+    wanted.retain(|(expr, _)| seen.insert(*expr));
+    wanted
 }
 
 /// Whether an expression calls an elementary function, or has a power that is not a whole number.

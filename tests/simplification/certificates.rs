@@ -339,6 +339,28 @@ fn bound_of_dropped_independent_terms_is_reached_at_a_corner() {
 }
 
 #[test]
+fn bound_of_dropped_terms_that_share_variables_is_sharper_than_their_sum() {
+    let sum = "0.3 z1; -0.3 sin(z1); 0.2 z1*dz1; -0.7 dz1*cos(z1); 0.1 z1^2*dz1; 0.4 dz1^2; -0.9 cos(z1*dz1)";
+    let made = simplified(sum, [(-1.0, 2.0), (-1.0, 2.0), UNIT], 100.0);
+    let equation = &made.certificate.phases[0].equations[0];
+    let (together, apart) = (equation.bound, equation.sum_of_bounds);
+    assert_eq!(left(&made.model), "");
+    assert!(apart.lo() < together.lo() && together.hi() < apart.hi());
+    for (x, y) in [
+        (-1.0, -1.0),
+        (2.0, 2.0),
+        (-1.0, 2.0),
+        (2.0, -1.0),
+        (0.7, 1.3),
+    ] {
+        let (sin, cos) = (f64::sin(x), f64::cos(x));
+        let lines = 0.3 * x - 0.3 * sin + 0.2 * x * y - 0.7 * y * cos;
+        let value = lines + 0.1 * x * x * y + 0.4 * y * y - 0.9 * (x * y).cos();
+        assert!(together.contains(value), "{together} {value}");
+    }
+}
+
+#[test]
 fn domain_around_samples_has_their_extremes_and_margin() {
     let model = single("1 z1");
     let points = [1.0, 0.0, -1.0, 3.0, 0.0, 1.0, 2.0, 0.0, 0.0];

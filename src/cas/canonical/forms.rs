@@ -131,19 +131,16 @@ impl<'p> CanonicalForms<'p> {
     pub(super) fn removed(&mut self, form: &CanonicalForm, atom: u32) -> Option<CanonicalForm> {
         let (top, bottom) = match self.atoms[atom as usize].clone() {
             Atom::Sum(sum) => (sum, CanonicalForm::one()),
-            Atom::Tan(argument) => {
-                let [plus, minus] = exponentials(&argument, true);
-                (
-                    plus.minus(&minus).scaled(&Coefficient::imaginary(-1, 1)),
-                    plus.plus(&minus),
-                )
+            Atom::Call(function @ (Function::Tan | Function::Tanh), argument) => {
+                let [plus, minus] = exponentials(&argument, function.is_circular());
+                let unit = match function.is_circular() {
+                    true => Coefficient::imaginary(-1, 1),
+                    false => Coefficient::integer(1),
+                };
+                (plus.minus(&minus).scaled(&unit), plus.plus(&minus))
             }
-            Atom::Tanh(argument) => {
-                let [plus, minus] = exponentials(&argument, false);
-                (plus.minus(&minus), plus.plus(&minus))
-            }
-            Atom::Abs(base) => {
-                let sign = self.atom(Atom::Sign(base.clone()));
+            Atom::Call(Function::Abs, base) => {
+                let sign = self.call(Function::Sign, base.clone());
                 (self.product(&base, &sign)?, CanonicalForm::one())
             }
             _ => return None,
@@ -171,6 +168,10 @@ impl<'p> CanonicalForms<'p> {
 
     pub(super) fn atom(&mut self, atom: Atom) -> CanonicalForm {
         CanonicalForm::atom(self.number(atom))
+    }
+
+    pub(super) fn call(&mut self, function: Function, argument: CanonicalForm) -> CanonicalForm {
+        self.atom(Atom::Call(function, argument))
     }
 
     pub(super) fn number(&mut self, atom: Atom) -> u32 {
@@ -259,8 +260,7 @@ impl<'p> CanonicalForms<'p> {
                     _ => plus.plus(&minus).scaled(&half),
                 })
             }
-            Function::Tan => self.odd(argument, Atom::Tan),
-            Function::Tanh => self.odd(argument, Atom::Tanh),
+            Function::Tan | Function::Tanh => self.odd(function, argument),
             Function::Exp => self.exp(argument.clone()),
             Function::Log => self.log(argument),
             Function::Sqrt => self.root(argument, 2),
@@ -269,18 +269,14 @@ impl<'p> CanonicalForms<'p> {
         }
     }
 
-    pub(super) fn odd(
-        &mut self,
-        argument: &CanonicalForm,
-        atom: fn(CanonicalForm) -> Atom,
-    ) -> Option<CanonicalForm> {
+    fn odd(&mut self, function: Function, argument: &CanonicalForm) -> Option<CanonicalForm> {
         let argument = self.argument(argument.clone());
         let Some(leading) = argument.leading() else {
             return Some(CanonicalForm::default());
         };
         let sign = leading.sign();
         let argument = argument.scaled(&sign);
-        Some(self.atom(atom(argument)).scaled(&sign))
+        Some(self.call(function, argument).scaled(&sign))
     }
 
     /// An argument of a function without its radii: one from before, if there are numbers that round to the decimals of
@@ -338,10 +334,10 @@ impl<'p> CanonicalForms<'p> {
 
     fn is_removable(&self, atom: u32) -> bool {
         match &self.atoms[atom as usize] {
-            Atom::Sum(_) | Atom::Tan(_) | Atom::Tanh(_) => true,
+            Atom::Sum(_) | Atom::Call(Function::Tan | Function::Tanh, _) => true,
             // `|x + y| = (x + y) sign(x + y)`; what one atom is has rules of its own.
-            Atom::Abs(base) => {
-                let sign = Atom::Sign(base.clone());
+            Atom::Call(Function::Abs, base) => {
+                let sign = Atom::Call(Function::Sign, base.clone());
                 base.as_atom().is_none() && self.numbers.contains_key(&sign)
             }
             _ => false,

@@ -2,18 +2,17 @@
 //!
 //! Complex rational coefficients with a radius.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use num_bigint::BigInt;
 use num_traits::{One, Signed, ToPrimitive, Zero};
 
 pub(super) use num_rational::BigRational as Rational;
 
-use crate::{ExprId, Number, SymbolId};
+use crate::{ExprId, Function, Number, SymbolId};
 
-/// Most terms of a form, and most products of terms that one multiplication makes.
+/// Most terms of a form.
 const MAX_TERMS: usize = 2_000;
-const MAX_PRODUCTS: usize = 40_000;
 
 /// A factor that is not taken apart.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -23,11 +22,8 @@ pub(super) enum Atom {
     Sum(CanonicalForm),
     /// `form^(1/index)`, to powers below the index.
     Root(CanonicalForm, u32),
-    Log(CanonicalForm),
-    Abs(CanonicalForm),
-    Sign(CanonicalForm),
-    Tan(CanonicalForm),
-    Tanh(CanonicalForm),
+    /// A function that is no exponential and no root.
+    Call(Function, CanonicalForm),
     /// An expression that is too large to take apart, or has no value.
     Opaque(ExprId),
 }
@@ -79,10 +75,9 @@ impl Monomial {
 
     pub(super) fn reciprocal(&self) -> Self {
         let powers = self.powers.iter();
+        let powers = powers.map(|(atom, power)| (*atom, power.saturating_neg()));
         Self {
-            powers: powers
-                .map(|(atom, power)| (*atom, power.saturating_neg()))
-                .collect(),
+            powers: powers.collect(),
             exponent: self.exponent.scaled(&Coefficient::integer(-1)),
         }
     }
@@ -151,10 +146,9 @@ impl CanonicalForm {
     }
 
     pub(super) fn as_constant(&self) -> Option<Coefficient> {
-        let mut terms = self.terms.iter();
-        match (terms.next(), terms.next()) {
-            (None, _) => Some(Coefficient::integer(0)),
-            (Some((monomial, coefficient)), None) if monomial.is_one() => Some(coefficient.clone()),
+        match self.as_term() {
+            None if self.terms.is_empty() => Some(Coefficient::integer(0)),
+            Some((coefficient, monomial)) if monomial.is_one() => Some(coefficient.clone()),
             _ => None,
         }
     }
@@ -168,11 +162,8 @@ impl CanonicalForm {
     }
 
     pub(super) fn as_term(&self) -> Option<(&Coefficient, &Monomial)> {
-        let mut terms = self.terms.iter();
-        match (terms.next(), terms.next()) {
-            (Some((monomial, coefficient)), None) => Some((coefficient, monomial)),
-            _ => None,
-        }
+        let (monomial, coefficient) = self.terms.first_key_value()?;
+        (self.terms.len() == 1).then_some((coefficient, monomial))
     }
 
     /// The form divided by size and sign of its leading coefficient, and these; nothing for zero, or where the size is
@@ -182,6 +173,14 @@ impl CanonicalForm {
         let (size, sign) = (Coefficient::from(leading.size()), leading.sign());
         let factor = size.reciprocal()?.times(&sign);
         Some((self.scaled(&factor), size, sign))
+    }
+
+    /// The monomials in the exponents of its terms.
+    pub(super) fn exponents(&self) -> BTreeSet<&Monomial> {
+        let monomials = self.terms.keys();
+        monomials
+            .flat_map(|monomial| monomial.exponent.terms.keys())
+            .collect()
     }
 
     pub(super) fn leading(&self) -> Option<&Coefficient> {
@@ -194,10 +193,9 @@ impl CanonicalForm {
 
     pub(super) fn exact(&self) -> Self {
         let terms = self.terms.iter().filter(|(_, c)| !c.is_zero());
+        let terms = terms.map(|(monomial, c)| (monomial.clone(), c.exact()));
         Self {
-            terms: terms
-                .map(|(monomial, c)| (monomial.clone(), c.exact()))
-                .collect(),
+            terms: terms.collect(),
         }
     }
 
@@ -223,23 +221,6 @@ impl CanonicalForm {
     /// `self - other`.
     pub fn minus(&self, other: &Self) -> Self {
         self.plus(&other.scaled(&Coefficient::integer(-1)))
-    }
-
-    pub(super) fn products(&self, other: &Self) -> Option<Vec<(Coefficient, Monomial)>> {
-        let count = self.terms.len().checked_mul(other.terms.len())?;
-        if count > MAX_PRODUCTS {
-            return None;
-        }
-        let mut products = Vec::with_capacity(count);
-        for (monomial, coefficient) in &self.terms {
-            for (other_monomial, other_coefficient) in &other.terms {
-                products.push((
-                    coefficient.times(other_coefficient),
-                    monomial.times(other_monomial),
-                ));
-            }
-        }
-        Some(products)
     }
 
     pub(super) fn is_small(&self) -> bool {

@@ -1,16 +1,19 @@
 //! Products, powers, quotients and square roots of normal forms, with the powers of atoms in their ranges.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use num_traits::Signed;
 
 use super::forms::CanonicalForms;
 use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, nearest, ratio};
+use crate::Function;
 use crate::number::power;
 
 /// Largest power of a sum that is multiplied out, and of a single term.
 const MAX_SUM_POWER: u32 = 40;
 const MAX_TERM_POWER: u32 = 2_000;
+/// Most products of terms that one multiplication makes.
+const MAX_PRODUCTS: usize = 40_000;
 const MAX_STEPS: usize = 200_000;
 /// Most terms of a square or dividend.
 const MAX_SQUARE: usize = 60;
@@ -21,8 +24,12 @@ impl CanonicalForms<'_> {
         a: &CanonicalForm,
         b: &CanonicalForm,
     ) -> Option<CanonicalForm> {
-        let products = a.products(b)?;
-        self.settled(products)
+        if a.terms.len().checked_mul(b.terms.len())? > MAX_PRODUCTS {
+            return None;
+        }
+        let pairs = (a.terms.iter()).flat_map(|of_a| b.terms.iter().map(move |of_b| (of_a, of_b)));
+        let products = pairs.map(|((m, c), (n, d))| (c.times(d), m.times(n)));
+        self.settled(products.collect())
     }
 
     /// The sum of terms, with the powers of roots, magnitudes and signs in their ranges.
@@ -67,7 +74,7 @@ impl CanonicalForms<'_> {
                         return Some((with_power(rest), self.power(&base, whole)));
                     }
                 }
-                Atom::Abs(base) => {
+                Atom::Call(Function::Abs, base) => {
                     let rest = power.rem_euclid(2);
                     if rest != power {
                         return Some((with_power(rest), self.power(&base, power - rest)));
@@ -78,9 +85,12 @@ impl CanonicalForms<'_> {
                     if let Some(shared) = shared {
                         // |x| / x = sign(x).
                         let rest = monomial.without(atom).times(&Monomial::atom(shared, 1));
-                        return Some((rest, Some(self.atom(Atom::Sign(base)))));
+                        return Some((rest, Some(self.call(Function::Sign, base))));
                     }
-                    let sign = self.numbers.get(&Atom::Sign(base.clone())).copied();
+                    let sign = self
+                        .numbers
+                        .get(&Atom::Call(Function::Sign, base.clone()))
+                        .copied();
                     let sign = sign.map_or((0, 0), |sign| (sign, monomial.power_of(sign)));
                     if sign.1 > 0 {
                         // |x| sign(x) = x, |x| sign(x)^2 = |x|.
@@ -91,23 +101,22 @@ impl CanonicalForms<'_> {
                         });
                     }
                 }
-                Atom::Sign(_) if !(0..=2).contains(&power) => {
+                Atom::Call(Function::Sign, _) if !(0..=2).contains(&power) => {
                     let rest = 2 - power.rem_euclid(2);
                     return Some((with_power(rest), Some(CanonicalForm::one())));
                 }
-                Atom::Sign(base) => {
+                Atom::Call(Function::Sign, base) => {
                     let shared = base.as_atom().filter(|base| monomial.power_of(*base) != 0);
                     if let Some(shared) = shared {
                         // x sign(x) = |x|, x sign(x)^2 = x, sign(x)/x as it is.
                         let rest = monomial.without(atom);
                         let is_over = monomial.power_of(shared) > 0;
-                        let magnitude = Atom::Abs(base);
                         return Some(match power {
                             2 => (rest, Some(CanonicalForm::one())),
                             _ if !is_over => continue,
                             _ => {
                                 let rest = rest.times(&Monomial::atom(shared, -1));
-                                (rest, Some(self.atom(magnitude)))
+                                (rest, Some(self.call(Function::Abs, base)))
                             }
                         });
                     }
@@ -122,18 +131,19 @@ impl CanonicalForms<'_> {
         if exponent == 0 {
             return Some(CanonicalForm::one());
         }
-        let base = if exponent < 0 {
-            self.reciprocal(base)?
-        } else {
-            base.clone()
+        let base = match exponent < 0 {
+            true => self.reciprocal(base)?,
+            false => base.clone(),
         };
         let count = exponent.unsigned_abs();
-        let limit = if base.terms.len() > 1 {
-            MAX_SUM_POWER
-        } else {
-            MAX_TERM_POWER
-        };
-        if count > limit {
+        let is_sum = base.terms.len() > 1;
+        if count
+            > if is_sum {
+                MAX_SUM_POWER
+            } else {
+                MAX_TERM_POWER
+            }
+        {
             return None;
         }
         power(CanonicalForm::one(), base, count.into(), |a, b| {
@@ -249,13 +259,8 @@ struct Order {
 
 impl Order {
     fn of(form: &CanonicalForm) -> Self {
-        let all = form
-            .terms
-            .keys()
-            .flat_map(|monomial| monomial.exponent.terms.keys());
-        let distinct: BTreeSet<&Monomial> = all.collect();
-        let weighted = (distinct.into_iter().enumerate())
-            .map(|(place, of)| (of.clone(), (place as f64 + 2.7).sqrt()));
+        let distinct = form.exponents().into_iter().enumerate();
+        let weighted = distinct.map(|(place, of)| (of.clone(), (place as f64 + 2.7).sqrt()));
         Self {
             exponents: weighted.collect(),
         }

@@ -1,13 +1,12 @@
 //! Roots, logarithms, exponentials and magnitudes of normal forms.
 
-use std::collections::BTreeSet;
-
 use num_bigint::{BigInt, BigUint};
 use num_integer::Integer;
 use num_traits::{ToPrimitive, Zero};
 
 use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
 use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, ratio};
+use crate::Function;
 
 impl CanonicalForms<'_> {
     /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive number, forms that
@@ -92,11 +91,7 @@ impl CanonicalForms<'_> {
         &mut self,
         form: &CanonicalForm,
     ) -> Option<(CanonicalForm, Option<CanonicalForm>)> {
-        let all = form
-            .terms
-            .keys()
-            .flat_map(|monomial| monomial.exponent.terms.keys());
-        let names: BTreeSet<&Monomial> = all.collect();
+        let names = form.exponents();
         let power = |monomial: &Monomial, name: &Monomial| {
             let found = monomial.exponent.terms.get(name);
             found.map_or_else(Rational::zero, |power| power.re.clone())
@@ -118,8 +113,10 @@ impl CanonicalForms<'_> {
     }
 
     fn is_positive(&self, atom: u32) -> bool {
-        matches!(self.atoms[atom as usize], Atom::Root(..) | Atom::Abs(_))
-            || self.positive.contains(&atom)
+        matches!(
+            self.atoms[atom as usize],
+            Atom::Root(..) | Atom::Call(Function::Abs, _)
+        ) || self.positive.contains(&atom)
     }
 
     /// The magnitude of an atom: itself if it is positive.
@@ -130,7 +127,7 @@ impl CanonicalForms<'_> {
             Atom::Sum(sum) => self.abs(&sum),
             _ if self.is_positive(atom) => Some(base),
             _ if self.negative.contains(&atom) => Some(base.scaled(&Coefficient::integer(-1))),
-            _ => Some(self.atom(Atom::Abs(base))),
+            _ => Some(self.call(Function::Abs, base)),
         }
     }
 
@@ -161,12 +158,12 @@ impl CanonicalForms<'_> {
         let split = self.split(form)?;
         let mut sum = split.exponent;
         for (prime, power) in prime_powers(&split.scale) {
-            let log = self.atom(Atom::Log(prime));
+            let log = self.call(Function::Log, prime);
             sum = sum.plus(&log.scaled(&Coefficient::integer(power.into())));
         }
         for (base, power) in split.factors {
             let (base, index) = self.radicand(base);
-            let log = self.atom(Atom::Log(base));
+            let log = self.call(Function::Log, base);
             sum = sum.plus(&log.scaled(&ratio(power, index).into()));
         }
         Some(sum)
@@ -220,7 +217,7 @@ impl CanonicalForms<'_> {
         for (monomial, coefficient) in &argument.terms {
             let log = match (monomial.powers.as_slice(), monomial.exponent.is_zero()) {
                 ([(atom, 1)], true) => match &self.atoms[*atom as usize] {
-                    Atom::Log(base) => Some(base.clone()),
+                    Atom::Call(Function::Log, base) => Some(base.clone()),
                     _ => None,
                 },
                 _ => None,
@@ -255,7 +252,7 @@ impl CanonicalForms<'_> {
             return Some(form.scaled(&sign.times(&known)));
         }
         let Some((_, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
-            return Some(self.atom(Atom::Abs(normed)).scaled(&scale));
+            return Some(self.call(Function::Abs, normed).scaled(&scale));
         };
         let mut product = CanonicalForm::exponential(monomial.exponent.clone());
         for &(atom, power) in &monomial.powers {
@@ -287,7 +284,7 @@ impl CanonicalForms<'_> {
             .filter(|(coefficient, _)| coefficient.is_one())
             .map(|(_, monomial)| monomial.powers.clone());
         let Some(powers) = powers.filter(|powers| self.have_signs(powers)) else {
-            return Some(self.atom(Atom::Sign(normed)).scaled(&sign));
+            return Some(self.call(Function::Sign, normed).scaled(&sign));
         };
         let mut product = CanonicalForm::constant(sign);
         for (atom, power) in powers {
@@ -302,8 +299,8 @@ impl CanonicalForms<'_> {
             let base = CanonicalForm::atom(atom);
             let (factor, power) = match self.atoms[atom as usize].clone() {
                 Atom::Sum(sum) => (self.sign(&sum)?, power),
-                Atom::Abs(inner) => (self.sign(&inner)?, 2),
-                _ => (self.atom(Atom::Sign(base)), power),
+                Atom::Call(Function::Abs, inner) => (self.sign(&inner)?, 2),
+                _ => (self.call(Function::Sign, base), power),
             };
             let factor = self.power(&factor, 2 - (power.abs() % 2))?;
             product = self.product(&product, &factor)?;
@@ -322,7 +319,10 @@ impl CanonicalForms<'_> {
     fn have_signs(&self, powers: &[(u32, i32)]) -> bool {
         powers.iter().all(|(atom, _)| {
             let atom = &self.atoms[*atom as usize];
-            matches!(atom, Atom::Symbol(_) | Atom::Sum(_) | Atom::Abs(_))
+            matches!(
+                atom,
+                Atom::Symbol(_) | Atom::Sum(_) | Atom::Call(Function::Abs, _)
+            )
         })
     }
 }

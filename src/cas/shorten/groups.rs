@@ -108,10 +108,9 @@ impl Shortener<'_> {
         let mut sines = Vec::new();
         for &(coefficient, expr) in summands {
             for atom in self.pool.atoms_of(expr) {
-                let Node::Apply(function @ (Function::Sin | Function::Cos | Function::Tan), angle) =
-                    *self.pool.node(atom)
-                else {
-                    continue;
+                let (function, angle) = match *self.pool.node(atom) {
+                    Node::Apply(function, angle) if function.is_circular() => (function, angle),
+                    _ => continue,
                 };
                 sines.push(self.pool.apply(Function::Sin, angle));
                 if function == Function::Cos && self.pool.split(angle).0.is_even() {
@@ -132,8 +131,12 @@ impl Shortener<'_> {
     }
 
     fn links_of(&mut self, expr: ExprId, waves: ExprId) -> Vec<Link> {
-        let is_tangent =
-            |factor: &ExprId| matches!(self.pool.node(*factor), Node::Apply(Function::Tan, _));
+        // Tangents meet sines and cosines.
+        let is_tangent = |factor: &ExprId| match *self.pool.node(*factor) {
+            Node::Apply(Function::Sin | Function::Cos, _) => false,
+            Node::Apply(function, _) => function.is_circular(),
+            _ => false,
+        };
         let is_alone = self.plain[&expr] && !self.pool.factors_of(expr).iter().any(is_tangent);
         if is_alone || !self.pool.affords(1) {
             return vec![Link::Monomial(expr)];
@@ -184,12 +187,13 @@ impl Shortener<'_> {
         }
         for factor in self.pool.factors_of(expr).to_vec() {
             match self.pool.function_power(factor) {
-                Some((Function::Sin | Function::Cos, _, power)) if power < 0 => {
+                Some((Function::Sin | Function::Cos, _, 0..)) => {}
+                Some((Function::Sin | Function::Cos, ..)) => {
                     links.push(Link::Monomial(self.pool.div(expr, factor)));
                 }
-                Some((Function::Tan, angle, _)) => {
+                Some((function, angle, _)) if function.is_circular() => {
                     let cofactor = self.pool.div(expr, factor);
-                    let tangent = self.pool.apply(Function::Tan, angle);
+                    let tangent = self.pool.apply(function, angle);
                     links.push(Link::Tangent(self.pool.mul(cofactor, tangent)));
                 }
                 _ => {}

@@ -206,10 +206,9 @@ impl<'a> Shortener<'a> {
         let order = self.pool.reachable(&exprs);
         let mut families: Vec<(ExprId, Vec<(Number, ExprId)>)> = Vec::new();
         for &expr in &order {
-            let Node::Apply(Function::Sin | Function::Cos | Function::Tan, angle) =
-                *self.pool.node(expr)
-            else {
-                continue;
+            let angle = match *self.pool.node(expr) {
+                Node::Apply(function, angle) if function.is_circular() => angle,
+                _ => continue,
             };
             let (factor, monic) = self.pool.content(angle);
             if !matches!(self.pool.node(monic), Node::Sum(_)) {
@@ -268,7 +267,7 @@ impl<'a> Shortener<'a> {
                 let (part, exponent) = match (self.pool.node(base), exponent) {
                     (_, Exponent::Number(exponent)) if exponent.is_negative() => continue,
                     (Node::Sum(_), Exponent::Number(exponent)) => (base, exponent),
-                    (Node::Apply(Function::Sin | Function::Cos | Function::Tan, _), _) => continue,
+                    (Node::Apply(function, _), _) if function.is_circular() => continue,
                     (Node::Symbol(_), Exponent::Number(exponent))
                         if exponent.as_integer().is_some() =>
                     {
