@@ -7,7 +7,7 @@ use romc_codegen::{ir, lower};
 use romc_control::online;
 use romc_data::recording;
 #[cfg(test)]
-use romc_model::{artifact, robot_file};
+use romc_model::artifact;
 use romc_model::{files, limits, model};
 use romc_robot as robot;
 
