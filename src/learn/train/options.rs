@@ -120,7 +120,8 @@ pub struct EncoderOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
-    /// The centre of mass, then rows over joints and pitch, left and right alike; the dynamics obey what is known.
+    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right; the
+    /// dynamics obey what is known of them.
     Named,
     /// Any rows over all coordinates that move or are actuated.
     Free,
