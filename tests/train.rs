@@ -1,5 +1,9 @@
 //! Training on the checked-in jumps, and on input that cannot be trained on.
 
+#[path = "train/definitions.rs"]
+mod definitions;
+#[path = "train/known_system.rs"]
+mod known_system;
 mod outside;
 
 use std::cell::Cell;
@@ -17,8 +21,8 @@ use romc::recording::{self, Recording};
 use romc::robot::{Actuators, Robot, WrenchFrame};
 use romc::sim::{LatentSegment, Restart, rollout};
 use romc::train::{
-    self, Coordinates, EncoderOptions, Monitor, Origin, Progress, Recordings, ScaleOptions,
-    SetMetrics, Split, TrainError, TrainOptions, Trained, Transfer,
+    self, Coordinates, Monitor, Origin, Progress, Recordings, ScaleOptions, SetMetrics, Split,
+    TrainError, TrainOptions, Trained, Transfer,
 };
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {
@@ -108,14 +112,9 @@ fn named_coordinates_predict_jumps_of_another_controller_which_free_ones_do_not(
     let (training, validation) = (jumps("train", 14), jumps("validation", 3));
     let other = jumps_of("go1-other", "jump", 8);
     let assessed = |coordinates| {
-        let options = TrainOptions {
-            actuators: Some(losses_of_the_simulated_go1()),
-            encoder: EncoderOptions {
-                coordinates,
-                ..EncoderOptions::default()
-            },
-            ..TrainOptions::new("d4", 4)
-        };
+        let mut options = TrainOptions::new("d4", 4);
+        options.actuators = Some(losses_of_the_simulated_go1());
+        options.encoder.coordinates = coordinates;
         let trained = train_with(&training, &validation, &options).expect("trains");
         train::assess(&trained.model, &other).expect("the model fits")
     };
@@ -538,16 +537,25 @@ fn closed_form_cancelled_during_a_later_seed_keeps_the_seeds_begun() {
 }
 
 fn joint(training: &[Recording], options: &TrainOptions, news: &mut Vec<String>) -> Trained {
+    joint_with([training, &[]], options, news).expect("trains")
+}
+
+/// Trains on recordings, judged by others.
+fn joint_with(
+    [training, validation]: [&[Recording]; 2],
+    options: &TrainOptions,
+    news: &mut Vec<String>,
+) -> Result<Trained, TrainError> {
     let cancel = AtomicBool::new(false);
     let mut listener = |progress: Progress| {
         if let Progress::Done { text, .. } = progress {
             news.push(text);
         }
     };
-    let recordings = Recordings::new(training, &[]);
+    let recordings = Recordings::new(training, validation);
     let origin = Origin::new("romc train", paths(training));
     let mut monitor = Monitor::new(&mut listener, &cancel);
-    train::joint(recordings, go1(), options, &origin, &mut monitor).expect("trains")
+    train::joint(recordings, go1(), options, &origin, &mut monitor)
 }
 
 fn few_epochs(activation: Activation) -> TrainOptions {

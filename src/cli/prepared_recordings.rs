@@ -16,8 +16,7 @@ type DividedJump = (PathBuf, usize, usize);
 const SETS: [&str; 3] = ["training", "validation", "test"];
 
 pub(super) struct RecordedSets {
-    /// Jumps that the model is fitted to, those that choose between candidates, and those used only for the final
-    /// metrics; empty before [`Self::read`].
+    /// Empty before [`Self::read`].
     pub sets: [RecordingSet; 3],
     files: [Vec<RecordingFile>; 3],
     robot: &'static Robot,
@@ -27,8 +26,7 @@ pub(super) struct RecordedSets {
 }
 
 impl RecordedSets {
-    /// The recordings that the arguments name, divided by their shares if they have any, to be conditioned as the
-    /// settings say.
+    /// The recordings that the arguments name, divided by their shares if they have any.
     pub(super) fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
@@ -91,12 +89,12 @@ impl RecordedSets {
     pub(super) fn division(&self) -> Option<(String, Value)> {
         let (mut text, mut json) = (String::new(), Map::new());
         for (name, places) in SETS.into_iter().zip(self.divided.as_ref()?) {
-            let (mut jumps, mut rows) = (Vec::new(), Vec::new());
-            for (path, _, row) in places {
+            let of_jump = |(path, _, row): &DividedJump| {
                 let file = path.display().to_string();
-                jumps.push(format!("{file} (row {row})"));
-                rows.push(json!({ "file": file, "row": row }));
-            }
+                let words = format!("{file} (row {row})");
+                (words, json!({ "file": file, "row": row }))
+            };
+            let (jumps, rows): (Vec<_>, Vec<_>) = places.iter().map(of_jump).unzip();
             let count = counted(jumps.len(), "jump");
             text += &format!("{name}, {count}: {}\n", jumps.join(", "));
             json.insert(name.to_owned(), rows.into());
@@ -124,14 +122,9 @@ impl RecordedSets {
         })
     }
 
-    /// Reports on stderr which files have implausible samples, or legs on the ground near a singularity, and what
-    /// became of them.
     pub(super) fn report_findings(&self) {
-        self.sets[0]
-            .reading
-            .lines()
-            .iter()
-            .for_each(|line| note(line));
+        let reading = self.sets[0].reading.lines();
+        reading.iter().for_each(|line| note(line));
         for (file, mismatch) in self.sets.iter().flat_map(|set| &set.mismatches) {
             note(&format!("{}: {mismatch}", file.display()));
         }

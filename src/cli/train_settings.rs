@@ -34,7 +34,6 @@ impl TrainSettings {
         read_settings(path, Self::check)
     }
 
-    /// The settings of the command line over those of its file, if it names one.
     pub(super) fn effective(arguments: &TrainArguments) -> Result<Self, Error> {
         let mut settings = arguments.settings.clone();
         if let Some(path) = &arguments.config {
@@ -50,8 +49,7 @@ impl TrainSettings {
         Ok(settings)
     }
 
-    /// The options that the settings describe; actuators that recordings tell are still to be
-    /// [identified](Self::identify).
+    /// Without actuators that are [identified](Self::identify).
     pub(super) fn options(
         &self,
         latent_dim: usize,
@@ -106,11 +104,8 @@ impl TrainSettings {
         Ok(options)
     }
 
-    /// Sets the actuators that are identified from the first training recordings, if the settings want those; where
-    /// there are none, a note on stderr says so.
-    ///
-    /// # Errors
-    /// [`IdentifyError::Contradiction`] for recordings that are not of one robot, also where no actuators are wanted.
+    /// Sets the actuators that are identified from the first training recordings, if the settings want those. Recordings
+    /// that are not of one robot are refused, also where no actuators are wanted.
     pub(super) fn identify(
         &self,
         options: &mut TrainOptions,
@@ -149,7 +144,7 @@ impl TrainSettings {
         }
     }
 
-    /// The layers of encoder and decoder; the decoder mirrors the encoder unless it is described itself.
+    /// The decoder mirrors the encoder unless it is described itself.
     fn maps(&self) -> MapOptions {
         let widths = |given: &Option<Widths>| given.as_ref().map(|widths| widths.0.clone());
         let encoder_layers = widths(&self.encoder_layers).unwrap_or_default();
@@ -161,7 +156,7 @@ impl TrainSettings {
         }
     }
 
-    /// The method that is asked for: the joint one if a setting is given that it alone knows.
+    /// By default the joint one if a setting is given that it alone has.
     pub(super) fn method(&self) -> Method {
         self.method.unwrap_or(match self.of_the_joint_method() {
             None => Method::ClosedForm,
@@ -231,14 +226,11 @@ impl TrainSettings {
         self.given().into_iter().map(flag).collect()
     }
 
-    /// Refuses settings that the method does not use, an activation without hidden layers, rows to filter without a
-    /// filter, and named coordinates where a method learns others.
+    /// Refuses settings that have no use beside the others.
     pub(super) fn check_pairs(&self) -> Result<(), Error> {
         let (method, is_linear) = (self.method(), self.maps().is_linear());
         let given = |names, when: bool| self.first(names).filter(|_| when);
-        let has_weight = self
-            .bptt_weight
-            .is_some_and(|weight| f64::from(weight) != 0.0);
+        let has_weight = (self.bptt_weight).is_some_and(|weight| f64::from(weight) != 0.0);
         let is_named = self.coordinates == Some(Coordinates::Named);
         let is_published = self.paper && method == Method::Joint;
         let activation = self.activation.unwrap_or(Activation::Elu);
@@ -291,8 +283,7 @@ impl TrainSettings {
         fault.map_or(Ok(()), |fault| Err(fault.into()))
     }
 
-    /// The first setting that this training does not depend on, in words: two named coordinates are those of the centre
-    /// of mass, which nothing searches, and the search of the closed form ends in one model from every start.
+    /// The first setting that this training does not depend on, in words.
     pub(super) fn without_effect(&self, options: &TrainOptions) -> Option<String> {
         let is_held = options.coordinates() == Coordinates::Named && options.latent_dim == 2;
         let searched = self.first("lift-weight body-weight no-rotation");

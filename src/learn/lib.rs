@@ -8,6 +8,8 @@ use romc_control::online;
 use romc_data::recording;
 #[cfg(test)]
 use romc_model::robot_file;
+#[cfg(test)]
+use romc_model::artifact;
 use romc_model::{files, limits, model};
 use romc_robot as robot;
 

@@ -1,10 +1,5 @@
-//! From a model to what the controller runs on: its numbers and its programs.
-//!
-//! The one place where the controller meets [`ReducedModel`]; what it makes is data.
-//!
-//! Names of the controller's choices on the command line and in Python.
-//!
-//! Errors of setting up a controller.
+//! From a model to what the controller runs on: its numbers and its programs. The one place where the controller meets
+//! [`ReducedModel`].
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,14 +14,12 @@ use crate::online::{
     MpcSettings, NonlinearMaps, Solver,
 };
 use crate::recording::RecordingError;
-use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
+use crate::robot::{JOINT_DIM, STATE_DIM};
 
-/// Share of the time between a recording's samples below which the controller's step is too short for it: a step may be
-/// shorter by what rounds it.
+/// Share of a recording's sampling below which the controller's step is too short for it.
 pub const STEP_SLACK: f64 = 0.99;
 
-/// Share of the mean variance that is added to every variance, so that a direction in which the training inputs never
-/// moved has a finite weight.
+/// Share of the mean variance added to every variance, for directions in which training inputs never moved.
 const VARIANCE_FLOOR: f64 = 1e-6;
 
 /// The accelerations of a model's phases, run by the interpreter.
@@ -55,8 +48,6 @@ impl LatentDynamics for ModelDynamics {
     }
 }
 
-/// A controller of a model.
-///
 /// # Errors
 /// [`MpcError::Control`] for settings out of range or a problem that the solver refuses, those of [`control_model`] if
 /// the model lacks something and [`MpcError::Lower`] if its dynamics do not compile.
@@ -66,10 +57,8 @@ pub fn controller(model: &ReducedModel, settings: MpcSettings) -> Result<Control
     Ok(Controller::with_plant(plant, dynamics, settings)?)
 }
 
-/// Reads off a model what the controller needs.
-///
-/// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`, and the statistics of
-/// the inputs are projected there, until a reference comes.
+/// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`, until a reference
+/// comes.
 ///
 /// # Errors
 /// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input statistics, [`MpcError::StateDim`]
@@ -102,7 +91,9 @@ pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
         encoder: tangent.encode,
         lift: tangent.lift,
         projection: tangent.project,
-        phase_of_feet: std::array::from_fn(|bits| model.phase_for(pattern(bits))),
+        phase_of_feet: std::array::from_fn(|bits| {
+            model.phase_for(std::array::from_fn(|foot| bits >> foot & 1 == 1))
+        }),
         nonlinear: None,
     };
     Ok(plant.checked()?)
@@ -116,34 +107,35 @@ const CHECKED: &str = "invariant: the plant was made of this model";
 
 impl NonlinearMaps for ModelMaps {
     fn encode(&self, x: &[f64], z: &mut [f64]) {
-        let encoded = self.0.encode(&DVector::from_column_slice(x));
-        z.copy_from_slice(encoded.expect(CHECKED).as_slice());
+        let encoded = self.0.encode(&vector(x)).expect(CHECKED);
+        z.copy_from_slice(encoded.as_slice());
     }
 
     fn decode(&self, z: &[f64]) -> [f64; STATE_DIM] {
-        let decoded = self.0.decode(&DVector::from_column_slice(z));
-        let decoded = decoded.expect(CHECKED);
+        let decoded = self.0.decode(&vector(z)).expect(CHECKED);
         std::array::from_fn(|i| decoded[i])
     }
 
     fn encoder_jacobian(&self, x: &[f64]) -> DMatrix<f64> {
-        let jacobian = self.0.encoder_jacobian(&DVector::from_column_slice(x));
-        jacobian.expect(CHECKED)
+        self.0.encoder_jacobian(&vector(x)).expect(CHECKED)
     }
 
     fn decoder_jacobian(&self, z: &[f64]) -> DMatrix<f64> {
-        let jacobian = self.0.decoder_jacobian(&DVector::from_column_slice(z));
-        jacobian.expect(CHECKED)
+        self.0.decoder_jacobian(&vector(z)).expect(CHECKED)
     }
 
     fn inputs(&self, x: &[f64]) -> Option<[DMatrix<f64>; 2]> {
-        let tangent = self.0.tangent(&DVector::from_column_slice(x)).ok()?;
+        let tangent = self.0.tangent(&vector(x)).ok()?;
         Some([tangent.lift, tangent.project])
     }
 
     fn phases(&self, x: &[f64]) -> Option<Vec<ControlPhase>> {
         phases_under(&self.0, &self.inputs(x)?[1]).ok()
     }
+}
+
+fn vector(values: &[f64]) -> DVector<f64> {
+    DVector::from_column_slice(values)
 }
 
 fn phases_under(
@@ -187,20 +179,10 @@ fn phase_under(
 
 fn with_floor(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
     let dim = covariance.nrows();
-    let mean_variance = covariance.trace() / dim as f64;
-    let size = if mean_variance > 0.0 {
-        mean_variance
-    } else {
-        1.0
-    };
-    for index in 0..dim {
-        covariance[(index, index)] += VARIANCE_FLOOR * size;
-    }
+    let mean_variance = Some(covariance.trace() / dim as f64);
+    let size = mean_variance.filter(|mean| *mean > 0.0).unwrap_or(1.0);
+    (0..dim).for_each(|index| covariance[(index, index)] += VARIANCE_FLOOR * size);
     covariance
-}
-
-fn pattern(bits: usize) -> ContactFlags {
-    std::array::from_fn(|foot| bits >> foot & 1 == 1)
 }
 
 /// Names of [`Lift`] with their help.
@@ -227,9 +209,8 @@ pub const SOLVERS: [(&str, &str, Solver); 2] = [
     ),
 ];
 
-/// Why a controller could not be built or given a reference.
-///
-/// Once it runs, a controller does not fail: each step's command carries a [`Status`](super::Status).
+/// Why a controller could not be built or given a reference; once it runs, each command carries a
+/// [`Status`](super::Status).
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "each variant's message names its fields")]

@@ -1,11 +1,9 @@
 //! Adaptive integration of `dy/dt = f(t, y)` by extrapolation: Gragg's explicit midpoint rule first, and where that
-//! needs too many evaluations (a stiff problem), the linearly implicit Euler rule from the same start. The paper uses
-//! LSODA, which switches in the same spirit.
+//! needs too many evaluations (a stiff problem), the linearly implicit Euler rule from the same start.
 //!
 //! A step of length `H` is computed with `n_0 < n_1 < ...` substeps, and the results are extrapolated to infinitely
 //! many (Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, II.9, and II, IV.9): order `2j + 2` or
-//! `j + 1` after `j + 1` results, as many as the tolerance asks for. Steps end at every requested time, so that an
-//! input with a kink there is integrated exactly.
+//! `j + 1` after `j + 1` results. Steps end at every requested time, where an input may have a kink.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -86,8 +84,7 @@ pub fn integrate(
     run(IntegrationMethod::Implicit, usize::MAX)
 }
 
-/// Results of one step that are extrapolated at most. More would amplify the rounding errors of the linearly implicit
-/// rule to the default tolerance.
+/// More results of a step would amplify the rounding errors of the linearly implicit rule to the default tolerance.
 const MOST_RESULTS: usize = 8;
 
 struct Stepper<'a, S> {
@@ -107,8 +104,7 @@ struct Trial {
     next: f64,
 }
 
-/// The cheapest way on: evaluations for the length just tried, a length, and an index of the table at which its error
-/// is expected to meet the tolerance.
+/// Evaluations for the length just tried, a length, and the index of the table expected to meet the tolerance at it.
 struct Plan {
     work: f64,
     length: f64,
@@ -116,8 +112,7 @@ struct Plan {
 }
 
 impl Plan {
-    /// Takes the length at which entry `j` should meet the tolerance, if that costs less per length; its `error` grows
-    /// with the power `order` of the length, and took `spent` evaluations at `h`.
+    /// Takes the length at which entry `j`, whose `error` grows with the power `order`, should do, if it costs less.
     fn consider(&mut self, j: usize, error: f64, order: usize, spent: f64, h: f64) {
         let factor = 0.9 * (0.5 / error.max(1e-300)).powf(1.0 / order as f64);
         let factor = factor.clamp(0.02, 4.0);
@@ -173,8 +168,8 @@ impl<S: OdeSystem> Stepper<'_, S> {
         }
     }
 
-    /// One step of length `h`: results with ever more substeps, until two neighbours in the extrapolation table agree
-    /// to the tolerance or one result more than expected was not enough.
+    /// Results with ever more substeps, until two neighbours in the extrapolation table agree to the tolerance or one
+    /// result more than expected was not enough.
     fn step(&mut self, time: f64, y: &DVector<f64>, h: f64) -> Trial {
         let begun = self.evaluations;
         let mut rate = DVector::zeros(y.len());
@@ -184,6 +179,11 @@ impl<S: OdeSystem> Stepper<'_, S> {
             jacobian = DMatrix::zeros(y.len(), y.len());
             self.system.jacobian(time, y.as_slice(), &mut jacobian);
         }
+        // Of the substeps; also what the order grows by with every result.
+        let multiple = match self.method {
+            IntegrationMethod::Explicit => 2,
+            IntegrationMethod::Implicit => 1,
+        };
         let mut table = Vec::new();
         let mut plan = Plan {
             work: f64::INFINITY,
@@ -191,14 +191,11 @@ impl<S: OdeSystem> Stepper<'_, S> {
             goal: 1,
         };
         for j in 0..MOST_RESULTS.min(self.goal + 2) {
-            let (result, order, next_substeps) = match self.method {
-                IntegrationMethod::Explicit => {
-                    let result = self.midpoint(time, y, &rate, h, 2 * (j + 1));
-                    (result, 2 * j + 1, 2 * (j + 2))
-                }
+            let substeps = multiple * (j + 1);
+            let result = match self.method {
+                IntegrationMethod::Explicit => self.midpoint(time, y, &rate, h, substeps),
                 IntegrationMethod::Implicit => {
-                    let result = self.linearly_implicit(time, y, &jacobian, h, j + 1);
-                    (result, j + 1, j + 2)
+                    self.linearly_implicit(time, y, &jacobian, h, substeps)
                 }
             };
             let Some(result) = result else { break };
@@ -208,11 +205,11 @@ impl<S: OdeSystem> Stepper<'_, S> {
             }
             let error = self.relative_size(&correction, y, &table[j]);
             let spent = (self.evaluations - begun) as f64;
-            plan.consider(j, error, order, spent, h);
+            plan.consider(j, error, multiple * j + 1, spent, h);
             if error <= 1.0 {
                 if plan.goal == j && j + 1 < MOST_RESULTS {
                     // one result more may pay: try it at the length at which it costs as much
-                    plan.length *= 1.0 + next_substeps as f64 / spent;
+                    plan.length *= 1.0 + (substeps + multiple) as f64 / spent;
                     plan.goal += 1;
                 }
                 self.goal = plan.goal;
@@ -278,8 +275,7 @@ impl<S: OdeSystem> Stepper<'_, S> {
         defined.then(|| self.system.rate(time, y.as_slice(), f.as_mut_slice()))
     }
 
-    /// Adds a row to the extrapolation table, of which only the last row is kept; returns the difference of its last
-    /// two entries.
+    /// Makes the last row of the extrapolation table the next one; returns the difference of its last two entries.
     fn extrapolate(&self, row: &mut Vec<DVector<f64>>, result: DVector<f64>) -> DVector<f64> {
         let n = (row.len() + 1) as f64;
         let mut entry = result;

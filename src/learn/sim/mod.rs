@@ -1,7 +1,6 @@
 //! Integration of the hybrid model.
 //!
-//! A model and recorded inputs come in; rollouts leave. `rollout.rs` first, `integrate.rs` for the method, `latent.rs`
-//! for how a recording is encoded.
+//! A model and recorded inputs come in; rollouts leave. `rollout.rs` first, `integrate.rs` for the method.
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 

@@ -1,9 +1,6 @@
 //! Rollouts: the hybrid model integrated over the recorded inputs, equation (24).
 //!
-//! Phases switch as recorded; the latent state is carried through the switch. Between samples the latent input is
-//! interpolated linearly.
-//!
-//! A recorded segment as the model sees it: latent states, latent inputs, phases.
+//! Phases switch as recorded; between samples the latent input is interpolated linearly.
 
 use std::ops::Range;
 
@@ -82,8 +79,7 @@ pub fn rollout(model: &CompiledModel, recorded: &LatentSegment, restart: Restart
     }
 }
 
-/// The default options with tolerance and bound moved for a model whose scaled coordinates are far from one, so that
-/// rollouts do not depend on its scale factors.
+/// Tolerance and bound for models whose coordinates are far from one, so that rollouts do not depend on their scale.
 fn at_scale(recorded: &LatentSegment) -> IntegrationOptions {
     /// Largest coordinates between which the options are taken as they are.
     const USUAL: [f64; 2] = [1e-3, 1e3];
@@ -146,10 +142,8 @@ fn roll_window(
     }
 }
 
-/// States of a window of samples from `initial` at its first one, stretch after stretch of like samples, as far as they
-/// are reached, and when they left every bound, if they did.
-///
-/// `of_stretch` integrates one from a state over its times, which end at the first sample of the next.
+/// States from `initial`, stretch after stretch of like samples, as far as they are reached, and when they left every
+/// bound; `of_stretch` integrates one over its times, which end at the first sample of the next.
 pub(crate) fn integrate_stretches(
     initial: &[f64],
     time_s: &[f64],
@@ -218,10 +212,8 @@ pub enum SimError {
     Recording(#[from] RecordingError),
 }
 
-/// Latent samples of one recorded segment; every matrix is `latent_dim x n`, a column a sample.
-///
-/// The equations are those of a linear model; a nonlinear encoder's Jacobian at the sample's `x` takes the place of
-/// `W_e`, and accelerations have the term `dJ/dt dx`.
+/// Latent samples of one recorded segment, in columns; of a nonlinear encoder its Jacobian at `x` stands for `W_e`, and
+/// accelerations have the term `dJ/dt dx`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LatentSegment {
     pub time_s: Vec<f64>,
@@ -248,10 +240,8 @@ impl LatentSegment {
             }
             Ok::<_, SimError>(out)
         };
-        let x = |k| segment.x.column(k).into_owned();
-        let dx = |k| segment.dx.column(k).into_owned();
-        let ddx = |k| segment.ddx.column(k).into_owned();
-        let u = |k| input.column(k).into_owned();
+        let [x, dx, ddx, u] = [&segment.x, &segment.dx, &segment.ddx, &input]
+            .map(|rows| |k: usize| rows.column(k).into_owned());
         Ok(Self {
             time_s: segment.time_s.clone(),
             z: samples(&|k| Ok(model.encode(&x(k))?))?,
@@ -280,8 +270,7 @@ impl LatentSegment {
     }
 }
 
-/// The phase of each sample by the spans of the model's phases ([`PhaseRule::spans`]): samples in transition, and
-/// contact chatter, belong to a neighbouring span, as in training.
+/// By the spans of the model's phases ([`PhaseRule::spans`]), as in training.
 fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimError> {
     let mut phases = vec![0; segment.len()];
     for span in phase_rule(model).spans(segment)? {
@@ -299,8 +288,7 @@ pub(crate) fn phase_rule(model: &ReducedModel) -> PhaseRule {
     PhaseRule::new(patterns.collect()).with_min_samples(CHATTER_SAMPLES)
 }
 
-/// The model with mean and covariance of the recorded inputs `u = [tau; F; M]` (SI, by the model's rule) in the phases
-/// that the recordings have samples of.
+/// The model with the statistics of the recorded inputs (SI, by its rule) in the phases that have samples.
 pub fn with_input_statistics(
     model: ReducedModel,
     segments: &[&Segment],

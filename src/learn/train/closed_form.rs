@@ -10,16 +10,11 @@ use super::subspace::find_subspace;
 use super::task::{Origin, Recordings, Task};
 use crate::robot::Robot;
 
-/// Learns a model: encoder by its row space, decoder by least squares, Xi by sparse regression.
-///
-/// The encoder's rows span the space of least reconstruction error and lift loss (`subspace`), rotated by varimax; its
-/// bias puts the mean of the training states at `z = 0`. The decoder is the least-squares one over all phases. Xi of
-/// each phase is chosen among many regressions by rollouts (`select`). A cancelled training ends with the seeds begun
-/// by then; seeds without a stable model are left out. Deterministic.
+/// Learns a model: encoder by its row space (`subspace`), decoder by least squares, Xi by sparse regression, chosen
+/// among many by rollouts (`select`). A cancelled training ends with the seeds begun by then. Deterministic.
 ///
 /// # Errors
-/// [`TrainError`]: options out of range, too few samples, too many latent coordinates, no stable model, cancelled
-/// before the first seed.
+/// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
 pub fn closed_form(
     recordings: Recordings<'_>,
     robot: &'static Robot,
@@ -48,7 +43,7 @@ pub fn closed_form(
 
 fn fit(task: &Task<'_>, seed: u64, monitor: &mut Monitor<'_>) -> Outcome {
     let options = task.options;
-    monitor.stage("searching the latent space", 1);
+    monitor.stage("searching the latent space");
     let (frame, d) = (&task.frame, options.latent_dim);
     let basis = find_subspace(&task.moments, frame, d, &options.encoder, seed);
     let encoder = task.encoder_over(&basis)?.into();

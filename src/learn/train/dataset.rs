@@ -1,6 +1,4 @@
-//! Recordings as training data: scaled, cut into the phases of the model.
-//!
-//! Jumps divided into sets for training, validation and test.
+//! Recordings as training data: scaled, cut into the phases of the model, divided into sets.
 
 use std::fmt;
 use std::ops::Range;
@@ -48,9 +46,8 @@ impl ScaleOptions {
         }
     }
 
-    /// State and torques 0.1, forces 0.005, so that both kinds of input are of one size; moments 0.05 in the body's
-    /// axes, with which they are of that size too, and 0.02 in the world's: about the body's origin moments of a jump
-    /// nearly cancel, and what remains is the least exact part of the input.
+    /// State and torques 0.1, forces 0.005, moments 0.05 in the body's axes: all of one size. In the world's axes
+    /// moments of a jump nearly cancel, and what remains is the least exact part of the input: 0.02.
     pub fn in_frame(frame: WrenchFrame) -> Self {
         Self {
             state: 0.1,
@@ -89,8 +86,7 @@ pub(super) struct Jump {
     pub ddx: DMatrix<f64>,
     /// Inputs `[tau; F; M]`, `18 x n`.
     pub u: DMatrix<f64>,
-    /// Joint friction and rotor inertia, which recorded torques have on top of those in the inputs, `12 x n`; none
-    /// without actuators.
+    /// Joint friction and rotor inertia, which recorded torques have on top of `u`, `12 x n`; none without actuators.
     pub losses: Option<DMatrix<f64>>,
     pub phase: Vec<usize>,
     /// Maximal runs of one phase.
@@ -123,8 +119,6 @@ pub(super) struct Dataset {
 }
 
 impl Dataset {
-    /// Takes the samples of recordings, cut into `phases`.
-    ///
     /// `smoothing` is the window of the moving average over accelerations, in samples.
     pub(super) fn new(
         recordings: &[Recording],
@@ -341,9 +335,7 @@ impl fmt::Display for Split {
 }
 
 impl Split {
-    /// Draws the sets: for training, validation and test the numbers of its jumps, rising. A jump (a segment of a
-    /// recording) goes into one of them as a whole, by a random order that depends on nothing but `seed` and the number
-    /// of jumps.
+    /// Draws the numbers of the jumps of each set, rising, by a random order that depends on `seed` and `jumps` alone.
     ///
     /// # Errors
     /// [`TrainError::Split`] if there are fewer jumps than sets.

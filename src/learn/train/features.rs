@@ -1,8 +1,6 @@
 //! The candidate library over whole batches of samples, forwards and backwards.
 //!
-//! Each step of the library's tape is computed for all samples of a batch before the next one starts, with the vector
-//! units of the machine. The reverse sweep turns the gradient with respect to the terms into the gradient with respect
-//! to `z`, `dz` and `u_lat`, exactly.
+//! Each step of the library's tape is computed for all samples of a batch before the next one starts.
 
 use nalgebra::DMatrix;
 
@@ -36,13 +34,14 @@ macro_rules! vectorised {
 
 pub(super) use vectorised;
 
-/// A library over batches.
 #[derive(Clone, Debug)]
 pub(super) struct Features {
     tape: Tape,
-    latent_dim: usize,
-    occurring: Vec<Vec<bool>>, // term, variable
-    affine: Vec<bool>,
+    pub latent_dim: usize,
+    /// Whether a variable, counted over `z`, `dz`, `u_lat`, occurs in a term.
+    pub occurring: Vec<Vec<bool>>,
+    /// Whether a term is affine: dynamics of such terms do not run away within the time of a jump.
+    pub affine: Vec<bool>,
 }
 
 /// Values of all steps on one batch, reused between batches.
@@ -77,21 +76,6 @@ impl Features {
 
     pub(super) fn library_dim(&self) -> usize {
         self.tape.terms.len()
-    }
-
-    pub(super) fn latent_dim(&self) -> usize {
-        self.latent_dim
-    }
-
-    /// For every term whether it is affine in `z`, `dz` and `u_lat`: dynamics of such terms do not run away within the
-    /// time of a jump.
-    pub(super) fn affine_terms(&self) -> &[bool] {
-        &self.affine
-    }
-
-    /// Whether a variable, counted over `z`, `dz`, `u_lat`, occurs in a term.
-    pub(super) fn depends_on(&self, term: usize, variable: usize) -> bool {
-        self.occurring[term][variable]
     }
 
     /// The term that is 1.
@@ -129,23 +113,17 @@ impl Features {
         &values.values[self.tape.terms[term]]
     }
 
-    /// Adds to `gradient` (`n x 3 latent_dim`) what `theta_gradient` (`n x library_dim`) means for the variables.
-    ///
-    /// `values` must hold the forward pass of the same batch.
+    /// Adds to `gradient` (`n x 3 latent_dim`) what `theta_gradient` (`n x library_dim`) means for the variables of the
+    /// batch that `values` holds.
     pub(super) fn backward(
         &self,
         theta_gradient: &DMatrix<f64>,
         values: &mut FeatureValues,
         gradient: &mut DMatrix<f64>,
     ) {
-        values.adjoints.resize(self.tape.steps.len(), Vec::new());
-        for adjoint in &mut values.adjoints {
-            adjoint.resize(theta_gradient.nrows(), 0.0);
-        }
         sweep_back(&self.tape, theta_gradient, values, gradient.as_mut_slice());
     }
 
-    /// Computes every step for all samples; see [`Self::evaluate`] for the shape of `variables`.
     pub(super) fn forward(&self, variables: &DMatrix<f64>, values: &mut FeatureValues) {
         compute(&self.tape.steps, variables, &mut values.values);
     }
@@ -156,10 +134,10 @@ vectorised! {
         let n = variables.nrows();
         values.resize(steps.len(), Vec::new());
         for (index, step) in steps.iter().enumerate() {
-            let (earlier, rest) = values.split_at_mut(index);
             if let Step::Cosine(_) = step {
-                continue;
+                continue; // done with its sine
             }
+            let (earlier, rest) = values.split_at_mut(index);
             let out = &mut rest[0];
             out.clear();
             match step {
@@ -184,7 +162,7 @@ vectorised! {
                     let (sines, cosines) = rest.split_at_mut(1);
                     both(&earlier[*argument], &mut sines[0], &mut cosines[0]);
                 }
-                Step::Cosine(_) => {} // done with its sine
+                Step::Cosine(_) => {}
                 Step::Apply(function, argument) => {
                     out.extend(earlier[*argument].iter().map(|v| function.evaluate(*v)))
                 }
@@ -202,8 +180,10 @@ vectorised! {
     ) {
         let FeatureValues { values, adjoints } = values;
         let n = theta_gradient.nrows();
+        adjoints.resize(tape.steps.len(), Vec::new());
         for adjoint in adjoints.iter_mut() {
-            adjoint.fill(0.0);
+            adjoint.clear();
+            adjoint.resize(n, 0.0);
         }
         let columns = theta_gradient.as_slice().chunks_exact(n);
         for (column, &step) in columns.zip(&tape.terms) {
@@ -230,9 +210,8 @@ fn fold(
 ) {
     out.resize(n, start);
     for &part in parts {
-        out.iter_mut()
-            .zip(&earlier[part])
-            .for_each(|(o, v)| *o = join(*o, *v));
+        let each = out.iter_mut().zip(&earlier[part]);
+        each.for_each(|(o, v)| *o = join(*o, *v));
     }
 }
 
@@ -316,20 +295,13 @@ fn add_adjoints(
 /// Adds to `out` the adjoint times the values of the steps `factors`.
 #[inline(always)]
 fn add_times(out: &mut [f64], adjoint: &[f64], values: &[Vec<f64>], factors: &[usize]) {
+    let each = out.iter_mut().zip(adjoint);
     match *factors {
-        [factor] => {
-            for ((o, a), v) in out.iter_mut().zip(adjoint).zip(&values[factor]) {
-                *o += a * v;
-            }
-        }
-        _ => {
-            for (i, (o, a)) in out.iter_mut().zip(adjoint).enumerate() {
-                *o += a * factors
-                    .iter()
-                    .map(|&other| values[other][i])
-                    .product::<f64>();
-            }
-        }
+        [factor] => (each.zip(&values[factor])).for_each(|((o, a), v)| *o += a * v),
+        _ => each.enumerate().for_each(|(i, (o, a))| {
+            let factors = factors.iter().map(|&other| values[other][i]);
+            *o += a * factors.product::<f64>();
+        }),
     }
 }
 
@@ -346,69 +318,5 @@ fn slope(function: Function, argument: f64, value: f64) -> f64 {
         Function::Abs if argument == 0.0 => 0.0,
         Function::Abs => argument.signum(),
         Function::Sign => 0.0,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::DVector;
-
-    use super::*;
-    use crate::train::random::Random;
-
-    fn library() -> Library {
-        let terms = [
-            "1",
-            "z1",
-            "dz2",
-            "z1*dz1*u2",
-            "sin(z1 + 2*z2)",
-            "cos(dz1)*z2",
-            "exp(-z1^2)",
-            "tanh(u1)/(2 + z2)",
-            "sqrt(2 + z1)",
-            "abs(z2)",
-            "log(3 + dz2)",
-            "tan(0.3*z1)",
-            "(2 + z1)^z2",
-        ];
-        Library::from_terms(2, &terms.map(String::from)).expect("terms parse")
-    }
-
-    #[test]
-    fn batch_values_equal_the_library_at_every_sample() {
-        let library = library();
-        let variables = Random::new(4).matrix(7, 6, 0.9);
-        let theta = Features::new(&library).evaluate(&variables, &mut FeatureValues::default());
-        for sample in 0..7 {
-            let block =
-                |i: usize| DVector::from(variables.row(sample).columns(2 * i, 2).transpose());
-            let expected = library.evaluate(&block(0), &block(1), &block(2));
-            let off = theta.row(sample).transpose() - expected.expect("dimensions fit");
-            for (off, term) in off.iter().zip(library.terms()) {
-                assert!(off.abs() < 1e-14, "{}", term.text());
-            }
-        }
-    }
-
-    #[test]
-    fn backward_pass_agrees_with_finite_differences_for_every_function() {
-        let features = Features::new(&library());
-        let variables = Random::new(8).matrix(3, 6, 0.9);
-        let weights = Random::new(9).matrix(3, features.library_dim(), 1.0);
-        let mut values = FeatureValues::default();
-        features.evaluate(&variables, &mut values);
-        let mut gradient = DMatrix::zeros(3, 6);
-        features.backward(&weights, &mut values, &mut gradient);
-        for index in 0..variables.len() {
-            let mut at = |step: f64| {
-                let mut moved = variables.clone();
-                moved[index] += step;
-                features.evaluate(&moved, &mut values).dot(&weights)
-            };
-            let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
-            let off = (difference - gradient[index]).abs();
-            assert!(off < 1e-7 * difference.abs().max(1.0), "{index}");
-        }
     }
 }

@@ -15,7 +15,7 @@ const ROLLOUT_WEIGHT: f64 = 0.2;
 const THINNED: usize = 5;
 /// Jumps of a part: with all errors at once, their derivatives would fill the memory for sets of many jumps.
 const JUMPS: usize = 64;
-/// Standard deviations that errors are not taken to be below where others are relative to them.
+/// Least error, in standard deviations, that others are taken relative to.
 const LEAST_ERROR: f64 = 1e-3;
 /// Kinds of windows: 0.1 s, and whole jumps.
 const SHORT: usize = 0;
@@ -43,10 +43,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Judges by errors relative to those of `xi`, each coordinate's over 0.1 s and over whole jumps by itself.
-    ///
-    /// In standard deviations a millimetre of a body that jumps half a metre is nothing beside a leg's error, though
-    /// both are a tenth of what can be predicted: this way a tenth less counts the same wherever it is.
+    /// Judges by errors relative to those of `xi`, so that a tenth less counts the same for a body that jumps half a
+    /// metre and for a leg.
     pub(super) fn relative_to(&self, xi: &[Xi]) -> Self {
         let mut relative = self.clone();
         for kind in [SHORT, LONG] {
@@ -80,8 +78,7 @@ impl<'a> Judge<'a> {
         0..self.set.dataset.jumps.len().div_ceil(JUMPS)
     }
 
-    /// Scaled errors of 0.1 s predictions and of whole jumps of a part, every [`THINNED`]th sample; none if a rollout
-    /// diverges.
+    /// Scaled errors of both kinds of windows of a part, every [`THINNED`]th sample; none if a rollout diverges.
     pub(super) fn errors(&self, xi: &[Xi], part: usize) -> Option<[DVector<f64>; 2]> {
         let errors = [SHORT, LONG].map(|kind| {
             let mut errors = Vec::new();
@@ -133,7 +130,6 @@ impl<'a> Judge<'a> {
         &windows[before(part * JUMPS)..before((part + 1) * JUMPS)]
     }
 
-    /// Adds every [`THINNED`]th error of a window's prediction, scaled.
     fn add_errors(
         &self,
         kind: usize,
@@ -156,11 +152,9 @@ impl<'a> Judge<'a> {
         let scaled = squares.iter().zip(&self.scales[kind]);
         let sum: f64 = scaled.map(|(square, scale)| square * scale * scale).sum();
         let error = (sum / squares.len().max(1) as f64).sqrt();
-        if error.is_finite() {
-            error
-        } else {
-            f64::INFINITY
-        }
+        Some(error)
+            .filter(|error| error.is_finite())
+            .unwrap_or(f64::INFINITY)
     }
 
     /// Mean squares of the errors, a coordinate.
@@ -193,29 +187,4 @@ fn row_std(latent: &[Latent], row: usize) -> f64 {
     let mut square = 0.0;
     rows().for_each(|row| row.iter().for_each(|z| square += (z - mean).powi(2)));
     (square / n).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::train::oscillator;
-
-    #[test]
-    fn relative_errors_of_a_candidate_are_one_and_of_the_truth_none() {
-        let (dataset, latent) = oscillator::jumps(3);
-        let (features, truth) = oscillator::known();
-        let off: Vec<_> = truth.iter().map(|xi| xi.map(|c| 1.1 * c)).collect();
-        let plain = Judge::new(&features, EncodedSet::new(&dataset, &latent));
-        let judge = plain.relative_to(&off);
-        assert!((judge.score(&off) - 1.2).abs() < 1e-12);
-        assert!(judge.score(&truth) < 0.05);
-        let errors = judge.errors(&off, 0).expect("no divergence");
-        for errors in errors {
-            // Every fifth error of a window, which begins with the least.
-            let mean_square = errors.norm_squared() / errors.len() as f64;
-            assert!((0.5..2.0).contains(&mean_square), "{mean_square}");
-        }
-        // What cannot be told apart from none is not divided by.
-        assert!(plain.relative_to(&truth).score(&off).is_finite());
-    }
 }

@@ -51,13 +51,12 @@ impl Latent {
             let column = |matrix: &DMatrix<f64>| matrix.column(sample).into_owned();
             let (x, dx) = (column(&jump.x), column(&jump.dx));
             let mapped = encoder.apply_rates(&x, &dx, &column(&jump.ddx));
-            let into = [&mut latent.z, &mut latent.dz, &mut latent.ddz];
-            for (matrix, value) in into.into_iter().zip(mapped.expect(FITS)) {
-                matrix.set_column(sample, &value);
-            }
+            let [z, dz, ddz] = mapped.expect(FITS);
+            latent.z.set_column(sample, &z);
+            latent.dz.set_column(sample, &dz);
+            latent.ddz.set_column(sample, &ddz);
             let projection = input_projection(&encoder.jacobian(&x).expect(FITS));
-            let u_lat = projection * jump.u.column(sample);
-            latent.u_lat.set_column(sample, &u_lat);
+            (latent.u_lat).set_column(sample, &(projection * jump.u.column(sample)));
         }
         latent
     }
@@ -116,10 +115,7 @@ pub(super) fn input_projection(weights: &DMatrix<f64>) -> DMatrix<f64> {
     let gram = weights * weights.transpose();
     match gram.cholesky() {
         Some(factor) => factor.solve(weights),
-        None => weights
-            .transpose()
-            .pseudo_inverse(1e-12)
-            .expect("the tolerance is positive"),
+        None => (weights.transpose().pseudo_inverse(1e-12)).expect("the tolerance is positive"),
     }
 }
 
@@ -169,8 +165,7 @@ pub(super) fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f6
     sum / states.ncols().max(1) as f64
 }
 
-/// Decoder of least mean square error over all phases: `x ~ W_d z + b_d`, with `z` the encoded samples after the
-/// `hidden` layers of the decoder, if it has any.
+/// Decoder `x ~ W_d z + b_d` of least mean square error, with `z` the encoded samples after the `hidden` layers.
 pub(super) fn least_squares_decoder(
     dataset: &Dataset,
     encoder: &StateMap,
@@ -183,10 +178,10 @@ pub(super) fn least_squares_decoder(
     let (x, z) = (centred(&x, &x_mean), centred(&z, &z_mean));
     let (gram, cross) = (&z * z.transpose(), &x * z.transpose());
     let floor = 1e-12 * gram.trace().max(f64::MIN_POSITIVE);
-    let inverse = gram
-        .pseudo_inverse(floor)
-        .expect("the tolerance is positive");
-    let weights = cross * inverse;
+    let weights = cross
+        * gram
+            .pseudo_inverse(floor)
+            .expect("the tolerance is positive");
     let bias = x_mean - &weights * z_mean;
     Ok(AffineMap::new("decoder", weights, bias)?)
 }

@@ -26,15 +26,13 @@ const SMOOTHING: usize = 11;
 
 /// Figures of one model on one set of jumps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-#[cfg_attr(test, derive(Default))]
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
     pub decoder_mse: f64,
     /// Coefficient of determination of the smoothed `ddz` in each phase, over all latent coordinates together.
     pub ddz_r2: Vec<f64>,
-    /// Coefficient of determination of the 12 joint torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`), and what the
-    /// joints take on top, against the recorded ones over all plausible samples, all joints together as in the lift of
-    /// an [`Assessment`](crate::evaluate::Assessment).
+    /// Coefficient of determination of the torques of `W_e^T pinv(W_e^T) u` (`J^T pinv(J^T) u`) and the joints' losses,
+    /// over all plausible samples and joints, as in the lift of an [`Assessment`](crate::evaluate::Assessment).
     pub torque_r2: f64,
     /// Root mean square error of body x over predictions of 0.1 s with fixed steps.
     pub prediction_x_m: f64,
@@ -188,8 +186,7 @@ pub struct TrainReport {
     /// Mean over pairs of seeds of (coefficients active in both) / (active in either), latent coordinates matched.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub support_overlap: Option<f64>,
-    /// How well the deviations of the training jumps from their prior are explained, one entry per part of a jump;
-    /// empty without a prior.
+    /// Of the parts of the training jumps' prior; empty without one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub deviations: Vec<PartScore>,
     /// Figures on the training recordings.
@@ -202,8 +199,8 @@ pub struct TrainReport {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartScore {
     pub part: String,
-    /// Coefficient of determination of the deviations from the prior, over all latent coordinates and jumps, each jump
-    /// left out of prior and fit in turn; 0 is what the prior alone explains.
+    /// Coefficient of determination of the accelerations' deviations from the prior, each jump left out of prior and
+    /// fit in turn.
     pub ddz_r2: f64,
 }
 
@@ -217,8 +214,7 @@ pub struct PhaseTerms {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SeedReport {
     pub seed: u64,
-    /// What seeds are compared by, less is better: the validation score of rollouts, or with the published method the
-    /// combined loss on the validation recordings.
+    /// Less is better: validation score of rollouts, or as published the combined loss on the validation recordings.
     pub score: f64,
     /// Losses of the last epoch of the first step of a joint training.
     #[serde(skip_serializing_if = "Option::is_none")]

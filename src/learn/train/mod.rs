@@ -18,8 +18,6 @@ mod jumps;
 mod latent;
 mod metrics;
 mod options;
-#[cfg(test)]
-mod oscillator;
 mod progress;
 mod random;
 mod refine;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::closed_form::closed_form;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
-use super::joint::{LossWeights, Schedule, Unroll, joint};
+use super::joint::{Integrator, LossWeights, Schedule, Unroll, joint};
 use super::metrics::{BODY_X, BODY_Z, Trained};
 use super::progress::Monitor;
 use super::task::{Origin, Recordings};
@@ -30,8 +30,6 @@ pub enum Method {
 }
 
 impl Method {
-    /// Learns a model: [`closed_form`] or [`joint`].
-    ///
     /// # Errors
     /// As the method's own function.
     pub fn learn(
@@ -61,12 +59,9 @@ pub struct TrainOptions {
     pub n_seeds: usize,
     /// Factors from SI to scaled units.
     pub scaling: ScaleOptions,
-    /// What the joints take of the recorded torques before they count as input; none if the motors' torques count as
-    /// they are.
+    /// Losses of the joints that are subtracted from the recorded torques; none if the motors' torques count.
     pub actuators: Option<Actuators>,
-    /// Axes of the force and moment in the inputs.
     pub wrench_frame: WrenchFrame,
-    /// Which coordinates the encoder looks at, and what it is to carry.
     pub encoder: EncoderOptions,
     pub regression: RegressionOptions,
     pub joint: JointOptions,
@@ -74,9 +69,7 @@ pub struct TrainOptions {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointOptions {
-    /// Epochs, thresholding, step length.
     pub schedule: Schedule,
-    /// Weights of the accelerations and of sparsity in the loss.
     pub weights: LossWeights,
     /// Value that all coefficients start at.
     pub xi_start: f64,
@@ -84,7 +77,6 @@ pub struct JointOptions {
     pub threads: usize,
     /// Window of the loss over predictions, which counts only if `weights.bptt` is not 0.
     pub unroll: Unroll,
-    /// What follows the first step.
     pub transfer: Transfer,
     pub maps: MapOptions,
 }
@@ -110,8 +102,7 @@ pub enum Transfer {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EncoderOptions {
-    /// Weight of the input energy which the latent input cannot carry, against the reconstruction error in scaled units
-    /// (the lift loss); 0 leaves the lift to chance.
+    /// Weight of the lift loss, the input energy that the latent input cannot carry, against the reconstruction error.
     pub lift_weight: f64,
     /// Weight of the three body positions in the reconstruction error; the other coordinates have 1.
     pub body_weight: f64,
@@ -121,7 +112,6 @@ pub struct EncoderOptions {
     pub least_input_share: f64,
     /// Whether the latent basis is rotated by varimax.
     pub rotate: bool,
-    /// What the encoder's rows are made of.
     pub coordinates: Coordinates,
     pub restarts: usize,
 }
@@ -166,9 +156,22 @@ impl TrainOptions {
             scaling: ScaleOptions::in_frame(WrenchFrame::World),
             actuators: None,
             wrench_frame: WrenchFrame::World,
-            encoder: EncoderOptions::default(),
-            regression: RegressionOptions::default(),
-            joint: JointOptions::default(),
+            encoder: EncoderOptions {
+                lift_weight: 1e-3,
+                body_weight: 300.0,
+                least_std: 0.015,
+                least_input_share: 0.005,
+                rotate: true,
+                coordinates: Coordinates::Named,
+                restarts: 4,
+            },
+            regression: RegressionOptions {
+                smoothing: 11,
+                slack: 0.1,
+                refinements: 10,
+                growth_per_s: Some(3.0),
+            },
+            joint: JointOptions::by_the_author(),
         }
     }
 
@@ -177,37 +180,22 @@ impl TrainOptions {
         InputRule::new(robot, self.actuators.clone(), self.wrench_frame)
     }
 
-    /// The settings of the paper: motors' torques, forces in the body's axes, one scale for everything, no mask, no
-    /// lift loss, all coordinates alike, Xi starting at ones, the published library and transfer steps, accelerations
-    /// as recorded.
+    /// The settings of the paper: motors' torques, forces in the body's axes, one scale, no mask, no lift loss, Xi from
+    /// ones, the published library and transfer steps, accelerations as recorded.
     pub fn paper(name: impl Into<String>, latent_dim: usize) -> Self {
-        let plain = Self::new(name, latent_dim);
-        Self {
-            library: LibraryChoice::Standard(StandardLibrary::default()),
-            scaling: ScaleOptions::uniform(0.1),
-            actuators: None,
-            wrench_frame: WrenchFrame::Body,
-            encoder: EncoderOptions {
-                lift_weight: 0.0,
-                body_weight: 1.0,
-                least_std: 0.0,
-                rotate: false,
-                coordinates: Coordinates::Free,
-                ..EncoderOptions::default()
-            },
-            regression: RegressionOptions {
-                smoothing: 1,
-                refinements: 0,
-                growth_per_s: None,
-                ..RegressionOptions::default()
-            },
-            joint: JointOptions {
-                xi_start: 1.0,
-                transfer: Transfer::Published,
-                ..JointOptions::default()
-            },
-            ..plain
-        }
+        let mut options = Self::new(name, latent_dim);
+        options.library = LibraryChoice::Standard(StandardLibrary::default());
+        options.scaling = ScaleOptions::uniform(0.1);
+        options.wrench_frame = WrenchFrame::Body;
+        let encoder = &mut options.encoder;
+        (encoder.lift_weight, encoder.body_weight, encoder.least_std) = (0.0, 1.0, 0.0);
+        (encoder.rotate, encoder.coordinates) = (false, Coordinates::Free);
+        let regression = &mut options.regression;
+        (regression.smoothing, regression.refinements) = (1, 0);
+        regression.growth_per_s = None;
+        let joint = &mut options.joint;
+        (joint.xi_start, joint.transfer) = (1.0, Transfer::Published);
+        options
     }
 
     /// What the encoder's rows are made of: networks have no rows to hold, so theirs are free.
@@ -223,21 +211,15 @@ impl TrainOptions {
         (0..count).map(|i| self.seed.wrapping_add(i)).collect()
     }
 
-    /// The candidate terms.
-    ///
-    /// # Errors
-    /// [`TrainError::Model`] for a term that does not parse or a latent dimension out of range.
     pub(crate) fn library(&self) -> Result<Library, TrainError> {
         let library = Library::of(self.latent_dim, self.library.clone())?;
         library.check_distinct()?;
         Ok(library)
     }
 
-    /// Complains about settings outside their range.
-    ///
     /// # Errors
-    /// [`TrainError::Range`] or [`TrainError::Option`] naming the first one, [`TrainError::Model`] for a name that no
-    /// model can have.
+    /// [`TrainError::Range`] or [`TrainError::Option`] naming the first setting out of range, [`TrainError::Model`] for
+    /// a name that no model can have.
     pub fn check(&self) -> Result<(), TrainError> {
         check_name(&self.name)?;
         let (encoder, regression) = (&self.encoder, &self.regression);
@@ -269,6 +251,40 @@ impl TrainOptions {
 }
 
 impl JointOptions {
+    /// The author's schedule, weights and window (five steps of 10 ms); Xi starts at 0, all cores.
+    fn by_the_author() -> Self {
+        Self {
+            schedule: Schedule {
+                epochs: 501,
+                refinement: 101,
+                threshold: 0.01,
+                threshold_every: 100,
+                learning_rate: 1e-3,
+            },
+            weights: LossWeights {
+                ddz: 1e-4,
+                ddx: 1e-6,
+                l1: 1e-6,
+                lift: 0.0,
+                bptt: 0.0,
+            },
+            xi_start: 0.0,
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            unroll: Unroll {
+                window: 5,
+                stride: 5,
+                decay: 0.9,
+                integrator: Integrator::Rk2,
+            },
+            transfer: Transfer::Chosen,
+            maps: MapOptions {
+                encoder_layers: Vec::new(),
+                decoder_layers: Vec::new(),
+                activation: Activation::Elu,
+            },
+        }
+    }
+
     /// Complains about a window of predictions out of range; one that no batch has room for would count for nothing.
     fn check_predictions(&self) -> Result<(), TrainError> {
         table::BPTT_WEIGHT.check(self.weights.bptt)?;
@@ -300,82 +316,30 @@ impl MapOptions {
             ("decoder-layers", &self.decoder_layers, 1),
         ];
         for (option, widths, least) in each {
-            let refused = |expected| TrainError::Option {
+            let expected = if widths.len() >= MAX_LAYERS {
+                "at most 15 hidden layers"
+            } else if widths.iter().any(|width| *width > MAX_LAYER_WIDTH) {
+                "layers of at most 1024 units"
+            } else if widths.iter().any(|width| *width < least) {
+                "layers at least as wide as the latent space"
+            } else {
+                continue;
+            };
+            return Err(TrainError::Option {
                 option,
                 found: format!("{widths:?}"),
                 expected,
-            };
-            if widths.len() >= MAX_LAYERS {
-                return Err(refused("at most 15 hidden layers"));
-            }
-            if widths.iter().any(|width| *width > MAX_LAYER_WIDTH) {
-                return Err(refused("layers of at most 1024 units"));
-            }
-            if widths.iter().any(|width| *width < least) {
-                return Err(refused("layers at least as wide as the latent space"));
-            }
+            });
         }
         Ok(())
     }
 }
 
 impl EncoderOptions {
-    /// Weight of every coordinate in the reconstruction error, 18.
     pub(super) fn coordinate_weights(&self) -> DVector<f64> {
         DVector::from_fn(STATE_DIM, |i, _| match (BODY_X..=BODY_Z).contains(&i) {
             true => self.body_weight,
             false => 1.0,
         })
-    }
-}
-
-impl Default for JointOptions {
-    /// The author's schedule and weights; Xi starts at 0, all cores.
-    fn default() -> Self {
-        Self {
-            schedule: Schedule::default(),
-            weights: LossWeights::default(),
-            xi_start: 0.0,
-            threads: std::thread::available_parallelism().map_or(1, usize::from),
-            unroll: Unroll::default(),
-            transfer: Transfer::Chosen,
-            maps: MapOptions::default(),
-        }
-    }
-}
-
-impl Default for MapOptions {
-    fn default() -> Self {
-        Self {
-            encoder_layers: Vec::new(),
-            decoder_layers: Vec::new(),
-            activation: Activation::Elu,
-        }
-    }
-}
-
-impl Default for EncoderOptions {
-    /// Lift weight 1e-3, body weight 300, mask under 0.015 rad or m and 0.5 % of the input's energy, varimax.
-    fn default() -> Self {
-        Self {
-            lift_weight: 1e-3,
-            body_weight: 300.0,
-            least_std: 0.015,
-            least_input_share: 0.005,
-            rotate: true,
-            coordinates: Coordinates::Named,
-            restarts: 4,
-        }
-    }
-}
-
-impl Default for RegressionOptions {
-    fn default() -> Self {
-        Self {
-            smoothing: 11,
-            slack: 0.1,
-            refinements: 10,
-            growth_per_s: Some(3.0),
-        }
     }
 }

@@ -6,13 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub enum Progress {
     Stage {
         name: &'static str,
-        /// Steps it will take, if it is known.
-        steps: usize,
     },
-    /// Candidates or epochs of the stage that are done.
+    /// After a candidate or epoch of the stage: figures of the moment, ready to print.
     Done {
-        steps: usize,
-        /// Figures of the moment, ready to print.
         text: String,
     },
 }
@@ -39,11 +35,11 @@ impl<'a> Monitor<'a> {
         self.cancel
     }
 
-    pub(crate) fn stage(&mut self, name: &'static str, steps: usize) {
-        (self.listener)(Progress::Stage { name, steps });
+    pub(crate) fn stage(&mut self, name: &'static str) {
+        (self.listener)(Progress::Stage { name });
     }
 
-    pub(crate) fn done(&mut self, steps: usize, text: String) {
-        (self.listener)(Progress::Done { steps, text });
+    pub(crate) fn done(&mut self, text: String) {
+        (self.listener)(Progress::Done { text });
     }
 }

@@ -1,5 +1,4 @@
-//! Light rollouts of candidate models, many at once, for choosing between them: the classical Runge-Kutta method with
-//! the vector units of the machine.
+//! Rollouts of candidate models, many at once, by the classical Runge-Kutta method.
 //!
 //! Loops go over indices: iterators of several slices at once are calls in code for other vector units than the rest.
 
@@ -19,6 +18,8 @@ const STAGES: [(usize, f64); 4] = [(0, 0.0), (1, 0.5), (1, 0.5), (2, 1.0)];
 
 /// Coefficients of one phase, `library_dim x latent_dim`.
 pub(super) type Xi = DMatrix<f64>;
+/// Phase, term and latent coordinate of a coefficient.
+pub(super) type CoefficientIndex = (usize, usize, usize);
 
 /// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
 #[derive(Clone, Copy, Debug)]
@@ -29,8 +30,7 @@ pub(super) struct Candidate<'a> {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Change {
-    /// Phase, term and latent coordinate of the coefficient.
-    pub place: (usize, usize, usize),
+    pub place: CoefficientIndex,
     pub by: f64,
 }
 
@@ -55,8 +55,7 @@ pub(super) fn plain(windows: &[Window]) -> Vec<Row> {
     rows.collect()
 }
 
-/// The windows between restarts of every jump ([`restart_windows`]), each up to the sample that the next one starts
-/// from.
+/// The windows between restarts of every jump, each up to the sample that the next one starts from.
 pub(super) fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
     let mut windows = Vec::new();
     for (jump, samples) in dataset.jumps.iter().enumerate() {
@@ -73,15 +72,14 @@ pub(super) fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
 
 /// Latent positions predicted in every row, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
 ///
-/// RK4 with the recorded sampling; the latent input is interpolated linearly between samples, the phase is the recorded
-/// one of the sample a step starts from. Values beyond 1e6 are set to infinity and stay there. What is computed for a
-/// row does not depend on the others.
+/// The latent input is interpolated linearly, the phase is that of the sample a step starts from. Values beyond 1e6 are
+/// infinite from there on. What is computed for a row does not depend on the others.
 pub(super) fn predict(
     candidate: Candidate<'_>,
     set: EncodedSet<'_>,
     rows: &[Row],
 ) -> Vec<DMatrix<f64>> {
-    let d = candidate.features.latent_dim();
+    let d = candidate.features.latent_dim;
     let empty = rows.iter().map(|row| DMatrix::zeros(d, row.window.steps));
     let mut predictions: Vec<_> = empty.collect();
     // The longest first, so that those which still go on are the first rows.
@@ -102,8 +100,7 @@ pub(super) fn predict(
     predictions
 }
 
-/// As [`predict`] for one window, once with each of the changes; one of a phase that the window does not have changes
-/// nothing.
+/// As [`predict`] for one window, once with each of the changes.
 pub(super) fn predict_changed(
     candidate: Candidate<'_>,
     changes: &[Change],
@@ -142,7 +139,7 @@ type ActiveTerms = Vec<Vec<(usize, f64)>>;
 
 impl<'a> Stepper<'a> {
     fn new(candidate: Candidate<'a>, set: EncodedSet<'a>, rows: Vec<Row>) -> Self {
-        let d = candidate.features.latent_dim();
+        let d = candidate.features.latent_dim;
         let active = |xi: &DMatrix<f64>| {
             let columns = xi.column_iter().map(|column| {
                 let terms = column.iter().copied().enumerate();
@@ -182,7 +179,7 @@ impl<'a> Stepper<'a> {
 
     /// Fits everything but the state to the number of rows.
     fn make_room(&mut self) {
-        let (n, d) = (self.rows.len(), self.candidate.features.latent_dim());
+        let (n, d) = (self.rows.len(), self.candidate.features.latent_dim);
         self.phase = vec![0; n];
         self.step_s = vec![0.0; n];
         self.input = std::array::from_fn(|_| DMatrix::zeros(n, d));
@@ -221,7 +218,7 @@ impl<'a> Stepper<'a> {
 
     fn rate(&mut self, stage: usize) {
         let (features, n) = (self.candidate.features, self.rows.len());
-        let d = features.latent_dim();
+        let d = features.latent_dim;
         let (input, share) = STAGES[stage];
         let (before, rates) = self.rates.split_at_mut(stage);
         let (moved, inputs) = self.variables.as_mut_slice().split_at_mut(2 * d * n);
@@ -299,77 +296,6 @@ vectorised! {
                 let next = state[row] + step_s[row] * mean;
                 let is_bounded = next.abs() < DIVERGED;
                 state[row] = if is_bounded { next } else { f64::INFINITY };
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::train::oscillator;
-
-    fn of<'a>(features: &'a Features, xi: &'a [DMatrix<f64>]) -> Candidate<'a> {
-        Candidate { features, xi }
-    }
-
-    #[test]
-    fn predictions_of_the_true_dynamics_follow_the_samples_through_both_phases() {
-        let (dataset, latent) = oscillator::jumps(2);
-        let (features, xi) = oscillator::known();
-        let set = EncodedSet::new(&dataset, &latent);
-        for restart in [Restart::Never, Restart::Every(0.1)] {
-            let windows = windows(&dataset, restart);
-            let predictions = predict(of(&features, &xi), set, &plain(&windows));
-            for (window, prediction) in windows.iter().zip(predictions) {
-                let z = &latent[window.jump].z;
-                let truth = z.columns(window.start + 1, window.steps);
-                assert!((prediction - truth).amax() < 2e-4, "{window:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn windows_of_several_lengths_are_predicted_as_each_by_itself() {
-        let (dataset, latent) = oscillator::jumps(2);
-        let (features, xi) = oscillator::known();
-        let candidate = of(&features, &xi);
-        let window = |(jump, start, steps)| Window { jump, start, steps };
-        let windows = [(0, 110, 20), (1, 0, 199), (0, 0, 1), (1, 130, 60)].map(window);
-        let set = EncodedSet::new(&dataset, &latent);
-        let together = predict(candidate, set, &plain(&windows));
-        for (window, prediction) in windows.iter().zip(&together) {
-            let alone = predict(candidate, set, &plain(&[*window]));
-            assert_eq!(prediction, &alone[0], "{window:?}");
-        }
-        assert!(predict(candidate, set, &[]).is_empty());
-    }
-
-    #[test]
-    fn changes_predict_what_the_changed_coefficients_predict() {
-        let (dataset, latent) = oscillator::jumps(1);
-        let (features, xi) = oscillator::known();
-        let set = EncodedSet::new(&dataset, &latent);
-        let predicted = |xi: &[DMatrix<f64>], window| {
-            predict(of(&features, xi), set, &plain(&[window])).remove(0)
-        };
-        let changes = [((1, 0, 1), 0.3), ((0, 1, 0), -2.0), ((0, 2, 1), 0.5)];
-        let changes = changes.map(|(place, by)| Change { place, by });
-        for (start, phases) in [(0, [true, true]), (20, [true, false]), (150, [false, true])] {
-            let window = Window {
-                jump: 0,
-                start,
-                steps: if phases[1] { 199 - start } else { 50 },
-            };
-            let candidate = of(&features, &xi);
-            let found = predict_changed(candidate, &changes, set, window);
-            let unchanged = predicted(&xi, window);
-            for (Change { place, by }, found) in changes.iter().zip(&found) {
-                let mut changed = xi.clone();
-                changed[place.0][(place.1, place.2)] += by;
-                let expected = predicted(&changed, window);
-                assert!((found - &expected).amax() < 1e-12, "{place:?} {window:?}");
-                assert_eq!(*found != unchanged, phases[place.0], "{place:?} {window:?}");
             }
         }
     }

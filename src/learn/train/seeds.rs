@@ -1,5 +1,4 @@
-//! The seeds of a training: one without a model is left out as long as another one has a model; how far they agree on
-//! which candidate terms matter.
+//! The seeds of a training: the best is kept, those without a model are left out; how far they agree on the terms.
 
 use std::collections::BTreeMap;
 
@@ -9,6 +8,7 @@ use super::error::TrainError;
 use super::jumps::learn_jumps;
 use super::metrics::{SeedReport, Trained};
 use super::progress::Monitor;
+use super::rollout::Xi;
 use super::task::{Fitted, Origin, Task, provenance};
 use crate::model::{LatentVariable, Library, ModelError};
 
@@ -32,8 +32,8 @@ impl Seeds {
         match outcome.and_then(with_finite_coefficients) {
             Ok(finished) => self.finished.push(finished),
             Err(error) if is_of_one_seed(&error) => {
-                monitor.stage("leaving out a seed without a model", 1);
-                monitor.done(1, format!("seed {seed}: {error}"));
+                monitor.stage("leaving out a seed without a model");
+                monitor.done(format!("seed {seed}: {error}"));
                 self.failure.get_or_insert(error);
             }
             Err(error) => return Err(error),
@@ -41,43 +41,33 @@ impl Seeds {
         Ok(())
     }
 
+    /// The model of the seed of least score, with the reports of all that have one, best first.
     pub(super) fn into_model(
-        self,
+        mut self,
         task: Task<'_>,
         method: &str,
         origin: &Origin,
     ) -> Result<Trained, TrainError> {
-        let (best, reports, overlap) = self.best(&task.library, &task.moments.state)?;
-        let maps = &best.maps;
-        let set = maps.training_set(&task);
+        let runs = self.finished.iter();
+        let runs: Vec<_> = runs
+            .map(|(_, fit)| (&fit.maps.weights, &fit.xi[..]))
+            .collect();
+        let overlap = support_overlap(&task.library, &runs, &task.moments.state);
+        (self.finished).sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
+        let (reports, fits): (Vec<SeedReport>, Vec<Fitted>) = self.finished.into_iter().unzip();
+        let Some(best) = fits.into_iter().next() else {
+            return Err(self.failure.unwrap_or(TrainError::Cancelled));
+        };
         let mut report = task.report(&best, &reports[0].judged);
         // A single seed without losses has nothing that the report does not say.
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let (jumps, deviations) = learn_jumps(set, &maps.encoder);
+        let (jumps, deviations) = learn_jumps(best.maps.training_set(&task), &best.maps.encoder);
         report.deviations = deviations;
         let provenance = provenance(task.options, method, origin, &report);
         let model = task.assemble(best, jumps, provenance)?;
         Ok(Trained { model, report })
-    }
-
-    /// The seed of least score, the reports of all that have a model, best first, and the overlap of their supports;
-    /// `state_covariance` (18 x 18) is that of the training states in scaled units.
-    fn best(
-        mut self,
-        library: &Library,
-        state_covariance: &DMatrix<f64>,
-    ) -> Result<(Fitted, Vec<SeedReport>, Option<f64>), TrainError> {
-        let fits: Vec<&Fitted> = self.finished.iter().map(|(_, fitted)| fitted).collect();
-        let overlap = support_overlap(library, &fits, state_covariance);
-        self.finished
-            .sort_by(|(a, _), (b, _)| a.score.total_cmp(&b.score));
-        let (reports, fits): (Vec<SeedReport>, Vec<Fitted>) = self.finished.into_iter().unzip();
-        match fits.into_iter().next() {
-            Some(fitted) => Ok((fitted, reports, overlap)),
-            None => Err(self.failure.unwrap_or(TrainError::Cancelled)),
-        }
     }
 }
 
@@ -101,44 +91,30 @@ fn with_finite_coefficients((mut report, fitted): (SeedReport, Fitted)) -> Outco
 }
 
 fn is_of_one_seed(error: &TrainError) -> bool {
-    match error {
-        TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {
-            true
-        }
-        TrainError::NoRecording
-        | TrainError::Split { .. }
-        | TrainError::TooFewSamples { .. }
-        | TrainError::PhaseSamples { .. }
-        | TrainError::LatentDim { .. }
-        | TrainError::Option { .. }
-        | TrainError::Range(_)
-        | TrainError::Cancelled
-        | TrainError::Recording(_) => false,
-    }
+    use TrainError::{Model, NoStableModel, TermValue};
+    matches!(error, NoStableModel { .. } | TermValue { .. } | Model(_))
 }
 
-/// Mean over pairs of runs of (coefficients active in both) / (coefficients active in either), all phases together,
-/// after matching the latent coordinates; `None` for fewer than two runs.
-///
-/// `state_covariance` (18 x 18) is that of the training states in scaled units.
-pub(super) fn support_overlap(
+/// Encoder weights and Xi of every phase.
+type Run<'a> = (&'a DMatrix<f64>, &'a [Xi]);
+
+/// Mean over pairs of runs of (coefficients active in both) / (active in either), after matching latent coordinates.
+fn support_overlap(
     library: &Library,
-    runs: &[&Fitted],
+    runs: &[Run<'_>],
     state_covariance: &DMatrix<f64>,
 ) -> Option<f64> {
     let mut overlaps = Vec::new();
     for (i, first) in runs.iter().enumerate() {
         for second in &runs[i + 1..] {
-            let partner =
-                match_latents(&first.maps.weights, &second.maps.weights, state_covariance);
-            overlaps.push(overlap(library, first, second, &partner));
+            let partner = match_latents(first.0, second.0, state_covariance);
+            overlaps.push(overlap(library, first.1, second.1, &partner));
         }
     }
     (!overlaps.is_empty()).then(|| overlaps.iter().sum::<f64>() / overlaps.len() as f64)
 }
 
-/// For every latent coordinate of `first` the one of `second` that it correlates with most, each taken once, the
-/// strongest pairs first.
+/// For every latent of `first` the one of `second` that it correlates with most, each once, the strongest first.
 fn match_latents(
     first: &DMatrix<f64>,
     second: &DMatrix<f64>,
@@ -166,10 +142,10 @@ fn match_latents(
     partner.expect("as many coordinates on both sides")
 }
 
-fn overlap(library: &Library, first: &Fitted, second: &Fitted, partner: &[usize]) -> f64 {
+fn overlap(library: &Library, first: &[Xi], second: &[Xi], partner: &[usize]) -> f64 {
     let renamed = renamed_terms(library, partner);
     let (mut both, mut either) = (0_usize, 0_usize);
-    for (a, b) in first.xi.iter().zip(&second.xi) {
+    for (a, b) in first.iter().zip(second) {
         let mut found = 0;
         for (column, &other) in partner.iter().enumerate() {
             for (row, other_row) in renamed.iter().enumerate() {
@@ -211,78 +187,34 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicBool;
-
     use super::*;
-    use crate::train::metrics::SetMetrics;
-    use crate::train::oscillator::{fitted, standard_library};
-    use crate::train::progress::Progress;
-
-    fn outcome(score: f64, coefficient: f64) -> Outcome {
-        let report = SeedReport {
-            seed: 1,
-            score,
-            losses: None,
-            active: 1,
-            dominant: Vec::new(),
-            judged: SetMetrics::default(),
-        };
-        let xi = DMatrix::from_element(7, 2, coefficient);
-        Ok((report, fitted(DMatrix::identity(2, 2), xi)))
-    }
-
-    fn reports(outcomes: Vec<Outcome>) -> Result<Vec<SeedReport>, TrainError> {
-        let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
-        let mut monitor = Monitor::new(&mut listener, &cancel);
-        let mut seeds = Seeds::default();
-        for (seed, outcome) in outcomes.into_iter().enumerate() {
-            seeds.add(seed as u64, outcome, &mut monitor)?;
-        }
-        let best = seeds.best(&standard_library(2, 1, false), &DMatrix::identity(2, 2))?;
-        Ok(best.1)
-    }
-
-    fn unstable(candidates: usize) -> Outcome {
-        Err(TrainError::NoStableModel { candidates })
-    }
-
-    #[test]
-    fn seeds_some_without_a_model_give_the_best_of_the_others() {
-        let outcomes = vec![
-            outcome(3.0, 1.0),
-            unstable(9),
-            outcome(-1.0, f64::NAN),
-            outcome(-f64::NAN, 1.0),
-            outcome(2.0, 1.0),
-        ];
-        let found = reports(outcomes).expect("three seeds have a model");
-        let scores: Vec<f64> = found.iter().map(|report| report.score).collect();
-        assert_eq!(scores, [2.0, 3.0, f64::INFINITY]);
-        let found = reports(vec![unstable(9), outcome(1.0, f64::INFINITY)]);
-        let first = matches!(found, Err(TrainError::NoStableModel { candidates: 9 }));
-        assert!(first, "{found:?}");
-    }
+    use crate::model::{LibraryChoice, StandardLibrary};
 
     #[test]
     fn exchanged_coordinates_overlap_fully_and_other_terms_do_not() {
-        let library = standard_library(2, 2, false);
-        let with = |weights: &DMatrix<f64>, active: [(&str, usize); 3]| {
+        let standard = StandardLibrary {
+            degree: 2,
+            trigonometric: false,
+            inputs: true,
+        };
+        let library = Library::of(2, LibraryChoice::Standard(standard)).expect("small library");
+        let with = |active: [(&str, usize); 3]| {
             let row = |text| library.terms().iter().position(|term| term.text() == text);
             let mut xi = DMatrix::zeros(library.len(), 2);
             for (text, column) in active {
                 xi[(row(text).expect(text), column)] = 1.0;
             }
-            fitted(weights.clone(), xi)
+            [xi]
         };
         let straight = DMatrix::from_row_slice(2, 3, &[1.0, 0.1, 0.0, 0.0, 1.0, 0.0]);
         let exchanged = DMatrix::from_row_slice(2, 3, &[0.0, -1.0, 0.0, 1.0, 0.2, 0.0]);
-        let covariance = DMatrix::identity(3, 3);
-        let first = with(&straight, [("z1", 0), ("u2", 1), ("dz1^2", 1)]);
-        let same = with(&exchanged, [("z2", 1), ("u1", 0), ("dz2^2", 0)]);
-        let half = with(&straight, [("z1", 0), ("u2", 0), ("dz1^2", 1)]);
-        let overlap = |runs: &[&Fitted]| support_overlap(&library, runs, &covariance);
-        assert_eq!(overlap(&[&first, &same]), Some(1.0));
-        assert_eq!(overlap(&[&first, &half]), Some(0.5));
-        assert_eq!(overlap(&[&first]), None);
+        let first = with([("z1", 0), ("u2", 1), ("dz1^2", 1)]);
+        let same = with([("z2", 1), ("u1", 0), ("dz2^2", 0)]);
+        let half = with([("z1", 0), ("u2", 0), ("dz1^2", 1)]);
+        let overlap = |runs: &[Run<'_>]| support_overlap(&library, runs, &DMatrix::identity(3, 3));
+        let first: Run<'_> = (&straight, &first);
+        assert_eq!(overlap(&[first, (&exchanged, &same)]), Some(1.0));
+        assert_eq!(overlap(&[first, (&straight, &half)]), Some(0.5));
+        assert_eq!(overlap(&[first]), None);
     }
 }

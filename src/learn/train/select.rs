@@ -1,5 +1,4 @@
-//! Choosing Xi: many candidates, judged by what their rollouts predict on jumps that were not fitted; terms that
-//! predictions do not miss are dropped, terms that they gain by are added.
+//! Choosing Xi: many candidates, judged by what their rollouts predict on jumps that were not fitted.
 
 use std::collections::BTreeSet;
 
@@ -37,24 +36,32 @@ const PRUNINGS: [Pruning; 10] = [
 /// How many candidates are pruned further, a term at a time, while their score stays within the slack.
 const SWEEPS: usize = 3;
 
+/// Share of the score that a term must bring to be added.
+const LEAST_GAIN: f64 = 0.005;
+/// Terms tried in a round of adding.
+const ATTEMPTS: usize = 60;
+/// Rounds of adding.
+const ROUNDS: usize = 3;
+
+/// A share of the energy, and the phase, row and column of the term that it belongs to.
+type RankedTerm = (f64, usize, usize, usize);
+
 /// How a candidate was fitted, and how it did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     pub window: usize,
     pub ridge: f64,
     pub pruning: Pruning,
-    /// Validation score: root mean square error of the latent state in standard deviations, of 0.1 s predictions plus
-    /// 0.2 times that of whole jumps.
+    /// Root mean square error, in standard deviations, of predictions over 0.1 s plus 0.2 times that of whole jumps.
     pub score: f64,
     pub active: usize,
 }
 
-/// Fits all combinations of windows, ridges and prunings and takes, among those within the slack of the best, the
-/// sparsest: Xi of every phase (`library_dim x latent_dim`), what it was fitted with, and how many candidates there
-/// were.
+/// Of all combinations of windows, ridges and prunings within the slack of the best, the sparsest: Xi of every phase,
+/// how it was fitted, and how many candidates there were.
 ///
-/// Fits the jumps of `set` with what is known of each phase, for the library of `judge`. The best by `judge` sets the
-/// scale: from there on errors are relative to its own. If cancelled, the search ends as soon as a candidate is stable.
+/// The best by `judge` sets the scale: from there on errors are relative to its own. If cancelled, the search ends as
+/// soon as a candidate is stable.
 pub(super) fn select(
     set: EncodedSet<'_>,
     knowledge: &[Knowledge],
@@ -111,8 +118,7 @@ pub(super) fn select(
     Ok((chosen.now.xi, choice, candidates))
 }
 
-/// Of the best refined candidate without the terms that rollouts do not miss, and of all others within the slack of the
-/// best, the one with fewest terms.
+/// Of the best refined candidate, thinned, and all others within the slack, the one with fewest terms.
 fn sparsest<'a>(
     mut refined: Vec<Trial<'a>>,
     refiner: &Refiner<'_>,
@@ -160,20 +166,36 @@ impl Trial<'_> {
                 .collect()
         });
     }
+
+    /// What `shares` gives for each column of every phase.
+    fn places(
+        &self,
+        shares: fn(&Regression, usize, &DMatrix<bool>, f64) -> Vec<(usize, f64)>,
+    ) -> Vec<RankedTerm> {
+        let mut places = Vec::new();
+        for (phase, regression) in self.regressions.iter().enumerate() {
+            let support = self.now.xi[phase].map(|value| value != 0.0);
+            for column in 0..support.ncols() {
+                let found = shares(regression, column, &support, self.ridge).into_iter();
+                places.extend(found.map(|(row, share)| (share, phase, row, column)));
+            }
+        }
+        places
+    }
 }
 
-/// The regressions of every phase, for each of the windows.
+/// Of every phase, for each of the windows.
 type Regressions = [Vec<Regression>; WINDOWS.len()];
 
 impl Refiner<'_> {
-    /// Every combination of windows, ridges and prunings; where the library has terms that are not affine, also those
-    /// without them, and the best of these grown by such terms: rollouts of full libraries diverge more often than not.
+    /// All combinations; where the library has terms that are not affine also those without them, and the best of these
+    /// grown by such terms: rollouts of full libraries diverge more often than not.
     fn try_all<'r>(
         &self,
         regressions: &'r Regressions,
         monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'r>> {
-        let affine = self.judge.features.affine_terms();
+        let affine = &self.judge.features.affine;
         let has_nonlinear = affine.contains(&false);
         // The affine terms are still to come where full libraries diverge.
         let enough =
@@ -191,8 +213,7 @@ impl Refiner<'_> {
         tried
     }
 
-    /// Every combination of windows, ridges and prunings with the terms that are `allowed`; if cancelled, those until
-    /// there are `enough`.
+    /// All combinations with the terms that are `allowed`; if cancelled, those until there are `enough`.
     fn fit_all<'r>(
         &self,
         regressions: &'r Regressions,
@@ -201,8 +222,7 @@ impl Refiner<'_> {
         monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'r>> {
         let mut tried = Vec::new();
-        let steps = WINDOWS.len() * RIDGES.len() * PRUNINGS.len();
-        monitor.stage("fitting the dynamics", steps);
+        monitor.stage("fitting the dynamics");
         for (window, regressions) in WINDOWS.into_iter().zip(regressions) {
             for ridge in RIDGES {
                 if monitor.cancelled() && enough(&tried) {
@@ -226,79 +246,41 @@ impl Refiner<'_> {
                         trial.score_by(self.judge);
                     }
                     let (active, score) = (trial.now.active(), trial.now.score);
-                    monitor.done(tried.len() + 1, format!("{active} terms, score {score:.4}"));
+                    monitor.done(format!("{active} terms, score {score:.4}"));
                     tried.push(trial);
                 }
             }
         }
         tried
     }
-}
 
-fn any_stable(tried: &[Trial<'_>]) -> bool {
-    tried.iter().any(Trial::is_stable)
-}
-
-fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>, TrainError> {
-    let best = (tried.iter().filter(|trial| trial.is_stable()))
-        .min_by(|a, b| a.now.score.total_cmp(&b.now.score));
-    best.ok_or(TrainError::NoStableModel {
-        candidates: tried.len(),
-    })
-}
-
-/// Candidates to prune and refine, at most [`SWEEPS`]: of every window the one with the best score, then all others
-/// within the limit, best first.
-fn starts<'a>(mut tried: Vec<Trial<'a>>, limit: f64) -> impl Iterator<Item = Trial<'a>> {
-    tried.retain(|trial| trial.now.score <= limit);
-    tried.sort_by(|a, b| a.now.score.total_cmp(&b.now.score));
-    let mut seen = BTreeSet::new();
-    let (first, later): (Vec<_>, Vec<_>) =
-        (tried.into_iter()).partition(|trial| seen.insert(trial.window));
-    first.into_iter().chain(later).take(SWEEPS)
-}
-
-/// Share of the score that a term must bring to be added.
-const LEAST_GAIN: f64 = 0.005;
-/// Terms tried in a round of adding.
-const ATTEMPTS: usize = 60;
-/// Rounds of adding.
-const ROUNDS: usize = 3;
-
-/// A share of the energy, and the phase, row and column of the term that it belongs to.
-type RankedTerm = (f64, usize, usize, usize);
-
-impl Refiner<'_> {
-    /// Drops terms, the least useful to the regression first, fitting the rest of their equation again, as long as the
-    /// score stays within `limit`. One attempt a term.
+    /// Drops terms, the least useful to the regression first, as long as the score stays within `limit`.
     fn sweep(&self, trial: &mut Trial<'_>, limit: f64, monitor: &mut Monitor<'_>) {
         let mut order = trial.places(Regression::losses);
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        monitor.stage("dropping terms that predictions do not miss", order.len());
-        for (attempt, place) in order.into_iter().enumerate() {
+        monitor.stage("dropping terms that predictions do not miss");
+        for place in order {
             if monitor.cancelled() {
                 return;
             }
             self.attempt(trial, place, false, limit);
-            monitor.done(attempt + 1, format!("score {:.4}", trial.now.score));
+            monitor.done(format!("score {:.4}", trial.now.score));
         }
     }
 
-    /// Adds terms, those that explain most of the accelerations first, fitting their equation again, wherever the score
-    /// falls by [`LEAST_GAIN`] or more. Goes round [`ROUNDS`] times, as terms explain less once others are there.
+    /// Adds terms that explain most of the accelerations wherever the score falls by [`LEAST_GAIN`] or more.
     fn grow(&self, trial: &mut Trial<'_>, monitor: &mut Monitor<'_>) {
-        monitor.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
-        for round in 0..ROUNDS {
+        monitor.stage("adding terms that predictions gain by");
+        for _ in 0..ROUNDS {
             let before = trial.now.score;
             let mut order = trial.places(Regression::gains);
             order.sort_by(|a, b| b.0.total_cmp(&a.0));
-            for (attempt, place) in order.into_iter().take(ATTEMPTS).enumerate() {
+            for place in order.into_iter().take(ATTEMPTS) {
                 if monitor.cancelled() {
                     return;
                 }
                 self.attempt(trial, place, true, (1.0 - LEAST_GAIN) * trial.now.score);
-                let done = round * ATTEMPTS + attempt + 1;
-                monitor.done(done, format!("score {:.4}", trial.now.score));
+                monitor.done(format!("score {:.4}", trial.now.score));
             }
             if trial.now.score == before {
                 return;
@@ -329,20 +311,24 @@ impl Refiner<'_> {
     }
 }
 
-impl Trial<'_> {
-    /// What `shares` gives for each column of every phase.
-    fn places(
-        &self,
-        shares: fn(&Regression, usize, &DMatrix<bool>, f64) -> Vec<(usize, f64)>,
-    ) -> Vec<RankedTerm> {
-        let mut places = Vec::new();
-        for (phase, regression) in self.regressions.iter().enumerate() {
-            let support = self.now.xi[phase].map(|value| value != 0.0);
-            for column in 0..support.ncols() {
-                let found = shares(regression, column, &support, self.ridge).into_iter();
-                places.extend(found.map(|(row, share)| (share, phase, row, column)));
-            }
-        }
-        places
-    }
+fn any_stable(tried: &[Trial<'_>]) -> bool {
+    tried.iter().any(Trial::is_stable)
+}
+
+fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>, TrainError> {
+    let best = (tried.iter().filter(|trial| trial.is_stable()))
+        .min_by(|a, b| a.now.score.total_cmp(&b.now.score));
+    best.ok_or(TrainError::NoStableModel {
+        candidates: tried.len(),
+    })
+}
+
+/// At most [`SWEEPS`]: the best of every window, then all others within the limit, best first.
+fn starts<'a>(mut tried: Vec<Trial<'a>>, limit: f64) -> impl Iterator<Item = Trial<'a>> {
+    tried.retain(|trial| trial.now.score <= limit);
+    tried.sort_by(|a, b| a.now.score.total_cmp(&b.now.score));
+    let mut seen = BTreeSet::new();
+    let (first, later): (Vec<_>, Vec<_>) =
+        (tried.into_iter()).partition(|trial| seen.insert(trial.window));
+    first.into_iter().chain(later).take(SWEEPS)
 }

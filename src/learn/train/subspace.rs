@@ -1,10 +1,8 @@
-//! The encoder's row space: which directions of the state the latent state sees and the lift can push.
+//! The encoder's row space.
 //!
 //! Reconstruction and lift depend on `W_e` only through the space its rows span, so the search runs over orthonormal
-//! bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`); [`varimax`] then chooses the basis inside the space: the same
-//! space, described by as few coordinates a latent as possible.
-//!
-//! What the encoder's rows are made of: rows that are held, and directions that the other rows combine.
+//! bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`) of the directions of a [`Frame`]; [`varimax`] then chooses the
+//! basis inside the space: as few coordinates a latent as possible.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -23,32 +21,26 @@ pub(super) struct Moments {
 }
 
 impl Moments {
-    /// Coordinates that the encoder may look at: they move (standard deviation of at least `least_std`, scaled), or
-    /// they are actuated (at least `least_share` of the input's energy).
-    ///
-    /// A coordinate that neither moves nor is actuated would only bring noise into the latent space. One that rests
-    /// because a torque holds it (hip abduction) must stay, else the lift cannot return that torque.
+    /// Coordinates that move (standard deviation of at least `least_std`, scaled) or are actuated (at least
+    /// `least_share` of the input's energy): without one that rests because a torque holds it (hip abduction), the lift
+    /// could not return that torque.
     pub(super) fn active_coordinates(&self, least_std: f64, least_share: f64) -> Vec<usize> {
-        let energy = self.input.trace();
-        (0..self.state.nrows())
-            .filter(|&i| {
-                self.state[(i, i)].sqrt() >= least_std || self.input[(i, i)] > least_share * energy
-            })
-            .collect()
+        let least_energy = least_share * self.input.trace();
+        let moves = |i: usize| self.state[(i, i)].sqrt() >= least_std;
+        let is_active = |&i: &usize| moves(i) || self.input[(i, i)] > least_energy;
+        (0..self.state.nrows()).filter(is_active).collect()
     }
 }
 
 const ITERATIONS: usize = 2000;
 
-/// Finds the row space of least `reconstruction + lift_weight * lift_loss`: an orthonormal basis, in which the rows of
-/// resting coordinates are zero. The frame must have as many directions as the space has dimensions.
+/// Finds the orthonormal basis of least `reconstruction + lift_weight * lift_loss` over the frame's free directions.
 ///
-/// With the state covariance `C`, the coordinate weights `D` (diagonal), the input second moment `U` and an orthonormal
-/// basis `Q` of the active coordinates: `reconstruction = (tr DC - tr((Q^T C Q)^-1 Q^T C D C Q)) / n` is the weighted
-/// mean square error of the least-squares decoder and `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T)
-/// u||^2 / ||u||^2`. Rows that the frame holds are taken as seen: `C` is then the covariance given them. The basis
-/// returned is that of the other rows. Descent along the exact gradient on the Stiefel manifold from several starting
-/// points, some of which are random; the best is kept.
+/// With the state covariance `C`, the coordinate weights `D` (diagonal) and the input second moment `U`:
+/// `reconstruction = (tr DC - tr((Q^T C Q)^-1 Q^T C D C Q)) / n` is the weighted mean square error of the least-squares
+/// decoder, `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T) u||^2 / ||u||^2`. Rows that the frame
+/// holds are taken as seen: `C` is the covariance given them. Descent along the exact gradient on the Stiefel manifold
+/// from several starting points; the best is kept.
 pub(super) fn find_subspace(
     moments: &Moments,
     frame: &Frame,
@@ -110,23 +102,15 @@ impl Objective {
         }
         let covariance = basis.transpose() * &self.state * basis;
         let floor = 1e-12 * self.total_state.max(f64::MIN_POSITIVE);
-        covariance
-            .pseudo_inverse(floor)
-            .expect("the tolerance is positive")
-    }
-
-    fn reconstruction(&self, basis: &DMatrix<f64>) -> f64 {
-        let seen = basis.transpose() * &self.state_squared * basis;
-        (self.total_state - (self.inverse_latent_covariance(basis) * seen).trace()) / self.state_dim
-    }
-
-    fn lift_loss(&self, basis: &DMatrix<f64>) -> f64 {
-        let carried = (basis.transpose() * &self.input * basis).trace() + self.held_input;
-        1.0 - carried / self.total_input
+        (covariance.pseudo_inverse(floor)).expect("the tolerance is positive")
     }
 
     fn value(&self, basis: &DMatrix<f64>) -> f64 {
-        self.reconstruction(basis) + self.lift_weight * self.lift_loss(basis)
+        let seen = basis.transpose() * &self.state_squared * basis;
+        let explained = (self.inverse_latent_covariance(basis) * seen).trace();
+        let carried = (basis.transpose() * &self.input * basis).trace() + self.held_input;
+        let lift_loss = 1.0 - carried / self.total_input;
+        (self.total_state - explained) / self.state_dim + self.lift_weight * lift_loss
     }
 
     /// Gradient of [`Self::value`] with respect to an orthonormal `Q`.
@@ -168,10 +152,9 @@ impl Objective {
                 break;
             }
             let curvature = moved.dot(&turned).abs();
-            step = if curvature > 0.0 {
-                moved.norm_squared() / curvature
-            } else {
-                2.0 * step
+            step = match curvature > 0.0 {
+                true => moved.norm_squared() / curvature,
+                false => 2.0 * step,
             };
         }
         (value, basis)
@@ -211,16 +194,11 @@ fn starting_points(
 ) -> Vec<DMatrix<f64>> {
     let state = &objective.state / objective.total_state.max(f64::MIN_POSITIVE);
     let input = &objective.input / objective.total_input;
-    let mut starts: Vec<DMatrix<f64>> = [0.0, 0.3, 0.6, 1.0]
-        .iter()
-        .map(|share| leading(&state * (1.0 - share) + &input * *share, latent_dim))
-        .collect();
+    let blend = |share: f64| leading(&state * (1.0 - share) + &input * share, latent_dim);
     let mut random = Random::new(seed);
-    for _ in 0..restarts {
-        let start = random.matrix(objective.state.nrows(), latent_dim, 1.0);
-        starts.push(orthonormal(start));
-    }
-    starts
+    let random = (0..restarts).map(|_| random.matrix(state.nrows(), latent_dim, 1.0));
+    let blends = [0.0, 0.3, 0.6, 1.0].map(blend).into_iter();
+    blends.chain(random.map(orthonormal)).collect()
 }
 
 fn leading(symmetric: DMatrix<f64>, count: usize) -> DMatrix<f64> {
@@ -230,11 +208,9 @@ fn leading(symmetric: DMatrix<f64>, count: usize) -> DMatrix<f64> {
     eigen.eigenvectors.select_columns(&order[..count])
 }
 
-/// Orthogonal `latent_dim x latent_dim` matrix `T` for which `loadings * T` is simplest in the varimax sense.
-///
-/// `loadings` is `state_dim x latent_dim` (here `diag(std) Q`); the sum over columns of the variance of the squared
-/// entries is increased by planar rotations until none moves a pair by more than `1e-12` rad (Kaiser 1958, The varimax
-/// criterion for analytic rotation in factor analysis, without row normalisation).
+/// Orthogonal `T` for which `loadings * T` (`diag(std) Q`) is simplest: planar rotations increase the sum over columns
+/// of the variance of the squared entries (Kaiser 1958, The varimax criterion for analytic rotation in factor
+/// analysis).
 pub(super) fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
     let n_columns = loadings.ncols();
     let n_rows = loadings.nrows() as f64;
@@ -259,10 +235,8 @@ pub(super) fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
     rotation
 }
 
-/// Columns reordered by decreasing weight on the coordinates in `order_by`, each with a positive dominant entry.
-///
-/// The first coordinate of `order_by` takes the column that weighs it most, then the next one, so that a reader meets
-/// body x as z1 and body z as z2 whenever the space holds them.
+/// The order of the columns that puts first the one which weighs the first coordinate of `order_by` most, then that of
+/// the next (body x as z1 and body z as z2), the others by weight; and signs that make dominant entries positive.
 pub(super) fn order_and_sign(
     loadings: &DMatrix<f64>,
     order_by: &[usize],
@@ -281,8 +255,9 @@ pub(super) fn order_and_sign(
     left.sort_by(|&a, &b| weight(b).total_cmp(&weight(a)));
     order.extend(left);
     let columns = order.iter().map(|&column| loadings.column(column));
-    let signs = columns.map(|column| column[column.iamax()].signum());
-    let signs = signs.collect();
+    let signs = columns
+        .map(|column| column[column.iamax()].signum())
+        .collect();
     (order, signs)
 }
 
@@ -298,10 +273,9 @@ fn best_angle(loadings: &DMatrix<f64>, a: usize, b: usize, n_rows: f64) -> f64 {
     }
     let numerator = sum_uv - 2.0 * sum_u * sum_v / n_rows;
     let denominator = sum_difference - (sum_u * sum_u - sum_v * sum_v) / n_rows;
-    if numerator == 0.0 && denominator >= 0.0 {
-        0.0
-    } else {
-        numerator.atan2(denominator) / 4.0
+    match numerator == 0.0 && denominator >= 0.0 {
+        true => 0.0,
+        false => numerator.atan2(denominator) / 4.0,
     }
 }
 
@@ -314,16 +288,14 @@ fn turn(matrix: &mut DMatrix<f64>, a: usize, b: usize, angle: f64) {
     }
 }
 
-/// Pitch of the body among the 18 coordinates.
-const PITCH: usize = 16;
+const PITCH: usize = JOINT_DIM + 4;
 /// Time over which accelerations in flight are averaged, in s.
 const WINDOW_S: f64 = 0.05;
 /// Samples left out at both ends of a flight, where feet still slip or already touch.
 const TRIM: usize = 4;
 /// Fewest averaged accelerations in flight that tell the centre of mass.
 const LEAST_WINDOWS: usize = 50;
-/// Ridge, relative to the mean square of all joints' accelerations: joints that move together share what they do, and
-/// one that hardly moves, whose part would be made of noise, has hardly any.
+/// Ridge, relative to the mean square of all joints' accelerations.
 const RIDGE: f64 = 1e-2;
 
 /// Rows of an encoder `W_e` before they are chosen, in scaled units.
@@ -344,11 +316,9 @@ impl Frame {
         }
     }
 
-    /// The frame of the options.
-    ///
-    /// With [`Coordinates::Named`] and two latent coordinates or more, the first two rows are the centre of mass
-    /// forwards and upwards (see `centre_of_mass`) and the others combine the sums of `active` coordinates left and
-    /// right that a mirror leaves alone: such an encoder knows nothing of `y`, roll and yaw, nor of left and right.
+    /// With [`Coordinates::Named`] and two latent coordinates or more, the first two rows are the centre of mass and
+    /// the others combine sums of `active` coordinates that a mirror leaves alone: neither `y`, roll and yaw, nor left
+    /// and right.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],
@@ -366,21 +336,15 @@ impl Frame {
         let single = body.iter().chain(&[PITCH]).filter(|i| active.contains(i));
         let mut free: Vec<DVector<f64>> = single.map(|&i| unit(i)).collect();
         free.extend(mirrored_joints(active, robot));
-        Self {
-            held,
-            free: match free.is_empty() {
-                true => DMatrix::zeros(STATE_DIM, 0),
-                false => DMatrix::from_columns(&free),
-            },
-        }
+        let free = DMatrix::from_fn(STATE_DIM, free.len(), |row, k| free[k][row]);
+        Self { held, free }
     }
 
     pub(super) fn dim(&self) -> usize {
         self.held.ncols() + self.free.ncols()
     }
 
-    /// The held rows and the `latent_dim - h` directions of the free space nearest to the space that the columns of
-    /// `basis` span.
+    /// The `latent_dim - h` free directions nearest to the space that the columns of `basis` span.
     pub(super) fn nearest(&self, basis: &DMatrix<f64>, latent_dim: usize) -> DMatrix<f64> {
         let inside = self.free.tr_mul(basis).svd(true, false);
         let left = inside.u.expect("invariant: asked for");
@@ -391,33 +355,29 @@ impl Frame {
     }
 }
 
-/// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`: abductions
-/// mostly turn the other way on the other side.
+/// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`.
 fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
     let pairs = [
-        (Leg::FrontRight, Leg::FrontLeft),
-        (Leg::RearRight, Leg::RearLeft),
+        [Leg::FrontRight, Leg::FrontLeft],
+        [Leg::RearRight, Leg::RearLeft],
     ];
     let joints_of_leg = JOINT_DIM / Leg::ALL.len();
-    let mut directions = Vec::new();
-    for (right, left) in pairs {
-        for joint in 0..joints_of_leg {
-            let [a, b] = [right, left].map(|leg| joints_of_leg * leg.index() + joint);
-            if active.contains(&a) || active.contains(&b) {
-                let sign = robot.mirror_sign(b);
-                directions.push((unit(a) + unit(b) * sign) * std::f64::consts::FRAC_1_SQRT_2);
-            }
-        }
-    }
-    directions
+    let joints = pairs.into_iter().flat_map(|legs| {
+        let first = legs.map(|leg| joints_of_leg * leg.index());
+        (0..joints_of_leg).map(move |joint| first.map(|first| first + joint))
+    });
+    let is_active = |[a, b]: &[usize; 2]| active.contains(a) || active.contains(b);
+    let direction = |[a, b]: [usize; 2]| {
+        (unit(a) + unit(b) * robot.mirror_sign(b)) * std::f64::consts::FRAC_1_SQRT_2
+    };
+    joints.filter(is_active).map(direction).collect()
 }
 
 /// Rows of the centre of mass forwards and upwards, as columns, `18 x 2`: `x + c_x^T q` and `z + c_z^T q` over the
 /// joints `q`, of the body alone where the recordings have no flight.
 ///
-/// Nothing pushes the robot in flight, so its centre of mass falls freely: `ddx + c_x^T ddq = 0` and `ddz + c_z^T ddq =
-/// -g`. The regression of the body's accelerations on those of the joints (mirrored, ridge) over all flights therefore
-/// tells the part `c` that the legs have in the centre of mass, to first order in `q`.
+/// In flight it falls freely: `ddx + c_x^T ddq = 0` and `ddz + c_z^T ddq = -g`. The regression of the body's
+/// accelerations on those of the joints (mirrored, ridge) tells `c`, to first order in `q`.
 fn centre_of_mass(training: &Dataset, robot: &Robot) -> DMatrix<f64> {
     let all: Vec<usize> = (0..JOINT_DIM).collect();
     let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));
@@ -473,92 +433,4 @@ fn flight_accelerations(training: &Dataset, jump: &Jump, all: &mut Vec<DVector<f
 
 fn unit(index: usize) -> DVector<f64> {
     DVector::from_fn(STATE_DIM, |i, _| if i == index { 1.0 } else { 0.0 })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::robot::STATE_DIM;
-    use crate::train::dataset::centred;
-
-    fn moments() -> Moments {
-        let mut random = Random::new(3);
-        let mixed = random.matrix(STATE_DIM, 3, 1.0) * random.matrix(3, 400, 1.0);
-        let x = mixed + random.matrix(STATE_DIM, 400, 0.01);
-        let u = random.matrix(STATE_DIM, 400, 1.0);
-        of_samples(&x, &u)
-    }
-
-    fn of_samples(x: &DMatrix<f64>, u: &DMatrix<f64>) -> Moments {
-        let n = x.ncols() as f64;
-        let deviations = centred(x, &x.column_mean());
-        Moments {
-            state: &deviations * deviations.transpose() / n,
-            input: u * u.transpose() / n,
-        }
-    }
-
-    fn options(lift_weight: f64, body_weight: f64) -> EncoderOptions {
-        EncoderOptions {
-            lift_weight,
-            body_weight,
-            restarts: 3,
-            ..EncoderOptions::default()
-        }
-    }
-
-    fn all() -> Frame {
-        Frame::plain(&Vec::from_iter(0..STATE_DIM))
-    }
-
-    #[test]
-    fn gradient_agrees_with_finite_differences() {
-        let objective = Objective::new(
-            &moments(),
-            &Frame::plain(&[0, 1, 2, 12, 14]),
-            &options(0.3, 3.0),
-        );
-        let basis = orthonormal(Random::new(5).matrix(5, 2, 1.0));
-        let gradient = tangent(&basis, &objective.gradient(&basis));
-        let direction = tangent(&basis, &Random::new(6).matrix(5, 2, 1.0));
-        // The value depends on the space only, so any orthonormal basis of the moved space will do.
-        let at = |step: f64| objective.value(&orthonormal(&basis + &direction * step));
-        let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-        assert!((difference - gradient.dot(&direction)).abs() < 1e-7 * difference.abs().max(1.0));
-    }
-
-    #[test]
-    fn without_lift_and_weights_the_space_is_that_of_the_principal_components() {
-        let moments = moments();
-        let options = options(0.0, 1.0);
-        let found = find_subspace(&moments, &all(), 3, &options, 1);
-        let found = Objective::new(&moments, &all(), &options).reconstruction(&found);
-        let mut eigenvalues = SymmetricEigen::new(moments.state).eigenvalues;
-        eigenvalues.as_mut_slice().sort_by(f64::total_cmp);
-        let least = eigenvalues.rows(0, STATE_DIM - 3).sum() / STATE_DIM as f64;
-        let close = (found - least).abs() < 1e-9 * least.max(1e-3);
-        assert!(close, "{found} {least}");
-    }
-
-    #[test]
-    fn resting_coordinate_is_active_only_if_it_is_actuated() {
-        let x = DMatrix::from_fn(3, 50, |i, j| if i == 0 { (j as f64).sin() } else { 0.0 });
-        let u = DMatrix::from_fn(3, 50, |i, _| if i == 1 { 2.0 } else { 0.0 });
-        assert_eq!(of_samples(&x, &u).active_coordinates(0.1, 0.01), [0, 1]);
-    }
-
-    #[test]
-    fn varimax_undoes_a_rotation_of_a_simple_structure() {
-        let simple =
-            DMatrix::from_row_slice(5, 2, &[1.0, 0.0, 0.9, 0.0, 0.0, 1.2, 0.0, 0.8, 0.0, 0.5]);
-        let mut mixed = simple.clone();
-        turn(&mut mixed, 0, 1, 0.4);
-        let found = &mixed * varimax(&mixed);
-        for row in 0..5 {
-            assert!(
-                found[(row, 0)].abs().min(found[(row, 1)].abs()) < 1e-9,
-                "{found}"
-            );
-        }
-    }
 }

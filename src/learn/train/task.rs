@@ -1,6 +1,5 @@
-//! One training as every method sees it, checked before any map is learned: from learned maps to the numbers of a model
-//! (latent basis, chosen dynamics, metrics of the fit), and the model that they make, which carries where it comes
-//! from.
+//! One training as every method sees it: checked recordings, from learned maps to chosen dynamics and metrics of the
+//! fit, and the model that they make, which carries where it comes from.
 
 use std::path::Path;
 
@@ -51,9 +50,8 @@ impl<'a> Recordings<'a> {
 }
 
 pub(super) struct Task<'a> {
-    /// The training recordings cut into phases, scaled.
     pub training: Dataset,
-    /// The same of the validation recordings; may have no jump.
+    /// May have no jump.
     pub validation: Dataset,
     pub moments: Moments,
     pub library: Library,
@@ -67,7 +65,6 @@ pub(super) struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    /// Checks the options, reads the data sets and cuts them into phases, and checks them against the options.
     pub(super) fn new(
         recordings: Recordings<'_>,
         robot: &'static Robot,
@@ -184,17 +181,13 @@ impl Task<'_> {
             .jump_prior(jumps);
         let phases = training.phases.patterns.iter().zip(fitted.xi);
         for (index, ((pattern, xi), given_state)) in phases.zip(given_state).enumerate() {
+            let (name, feet) = (pattern.name.clone(), pattern.feet.clone());
             let statistics = InputStatistics {
                 given_state,
                 ..training.input_statistics(index)
             };
-            builder = builder
-                .phase(Phase {
-                    name: pattern.name.clone(),
-                    feet: pattern.feet.clone(),
-                    xi,
-                })
-                .input_statistics(pattern.name.clone(), statistics);
+            builder = builder.input_statistics(name.clone(), statistics);
+            builder = builder.phase(Phase { name, feet, xi });
         }
         Ok(builder.build()?)
     }
@@ -222,9 +215,8 @@ fn median_step_s(dataset: &Dataset) -> f64 {
     let mut steps: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
     // Recorded times carry rounding; a microsecond is below every sampling.
-    steps
-        .get(steps.len() / 2)
-        .map_or(0.002, |step| (step * 1e6).round() / 1e6)
+    let median = steps.get(steps.len() / 2);
+    median.map_or(0.002, |step| (step * 1e6).round() / 1e6)
 }
 
 pub(super) fn provenance(
@@ -237,17 +229,16 @@ pub(super) fn provenance(
         coordinates: options.coordinates(),
         ..options.encoder.clone()
     };
-    let entries = [
-        ("command", json!(origin.command)),
-        ("romc_version", json!(env!("CARGO_PKG_VERSION"))),
-        ("method", json!(method)),
-        ("seed", json!(options.seed)),
-        ("encoder_options", json!(encoder)),
-        ("recordings", json!(origin.recordings)),
-        ("report", json!(report)),
-    ];
-    let entries = entries.map(|(name, value)| (name.to_owned(), value));
-    entries.into_iter().collect()
+    let provenance = json!({
+        "command": origin.command,
+        "romc_version": env!("CARGO_PKG_VERSION"),
+        "method": method,
+        "seed": options.seed,
+        "encoder_options": encoder,
+        "recordings": origin.recordings,
+        "report": report,
+    });
+    provenance.as_object().cloned().expect("an object")
 }
 
 pub(super) struct Maps {
@@ -290,8 +281,7 @@ impl Fitted {
 }
 
 impl Task<'_> {
-    /// The encoder of the rows that the frame holds and, in its canonical basis, of a space with orthonormal `basis`
-    /// (`18 x (d - h)`); `b_e = -W_e mean(x)`.
+    /// The encoder of the held rows and, in its canonical basis, of a space with orthonormal `basis` (`18 x (d - h)`).
     pub(super) fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap, TrainError> {
         let held = self.frame.held.column_iter();
         let learned = self.canonical_basis(basis).0;
@@ -301,8 +291,7 @@ impl Task<'_> {
         Ok(AffineMap::new("encoder", weights, bias)?)
     }
 
-    /// `basis T` (`18 x d`) and the orthogonal `T` (`d x d`) for which its columns are simple in the sense of varimax,
-    /// with body x and body z first and positive dominant entries.
+    /// `basis T` and the orthogonal `T` of varimax, body x and body z first, dominant entries positive.
     pub(super) fn canonical_basis(&self, basis: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
         let std = self.training.state_std();
         let loadings = |basis: &DMatrix<f64>| DMatrix::from_diagonal(&std) * basis;
@@ -367,30 +356,28 @@ impl Task<'_> {
             score: fitted.score,
             losses,
             active: fitted.xi.iter().map(active_terms).sum(),
-            dominant: rows
-                .map(|row| names[row.transpose().component_mul(&std).iamax()].clone())
+            dominant: (rows.map(|row| row.transpose().component_mul(&std).iamax()))
+                .map(|largest| names[largest].clone())
                 .collect(),
             judged: fitted.measure(&self.features, fitted.maps.judged_set(self)),
         }
     }
 
-    /// The report of `fitted`; `judged` are its metrics on the jumps that candidates are judged by, kept only if there
-    /// are validation jumps.
+    /// `judged` are metrics on the jumps that candidates are judged by, kept if these are validation jumps.
     pub(super) fn report(&self, fitted: &Fitted, judged: &SetMetrics) -> TrainReport {
         let names = Robot::state_names();
         let phases = self.training.phases.names().into_iter().zip(&fitted.xi);
+        let terms = phases.map(|(phase, xi)| PhaseTerms {
+            phase,
+            active: active_terms(xi),
+        });
         let (choice, candidates) = fitted.choice.clone().unzip();
         let validated = !self.validation.jumps.is_empty();
         let set = fitted.maps.training_set(self);
         TrainReport {
             encoded: self.active.iter().map(|&i| names[i].clone()).collect(),
             lift_loss: self.lift_loss(&fitted.maps.encoder, set),
-            active_terms: phases
-                .map(|(phase, xi)| PhaseTerms {
-                    phase,
-                    active: active_terms(xi),
-                })
-                .collect(),
+            active_terms: terms.collect(),
             choice,
             candidates: candidates.unwrap_or(0),
             seeds: Vec::new(),

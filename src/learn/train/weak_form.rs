@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
-use super::latent::{EncodedSet, Latent};
+use super::latent::EncodedSet;
 use crate::model::Library;
 
 /// Samples between the starts of two windows.
@@ -48,17 +48,16 @@ pub(super) fn check_terms(
 
 /// Rows of `theta` and `target` of one phase, averaged over windows of `window` samples.
 ///
-/// Integrating `ddz = theta Xi` once and twice over a window of length `T` gives two equations a window, `(dz(T) -
-/// dz(0)) / T = mean of theta Xi` and `2 (z(T) - z(0) - T dz(0)) / T^2 = weighted mean of theta Xi` (the integral form
-/// of Schaeffer and McCalla 2017, here of second order). They need no accelerations and weigh coefficients by what they
-/// do to a prediction. A `window` of 0 gives the smoothed accelerations themselves.
+/// Integrating `ddz = theta Xi` once and twice over a window of length `T` gives `(dz(T) - dz(0)) / T = mean of theta
+/// Xi` and `2 (z(T) - z(0) - T dz(0)) / T^2 = weighted mean of theta Xi` (the integral form of Schaeffer and McCalla
+/// 2017, here of second order). A `window` of 0 gives the smoothed accelerations themselves.
 pub(super) fn windowed_samples(
     set: EncodedSet<'_>,
     features: &Features,
     phase: usize,
     window: usize,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    let (p, d) = (features.library_dim(), features.latent_dim());
+    let (p, d) = (features.library_dim(), features.latent_dim);
     if window == 0 {
         let (variables, target) = set.regression_samples(phase);
         let theta = features.evaluate(&variables, &mut FeatureValues::default());
@@ -67,11 +66,26 @@ pub(super) fn windowed_samples(
     let (mut theta_rows, mut target_rows) = (Vec::new(), Vec::new());
     let spans = set.dataset.spans(Some(phase));
     for (jump, range) in spans.filter(|(_, range)| range.len() > 4) {
-        let time_s = &set.dataset.jumps[jump].time_s;
-        let span = Span::new(&set.latent[jump], time_s, range.clone(), features);
+        let time_s = &set.dataset.jumps[jump].time_s[range.clone()];
+        let latent = &set.latent[jump];
+        let theta = latent.variables(range.clone());
+        let (once, twice) = integrals(time_s, &features.evaluate(&theta, &mut Default::default()));
+        let [z, dz] = [&latent.z, &latent.dz].map(|rows| rows.columns_range(range.clone()));
         let window = window.min(range.len() - 1);
-        for start in (0..range.len() - window).step_by(STRIDE) {
-            span.equations(start, start + window, &mut theta_rows, &mut target_rows);
+        for from in (0..range.len() - window).step_by(STRIDE) {
+            let to = from + window;
+            let duration = time_s[to] - time_s[from];
+            let scale = 2.0 / (duration * duration);
+            theta_rows.extend((0..p).map(|j| (once[(to, j)] - once[(from, j)]) / duration));
+            target_rows.extend((0..d).map(|k| (dz[(k, to)] - dz[(k, from)]) / duration));
+            theta_rows.extend(
+                (0..p).map(|j| {
+                    (twice[(to, j)] - twice[(from, j)] - duration * once[(from, j)]) * scale
+                }),
+            );
+            target_rows.extend(
+                (0..d).map(|k| (z[(k, to)] - z[(k, from)] - duration * dz[(k, from)]) * scale),
+            );
         }
     }
     let n = theta_rows.len() / p.max(1);
@@ -81,88 +95,18 @@ pub(super) fn windowed_samples(
     )
 }
 
-struct Span {
-    time_s: Vec<f64>,
-    z: DMatrix<f64>,
-    dz: DMatrix<f64>,
-    once: DMatrix<f64>,  // n x library_dim
-    twice: DMatrix<f64>, // n x library_dim
-}
-
-impl Span {
-    fn new(
-        latent: &Latent,
-        time_s: &[f64],
-        range: std::ops::Range<usize>,
-        features: &Features,
-    ) -> Self {
-        let (start, n) = (range.start, range.len());
-        let variables = latent.variables(range.clone());
-        let theta = features.evaluate(&variables, &mut FeatureValues::default());
-        let mut once = DMatrix::zeros(n, theta.ncols());
-        let mut twice = once.clone();
-        for i in 1..n {
-            let h = time_s[start + i] - time_s[start + i - 1];
-            for j in 0..theta.ncols() {
-                let (before, after) = (theta[(i - 1, j)], theta[(i, j)]);
-                once[(i, j)] = once[(i - 1, j)] + h * (before + after) / 2.0;
-                twice[(i, j)] =
-                    twice[(i - 1, j)] + h * once[(i - 1, j)] + h * h * (2.0 * before + after) / 6.0;
-            }
-        }
-        Self {
-            time_s: time_s[range].to_vec(),
-            z: latent.z.columns(start, n).into_owned(),
-            dz: latent.dz.columns(start, n).into_owned(),
-            once,
-            twice,
+/// Theta integrated once and twice from the first sample on, `n x library_dim`.
+fn integrals(time_s: &[f64], theta: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let mut once = DMatrix::zeros(theta.nrows(), theta.ncols());
+    let mut twice = once.clone();
+    for i in 1..theta.nrows() {
+        let h = time_s[i] - time_s[i - 1];
+        for j in 0..theta.ncols() {
+            let (before, after) = (theta[(i - 1, j)], theta[(i, j)]);
+            once[(i, j)] = once[(i - 1, j)] + h * (before + after) / 2.0;
+            twice[(i, j)] =
+                twice[(i - 1, j)] + h * once[(i - 1, j)] + h * h * (2.0 * before + after) / 6.0;
         }
     }
-
-    /// Appends the velocity and the position equation of the window `from ..= to`.
-    fn equations(&self, from: usize, to: usize, theta: &mut Vec<f64>, target: &mut Vec<f64>) {
-        let duration = self.time_s[to] - self.time_s[from];
-        let scale = 2.0 / (duration * duration);
-        let (once, twice, z, dz) = (&self.once, &self.twice, &self.z, &self.dz);
-        for j in 0..once.ncols() {
-            theta.push((once[(to, j)] - once[(from, j)]) / duration);
-        }
-        for k in 0..z.nrows() {
-            target.push((dz[(k, to)] - dz[(k, from)]) / duration);
-        }
-        for j in 0..once.ncols() {
-            theta.push((twice[(to, j)] - twice[(from, j)] - duration * once[(from, j)]) * scale);
-        }
-        for k in 0..z.nrows() {
-            target.push((z[(k, to)] - z[(k, from)] - duration * dz[(k, from)]) * scale);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::train::oscillator;
-    use crate::train::sparse::Knowledge;
-    use crate::train::sparse::{Pruning, Regression};
-
-    #[test]
-    fn windows_and_accelerations_recover_the_same_known_coefficients() {
-        let (dataset, latent) = oscillator::jumps(4);
-        let (features, truth) = oscillator::known();
-        for window in [0, 20, 60] {
-            let set = EncodedSet::new(&dataset, &latent);
-            let (theta, target) = windowed_samples(set, &features, 0, window);
-            let xi = Regression::new(&theta, &target, Knowledge::nothing(7, 2))
-                .fit(1e-9, Pruning::Threshold(1e-3));
-            let active = xi
-                .iter()
-                .zip(truth[0].iter())
-                .filter(|(_, truth)| **truth != 0.0);
-            for (found, expected) in active {
-                let close = (found - expected).abs() < 0.02 * expected.abs();
-                assert!(close, "{window}: {found} for {expected}");
-            }
-        }
-    }
+    (once, twice)
 }

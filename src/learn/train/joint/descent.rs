@@ -1,9 +1,8 @@
-//! Descent by Adam: the transfer steps of section IV-D, the optimiser, and the coefficients that sequential
-//! thresholding leaves.
+//! The transfer steps of section IV-D: descent by Adam with sequential thresholding.
 
 use std::collections::BTreeSet;
 
-use super::loss::{Batch, JointLoss, LossWeights, Losses};
+use super::loss::{Batch, JointLoss, Losses};
 use super::parameters::Parameters;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -19,32 +18,7 @@ pub struct Schedule {
     pub learning_rate: f64,
 }
 
-impl Default for Schedule {
-    fn default() -> Self {
-        Self {
-            epochs: 501,
-            refinement: 101,
-            threshold: 0.01,
-            threshold_every: 100,
-            learning_rate: 1e-3,
-        }
-    }
-}
-
 impl Schedule {
-    pub(super) fn total(&self) -> usize {
-        self.epochs + self.refinement
-    }
-
-    /// The loss weights in an epoch: refinement has no L1 term.
-    fn weights_at(&self, epoch: usize, weights: LossWeights) -> LossWeights {
-        let refining = epoch >= self.epochs;
-        LossWeights {
-            l1: if refining { 0.0 } else { weights.l1 },
-            ..weights
-        }
-    }
-
     fn thresholds_at(&self, epoch: usize) -> bool {
         epoch > 0
             && epoch < self.epochs
@@ -89,19 +63,23 @@ pub(super) fn descend(
         Moved::Decoder => BTreeSet::new(),
         Moved::All | Moved::Xi => batches.iter().map(|batch| batch.phase).collect(),
     };
+    // The encoder stays in the later steps.
+    let known =
+        |batch: &&Batch| (moved != Moved::All).then(|| loss.known(parameters, batch, moved));
+    let known: Vec<_> = batches.iter().map(known).collect();
+    loss.current = loss.weights;
     let mut mean = Losses::default();
-    for epoch in 0..schedule.total() {
+    for epoch in 0..schedule.epochs + schedule.refinement {
         for &phase in phases.iter().filter(|_| schedule.thresholds_at(epoch)) {
             let xi = parameters.xi[phase].as_mut_slice();
             coefficients[phase].threshold(xi, schedule.threshold);
         }
-        loss.current = match moved {
-            Moved::Decoder => LossWeights::RECONSTRUCTION_ONLY,
-            Moved::All | Moved::Xi => schedule.weights_at(epoch, loss.weights),
-        };
+        if epoch >= schedule.epochs {
+            loss.current.l1 = 0.0;
+        }
         mean = Losses::default();
-        for batch in batches {
-            let losses = loss.evaluate(parameters, batch);
+        for (batch, known) in batches.iter().zip(&known) {
+            let losses = loss.evaluate(parameters, batch, moved, known.as_ref());
             mean = mean.plus(&losses, 1.0 / batches.len() as f64);
             let (gradient, phase) = (&loss.gradient, batch.phase);
             let blocks = parameters.maps_mut().zip(gradient.maps()).skip(fixed);
@@ -121,8 +99,7 @@ pub(super) fn descend(
     mean
 }
 
-/// The Adam optimiser (Kingma and Ba 2015) on one block of numbers, with the mask of sequential thresholding: what is
-/// dropped once stays zero.
+/// Adam (Kingma and Ba 2015) on one block of numbers; what thresholding drops once stays zero.
 struct Adam {
     learning_rate: f64,
     mean: Vec<f64>,
@@ -172,80 +149,6 @@ impl Adam {
             *square += (1.0 - BETA_SQUARE) * (g * g - *square);
             let moved = *value - rate * *mean / (square.sqrt() + epsilon);
             *value = if *kept { moved } else { 0.0 };
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::{DMatrix, DVector};
-
-    use super::*;
-    use crate::model::Activation;
-    use crate::train::features::Features;
-    use crate::train::joint::parameters::Frame;
-    use crate::train::joint::unroll::Unroll;
-    use crate::train::oscillator::standard_library;
-    use crate::train::random::Random;
-
-    #[test]
-    fn training_lowers_the_loss_and_masks_small_coefficients_and_moves_nothing_else() {
-        let schedule = Schedule {
-            epochs: 40,
-            refinement: 20,
-            threshold: 0.09,
-            threshold_every: 10,
-            learning_rate: 1e-2,
-        };
-        let weights = LossWeights {
-            ddz: 0.5,
-            ddx: 0.3,
-            l1: 0.01,
-            lift: 0.2,
-            bptt: 0.0,
-        };
-        let features = Features::new(&standard_library(2, 1, true));
-        let mut random = Random::new(21);
-        let batch = |i: usize| Batch::random(i % 2, (40, 6), 0.5, &mut random);
-        let batches: Vec<Batch> = (0..4).map(batch).collect();
-        let all: Vec<&Batch> = batches.iter().collect();
-        let kinds = [Activation::Linear, Activation::Elu].into_iter();
-        let moves = [Moved::All, Moved::Decoder, Moved::Xi];
-        for (kind, moved) in kinds.flat_map(|kind| moves.map(|moved| (kind, moved))) {
-            let widths: (&[usize], &[usize]) = (&[6, 5, 2], &[2, 5, 6]);
-            let shape = (features.library_dim(), 2, 0.1);
-            let mut parameters = Parameters::random(widths, kind, shape, &mut Random::new(22));
-            let frame = Frame::plain(&[true, true, false, true, true, true]);
-            let maps = (frame, DVector::from_element(6, 1.0));
-            let mut loss =
-                JointLoss::new(&features, maps, (weights, Unroll::default()), &parameters);
-            let before = parameters.clone();
-            let (mut history, mut counts) = (Vec::new(), Vec::new());
-            let mut listen = |_: usize, losses: &Losses, active: usize| {
-                history.push(losses.total(&weights));
-                counts.push(active);
-                true
-            };
-            descend(
-                &mut parameters,
-                moved,
-                &all,
-                &mut loss,
-                &schedule,
-                &mut listen,
-            );
-            assert!(history[59] < history[0], "{moved:?} {history:?}");
-            let masked =
-                |parameters: &Parameters| parameters.encoder.layers[0].weights.row(2).into_owned();
-            assert_eq!(masked(&parameters), masked(&before));
-            assert_eq!(parameters.encoder != before.encoder, moved == Moved::All);
-            assert_eq!(parameters.decoder != before.decoder, moved != Moved::Xi);
-            assert_eq!(parameters.xi != before.xi, moved != Moved::Decoder);
-            if moved == Moved::All {
-                assert!(counts[59] < counts[0] && counts.windows(2).all(|pair| pair[1] <= pair[0]));
-                let left = |xi: &DMatrix<f64>| xi.iter().filter(|value| **value != 0.0).count();
-                assert_eq!(parameters.xi.iter().map(left).sum::<usize>(), counts[59]);
-            }
         }
     }
 }

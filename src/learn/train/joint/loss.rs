@@ -1,16 +1,15 @@
-//! The losses (16) to (20) with the lift loss and the window (41), and their exact gradient.
+//! The losses (16) to (20) with the lift loss and the window (41) on batches of samples, and their exact gradient.
 //!
 //! With the encoder's Jacobian `J` at each sample: `z = phi(x)`, `dz = J dx`, `ddz = J ddx + (dJ/dt) dx`, `u_lat =
 //! pinv(J^T) u`; the decoder takes `(z, dz, Theta Xi)` to the decoded position and acceleration the same way.
-//!
-//! Batches of consecutive samples.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::network::{Jacobians, Tape, add_transposed, product};
+use super::descent::Moved;
+use super::network::{Jacobians, Tape, add_transposed, dot, product};
 use super::parameters::{Frame, InputProjections, Parameters};
-use super::unroll::{Adjoints, Unroll, Window};
+use super::unroll::{Unroll, Window};
 use crate::recording::Recording;
 use crate::recording::preprocess::{BATCH_ROWS, moving_average, prepare};
 use crate::train::dataset::{Dataset, scaled};
@@ -30,28 +29,6 @@ pub struct LossWeights {
     pub lift: f64,
     /// Of predictions over a window (41).
     pub bptt: f64,
-}
-
-impl LossWeights {
-    pub(super) const RECONSTRUCTION_ONLY: Self = Self {
-        ddz: 0.0,
-        ddx: 0.0,
-        l1: 0.0,
-        lift: 0.0,
-        bptt: 0.0,
-    };
-}
-
-impl Default for LossWeights {
-    /// The author's weights; no lift loss, no window.
-    fn default() -> Self {
-        Self {
-            ddz: 1e-4,
-            ddx: 1e-6,
-            l1: 1e-6,
-            ..Self::RECONSTRUCTION_ONLY
-        }
-    }
 }
 
 /// Values of the terms, unweighted.
@@ -95,39 +72,30 @@ impl Losses {
 }
 
 /// A batch in latent coordinates.
-struct Encoded {
-    stack: DMatrix<f64>, // z, dz, ddz: 3n x d
-    jacobians: Jacobians,
-    rows: DMatrix<f64>, // of the Jacobians between x and z
+pub(super) struct Encoded {
+    stack: DMatrix<f64>,  // z, dz, ddz: 3n x d
+    jacobians: Jacobians, // between x and z
     projections: InputProjections,
+    variables: DMatrix<f64>, // z, dz, u_lat: n x 3d
+    theta: DMatrix<f64>,
 }
 
-impl Encoded {
-    /// (9), (11), (12) and (13) at every sample.
-    fn new(parameters: &Parameters, batch: &Batch, frame: &Frame, tape: &mut Tape) -> Self {
-        let mut stack = (parameters.encoder).forward(frame.enter(batch), batch.samples(), tape);
-        stack *= frame.latent;
-        let jacobians = parameters.encoder.jacobian(tape);
-        let mut rows = jacobians.at_samples(batch.samples(), stack.ncols());
-        frame.scale_jacobian(&mut rows);
-        Self {
-            projections: InputProjections::new(&rows, &batch.u),
-            stack,
-            jacobians,
-            rows,
-        }
-    }
+/// What stays of a batch while the encoder does.
+pub(super) enum Known {
+    Encoded(Encoded),
+    Quadratic(Quadratic),
+}
 
-    /// `z`, `dz`, `u_lat`: `n x 3d`.
-    fn variables(&self) -> DMatrix<f64> {
-        let (n, d) = self.projections.u_lat.shape();
-        let mut variables = DMatrix::zeros(n, 3 * d);
-        for (start, block) in [(0, self.stack.rows(0, n)), (d, self.stack.rows(n, n))] {
-            variables.columns_mut(start, d).copy_from(&block);
-        }
-        let mut inputs = variables.columns_mut(2 * d, d);
-        inputs.copy_from(&self.projections.u_lat);
-        variables
+/// A loss that is quadratic in a matrix `M`: its gradient is `gram M metric - cross`.
+pub(super) struct Quadratic {
+    gram: DMatrix<f64>,
+    metric: DMatrix<f64>,
+    cross: DMatrix<f64>,
+}
+
+impl Quadratic {
+    fn gradient(&self, at: &DMatrix<f64>) -> DMatrix<f64> {
+        product(&product(&self.gram, at), &self.metric) - &self.cross
     }
 }
 
@@ -169,26 +137,134 @@ impl<'a> JointLoss<'a> {
         }
     }
 
-    /// The losses on a batch; the gradient of their weighted sum is kept in [`Self::gradient`].
-    pub(super) fn evaluate(&mut self, parameters: &Parameters, batch: &Batch) -> Losses {
+    /// (9), (11), (12) and (13) at every sample.
+    fn encode(&mut self, parameters: &Parameters, batch: &Batch) -> Encoded {
+        let (encoder, tape) = (&parameters.encoder, &mut self.encoder_tape);
+        let (n, d) = (batch.samples(), self.features.latent_dim);
+        let stack = encoder.forward(&batch.entering, n, tape) * self.frame.latent;
+        let mut jacobians = encoder.jacobian(tape);
+        self.frame.scale_jacobian(&mut jacobians.rows);
+        let projections = InputProjections::new(&jacobians.rows, &batch.u, d);
+        let mut variables = DMatrix::zeros(n, 3 * d);
+        (variables.columns_mut(0, d)).copy_from(&stack.rows(0, n));
+        (variables.columns_mut(d, d)).copy_from(&stack.rows(n, n));
+        (variables.columns_mut(2 * d, d)).copy_from(&projections.u_lat);
+        Encoded {
+            theta: self.features.evaluate(&variables, &mut self.values),
+            stack,
+            jacobians,
+            projections,
+            variables,
+        }
+    }
+
+    /// What a step that keeps the encoder needs of a batch.
+    pub(super) fn known(&mut self, parameters: &Parameters, batch: &Batch, moved: Moved) -> Known {
+        let encoded = self.encode(parameters, batch);
+        let [decoder] = &parameters.decoder.layers[..] else {
+            return Known::Encoded(encoded);
+        };
+        if moved == Moved::Xi && self.weights.bptt != 0.0 {
+            return Known::Encoded(encoded);
+        }
+        let (frame, (n, state_dim)) = (&self.frame, batch.x.shape());
+        let share = 2.0 / (n * state_dim) as f64;
+        let spread = DMatrix::from_diagonal(&frame.spread);
+        let (left, metric, target) = match moved {
+            Moved::Decoder => {
+                let weights = DMatrix::from_diagonal(&(&self.coordinate_weights * share));
+                let mut target = batch.x.clone();
+                for (mut column, mean) in target.column_iter_mut().zip(&frame.mean) {
+                    column.add_scalar_mut(-mean);
+                }
+                let z = encoded.stack.rows(0, n) / frame.latent;
+                let left = z.insert_column(encoded.stack.ncols(), 1.0);
+                let weighted = &spread * weights;
+                (left, &spread * &weighted, target * weighted)
+            }
+            Moved::All | Moved::Xi => {
+                let ddz = encoded.stack.rows(2 * n, n);
+                let latent = 2.0 * self.weights.ddz / ddz.len() as f64;
+                let real = share * self.weights.ddx;
+                let decoded = &decoder.weights * spread / frame.latent;
+                let metric = &decoded * decoded.transpose() * real;
+                let metric = metric + DMatrix::identity(ddz.ncols(), ddz.ncols()) * latent;
+                let target = ddz * latent + &batch.ddx * decoded.transpose() * real;
+                (encoded.theta, metric, target)
+            }
+        };
+        Known::Quadratic(Quadratic {
+            gram: left.tr_mul(&left),
+            cross: left.tr_mul(&target),
+            metric,
+        })
+    }
+
+    /// Sets the gradient of a quadratic loss.
+    fn follow(&mut self, parameters: &Parameters, phase: usize, moved: Moved, of: &Quadratic) {
+        if moved == Moved::Decoder {
+            let layer = &parameters.decoder.layers[0];
+            let last = layer.weights.nrows();
+            let mut affine = layer.weights.clone().insert_row(last, 0.0);
+            affine.row_mut(last).tr_copy_from(&layer.bias);
+            let gradient = of.gradient(&affine);
+            let own = &mut self.gradient.decoder.layers[0];
+            own.weights.copy_from(&gradient.rows(0, last));
+            own.bias.tr_copy_from(&gradient.row(last));
+            return;
+        }
+        let xi = &parameters.xi[phase];
+        self.gradient.xi[phase] = of.gradient(xi);
+        let l1_scale = self.current.l1 / xi.len() as f64;
+        l1_subgradient(xi, l1_scale, &mut self.gradient.xi[phase]);
+    }
+
+    /// The losses on a batch; the gradient of their weighted sum is kept in [`Self::gradient`]. If something is known
+    /// of the batch, the gradient is that of what is moved, and losses may be left out.
+    pub(super) fn evaluate(
+        &mut self,
+        parameters: &Parameters,
+        batch: &Batch,
+        moved: Moved,
+        known: Option<&Known>,
+    ) -> Losses {
+        let fresh;
+        let encoded = match known {
+            Some(Known::Quadratic(quadratic)) => {
+                self.follow(parameters, batch.phase, moved, quadratic);
+                return Losses::default();
+            }
+            Some(Known::Encoded(known)) => known,
+            None => {
+                fresh = self.encode(parameters, batch);
+                &fresh
+            }
+        };
         self.gradient.clear();
         let weights = self.current;
-        let (n, d) = (batch.samples(), self.features.latent_dim());
+        let (n, d) = (batch.samples(), self.features.latent_dim);
+        if moved == Moved::Decoder {
+            let positions = encoded.stack.rows(0, n).into_owned();
+            self.decode(parameters, batch, positions);
+            return Losses::default();
+        }
         let xi = &parameters.xi[batch.phase];
-        let encoded = Encoded::new(parameters, batch, &self.frame, &mut self.encoder_tape);
-        let variables = encoded.variables();
-        let theta = self.features.evaluate(&variables, &mut self.values);
-        let predicted = product(&theta, xi);
+        let predicted = product(&encoded.theta, xi);
         let mut residual = &predicted - encoded.stack.rows(2 * n, n);
         let ddz = residual.norm_squared() / (n * d) as f64;
         residual *= 2.0 * weights.ddz / (n * d) as f64;
-        let (decoder, ddx, mut onto_stack) =
-            self.decode(parameters, batch, &encoded.stack, &predicted);
+        let mut entering = encoded.stack.clone();
+        entering.rows_mut(2 * n, n).copy_from(&predicted);
+        let (decoder, ddx, mut onto_stack) = self.decode(parameters, batch, entering);
         let adjoint = onto_stack.rows(2 * n, n) + &residual;
         onto_stack.rows_mut(2 * n, n).copy_from(&-residual);
         let (bptt, onto_variables) =
-            self.library_adjoint(parameters, batch, &variables, &theta, &adjoint);
-        let lift = self.encoder_adjoint(parameters, batch, &encoded, onto_stack, &onto_variables);
+            self.library_adjoint(parameters, batch, moved, encoded, &adjoint);
+        let total = batch.u.norm_squared().max(f64::MIN_POSITIVE);
+        if moved == Moved::All {
+            let onto = (onto_stack, &onto_variables);
+            self.encoder_adjoint(parameters, batch, encoded, onto, weights.lift / total);
+        }
         let l1_scale = weights.l1 * (1.0 / xi.len() as f64);
         let l1 = l1_subgradient(xi, l1_scale, &mut self.gradient.xi[batch.phase]);
         Losses {
@@ -196,66 +272,67 @@ impl<'a> JointLoss<'a> {
             ddz,
             ddx,
             l1,
-            lift,
+            lift: 1.0 - encoded.projections.carried / total,
             bptt,
         }
     }
 
-    /// (16) and (18), and the adjoint of `z`, `dz` and the predicted `ddz`, `3n x d`.
+    /// (16) and (18), and the adjoint of `entering`: `z`, `dz` and the predicted `ddz`, `3n x d`, or `z` alone.
     fn decode(
         &mut self,
         parameters: &Parameters,
         batch: &Batch,
-        stack: &DMatrix<f64>,
-        predicted: &DMatrix<f64>,
+        mut entering: DMatrix<f64>,
     ) -> (f64, f64, DMatrix<f64>) {
         let (frame, (n, state_dim)) = (&self.frame, batch.x.shape());
-        let mut entering = stack.clone();
-        entering.rows_mut(2 * n, n).copy_from(predicted);
         entering /= frame.latent;
-        let mut leaving = (parameters.decoder).forward(entering, n, &mut self.decoder_tape);
+        let (map, tape) = (&parameters.decoder, &mut self.decoder_tape);
+        let mut leaving = map.forward(&entering, n, tape);
         let (mut reconstruction, mut ddx) = (0.0, 0.0);
         let share = 1.0 / (n * state_dim) as f64;
         for (i, mut column) in leaving.column_iter_mut().enumerate() {
             let (mean, spread) = (frame.mean[i], frame.spread[i]);
             let weight = self.coordinate_weights[i] * share;
             let (values, rates) = column.as_mut_slice().split_at_mut(n);
-            for (value, x) in values.iter_mut().zip(batch.x.column(i).iter()) {
-                let residual = mean + spread * *value - x;
-                reconstruction += weight * residual * residual;
-                *value = 2.0 * weight * spread * residual;
+            for (value, x) in values.iter_mut().zip(batch.x.column(i).as_slice()) {
+                *value = mean + spread * *value - x;
             }
-            let (velocities, accelerations) = rates.split_at_mut(n);
+            reconstruction += weight * dot(values, values);
+            let factor = 2.0 * weight * spread;
+            values.iter_mut().for_each(|value| *value *= factor);
+            let (velocities, accelerations) = rates.split_at_mut(rates.len() / 2);
             velocities.fill(0.0);
-            for (value, target) in accelerations.iter_mut().zip(batch.ddx.column(i).iter()) {
-                let residual = spread * *value - target;
-                ddx += share * residual * residual;
-                *value = 2.0 * self.current.ddx * share * spread * residual;
+            for (value, target) in accelerations.iter_mut().zip(batch.ddx.column(i).as_slice()) {
+                *value = spread * *value - target;
             }
+            ddx += share * dot(accelerations, accelerations);
+            let factor = 2.0 * self.current.ddx * share * spread;
+            accelerations.iter_mut().for_each(|value| *value *= factor);
         }
-        let own = &mut self.gradient.decoder;
-        let at_first = (parameters.decoder).backward(&self.decoder_tape, leaving, &[], own);
-        let onto_stack = parameters.decoder.onto_input(&at_first) / frame.latent;
-        (reconstruction, ddx, onto_stack)
+        let at_first = map.backward((tape, &entering), leaving, &[], &mut self.gradient.decoder);
+        let onto = map.onto_input(&at_first) / frame.latent;
+        (reconstruction, ddx, onto)
     }
 
-    /// From the adjoint of the predicted `ddz` to those of Xi and `(z, dz, u_lat)`; (41), if it has a weight, is
-    /// evaluated here and adds its own.
+    /// From the adjoint of the predicted `ddz` to those of Xi and, if they move, of the variables; (41), if it has a
+    /// weight, adds its own.
     fn library_adjoint(
         &mut self,
         parameters: &Parameters,
         batch: &Batch,
-        variables: &DMatrix<f64>,
-        theta: &DMatrix<f64>,
+        moved: Moved,
+        encoded: &Encoded,
         adjoint: &DMatrix<f64>,
     ) -> (f64, DMatrix<f64>) {
-        let xi = &parameters.xi[batch.phase];
+        let (xi, variables) = (&parameters.xi[batch.phase], &encoded.variables);
         let onto_xi = &mut self.gradient.xi[batch.phase];
-        add_transposed(onto_xi, theta, adjoint);
-        let onto_theta = product(adjoint, &xi.transpose());
+        add_transposed(onto_xi, &encoded.theta, adjoint);
         let mut onto_variables = DMatrix::zeros(variables.nrows(), variables.ncols());
-        self.features
-            .backward(&onto_theta, &mut self.values, &mut onto_variables);
+        if moved == Moved::All {
+            let onto_theta = product(adjoint, &xi.transpose());
+            self.features
+                .backward(&onto_theta, &mut self.values, &mut onto_variables);
+        }
         let weight = self.current.bptt;
         if weight == 0.0 {
             return (0.0, onto_variables);
@@ -266,40 +343,35 @@ impl<'a> JointLoss<'a> {
             xi,
             step_s: batch.step_s,
         };
-        let mut adjoints = Adjoints {
-            variables: &mut onto_variables,
-            xi: onto_xi,
-        };
-        let bptt = self.unroll.evaluate(samples, weight, &mut adjoints);
+        let adjoints = [&mut onto_variables, onto_xi];
+        let bptt = self.unroll.evaluate(samples, weight, adjoints);
         (bptt, onto_variables)
     }
 
-    /// The lift loss; adds to the gradient what the adjoints of `z`, `dz`, `ddz` (`3n x d`) and of the variables (`n x
-    /// 3d`) mean for the encoder.
+    /// Adds what the adjoints of `z`, `dz`, `ddz` (`3n x d`) and of the variables (`n x 3d`), and the weight of the
+    /// energy carried, mean for the encoder.
     fn encoder_adjoint(
         &mut self,
         parameters: &Parameters,
         batch: &Batch,
         encoded: &Encoded,
-        mut onto_stack: DMatrix<f64>,
-        onto_variables: &DMatrix<f64>,
-    ) -> f64 {
+        (mut onto_stack, onto_variables): (DMatrix<f64>, &DMatrix<f64>),
+        lift: f64,
+    ) {
         let (n, d) = encoded.projections.u_lat.shape();
         for (block, start) in [(0, 0), (n, d)] {
             let mut rows = onto_stack.rows_mut(block, n);
             rows += onto_variables.columns(start, d);
         }
         let onto_inputs = onto_variables.columns(2 * d, d).into_owned();
-        let total = batch.u.norm_squared().max(f64::MIN_POSITIVE);
-        let (projections, lift) = (&encoded.projections, self.current.lift / total);
-        let mut onto_rows = projections.adjoint(&encoded.rows, &batch.u, &onto_inputs, lift);
+        let (jacobians, projections) = (&encoded.jacobians, &encoded.projections);
+        let mut onto_rows = projections.adjoint(&jacobians.rows, &batch.u, &onto_inputs, lift);
         self.frame.scale_jacobian(&mut onto_rows);
         let (encoder, tape) = (&parameters.encoder, &self.encoder_tape);
         let own = &mut self.gradient.encoder;
-        let onto_jacobians = encoded.jacobians.of_samples(&onto_rows, n);
-        let at_affine = encoder.jacobian_adjoint(tape, &encoded.jacobians, &onto_jacobians, own);
-        encoder.backward(tape, onto_stack * self.frame.latent, &at_affine, own);
-        1.0 - projections.carried / total
+        let at_affine = encoder.jacobian_adjoint(tape, jacobians, onto_rows, own);
+        let forward = (tape, &batch.entering);
+        encoder.backward(forward, onto_stack * self.frame.latent, &at_affine, own);
     }
 }
 
@@ -318,44 +390,30 @@ fn l1_subgradient(xi: &DMatrix<f64>, scale: f64, gradient: &mut DMatrix<f64>) ->
 }
 
 /// Consecutive samples of one phase, rows are samples, scaled units.
-#[derive(Clone, Debug)]
 pub(super) struct Batch {
     pub phase: usize,
-    /// States, `n x 18`.
-    pub x: DMatrix<f64>,
-    /// Velocities, `n x 18`.
-    pub dx: DMatrix<f64>,
-    /// Accelerations, `n x 18`.
-    pub ddx: DMatrix<f64>,
-    /// Inputs, `n x 18`.
-    pub u: DMatrix<f64>,
-    pub step_s: f64,
+    /// States, velocities and accelerations as they enter the encoder, `3n x 18`.
+    entering: DMatrix<f64>,
+    x: DMatrix<f64>,
+    ddx: DMatrix<f64>,
+    u: DMatrix<f64>,
+    step_s: f64,
 }
 
 impl Batch {
-    pub(super) fn samples(&self) -> usize {
-        self.x.nrows()
-    }
-
-    /// Entries uniform in `-bound .. bound`, 2 ms apart.
-    #[cfg(test)]
-    pub(super) fn random(
-        phase: usize,
-        (samples, state_dim): (usize, usize),
-        bound: f64,
-        random: &mut crate::train::random::Random,
-    ) -> Self {
-        let mut block = || random.matrix(samples, state_dim, bound);
-        let [x, dx, ddx, u] = std::array::from_fn(|_| block());
-        let step_s = 0.002;
+    fn new(phase: usize, [x, dx, ddx, u]: [DMatrix<f64>; 4], step_s: f64, frame: &Frame) -> Self {
         Self {
             phase,
+            entering: frame.enter([&x, &dx, &ddx]),
             x,
-            dx,
             ddx,
             u,
             step_s,
         }
+    }
+
+    fn samples(&self) -> usize {
+        self.x.nrows()
     }
 }
 
@@ -363,24 +421,20 @@ impl Batch {
 pub(super) fn batches(
     recordings: &[Recording],
     dataset: &Dataset,
+    frame: &Frame,
 ) -> Result<Vec<Batch>, TrainError> {
     let mut out = Vec::new();
     let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
     for recording in recordings {
         for (span, samples) in prepare(recording, &dataset.phases)? {
             let u = scaled(samples.input(&dataset.rule)?, &dataset.scaling.input).transpose();
-            let (x, dx) = (state(samples.x.clone()), state(samples.dx.clone()));
             let ddx = state(moving_average(&samples.ddx, dataset.smoothing));
+            let all = [state(samples.x.clone()), state(samples.dx.clone()), ddx, u];
             for start in (0..samples.len()).step_by(BATCH_ROWS) {
-                let cut = |all: &DMatrix<f64>| all.rows(start, BATCH_ROWS).into_owned();
-                out.push(Batch {
-                    phase: span.phase,
-                    x: cut(&x),
-                    dx: cut(&dx),
-                    ddx: cut(&ddx),
-                    u: cut(&u),
-                    step_s: samples.mean_step_s(),
-                });
+                let cut = all
+                    .each_ref()
+                    .map(|rows| rows.rows(start, BATCH_ROWS).into_owned());
+                out.push(Batch::new(span.phase, cut, samples.mean_step_s(), frame));
             }
         }
     }
@@ -390,9 +444,8 @@ pub(super) fn batches(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Activation;
+    use crate::model::{Activation, Library};
     use crate::train::joint::unroll::Integrator;
-    use crate::train::oscillator::standard_library;
     use crate::train::random::Random;
 
     const WEIGHTS: LossWeights = LossWeights {
@@ -403,33 +456,34 @@ mod tests {
         bptt: 0.8,
     };
 
-    /// Library, batch of phase 1 of 2, and moved random parameters with layers of `widths`.
-    fn setup(widths: (&[usize], &[usize]), phi: Activation) -> (Features, Batch, Parameters) {
-        let features = Features::new(&standard_library(3, 1, true));
+    /// A library of every function, and random parameters with layers of `widths`.
+    fn setup(widths: (&[usize], &[usize]), phi: Activation) -> (Features, Parameters) {
+        let terms = [
+            "1",
+            "z1",
+            "dz2",
+            "u3",
+            "z1*dz1*u2",
+            "sin(z1 + 2*z2)",
+            "cos(dz1)*z2",
+            "exp(-z1^2)",
+            "tanh(u1)/(2 + z2^2)",
+            "sqrt(2 + z1^2)",
+            "abs(z2)",
+            "log(3 + dz2^2)",
+            "tan(0.1*z3)",
+            "(2 + z1^2)^z2",
+            "dz3^3",
+        ];
+        let library = Library::from_terms(3, &terms.map(String::from));
+        let features = Features::new(&library.expect("terms parse"));
         let mut random = Random::new(11);
-        let batch = Batch::random(1, (30, 7), 0.8, &mut random);
         let shape = (features.library_dim(), 2, 0.1);
         let mut parameters = Parameters::random(widths, phi, shape, &mut random);
-        let xi = parameters.xi[1].as_mut_slice().iter_mut();
-        xi.for_each(|v| *v += 0.3 * random.signed());
-        let maps = parameters.maps_mut().flatten();
-        maps.for_each(|v| *v += 0.3 * random.signed());
-        (features, batch, parameters)
-    }
-
-    fn loss<'a>(
-        features: &'a Features,
-        maps: (Frame, DVector<f64>),
-        parameters: &Parameters,
-        integrator: Integrator,
-    ) -> JointLoss<'a> {
-        let unroll = Unroll {
-            window: 3,
-            stride: 2,
-            decay: 0.9,
-            integrator,
-        };
-        JointLoss::new(features, maps, (WEIGHTS, unroll), parameters)
+        for entry in all(&mut parameters).into_iter().flatten() {
+            *entry += 0.3 * random.signed();
+        }
+        (features, parameters)
     }
 
     fn all(parameters: &mut Parameters) -> Vec<&mut [f64]> {
@@ -462,10 +516,19 @@ mod tests {
                 Activation::Linear => (&[7, 3], &[3, 7]),
                 _ => (&[7, 5, 4, 3], &[3, 4, 7]),
             };
-            let (features, batch, parameters) = setup(widths, phi);
+            let (features, parameters) = setup(widths, phi);
+            let blocks = std::array::from_fn(|_| random.matrix(30, 7, 0.8));
+            let batch = Batch::new(1, blocks, 0.002, &frame);
             let weights = DVector::from_fn(7, |i, _| 1.0 + i as f64);
-            let mut loss = loss(&features, (frame.clone(), weights), &parameters, integrator);
-            loss.evaluate(&parameters, &batch);
+            let unroll = Unroll {
+                window: 3,
+                stride: 2,
+                decay: 0.9,
+                integrator,
+            };
+            let maps = (frame.clone(), weights);
+            let mut loss = JointLoss::new(&features, maps, (WEIGHTS, unroll), &parameters);
+            loss.evaluate(&parameters, &batch, Moved::All, None);
             let mut gradient = loss.gradient.clone();
             let masked = gradient.encoder.layers[0].weights.row(4).amax() == 0.0;
             assert!(gradient.xi[0].amax() == 0.0 && masked);
@@ -475,7 +538,8 @@ mod tests {
                     let mut at = |step: f64| {
                         let mut moved = parameters.clone();
                         all(&mut moved)[block][entry] += step;
-                        loss.evaluate(&moved, &batch).total(&WEIGHTS)
+                        loss.evaluate(&moved, &batch, Moved::All, None)
+                            .total(&WEIGHTS)
                     };
                     // Of fourth order: the losses are large, and a smaller step would drown in their rounding.
                     let (near, far) = (at(1e-5) - at(-1e-5), at(2e-5) - at(-2e-5));
@@ -488,37 +552,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn losses_of_linear_maps_equal_their_definitions() {
-        let (features, batch, mut parameters) = setup((&[7, 3], &[3, 7]), Activation::Linear);
-        parameters.xi[1].fill(0.2);
-        for map in [&mut parameters.encoder, &mut parameters.decoder] {
-            map.layers[0].bias.fill(0.0);
-        }
-        let maps = (Frame::plain(&[true; 7]), DVector::from_element(7, 1.0));
-        let mut loss = loss(&features, maps, &parameters, Integrator::Rk2);
-        let losses = loss.evaluate(&parameters, &batch);
-        let encoder = &parameters.encoder.layers[0].weights;
-        let decoder = &parameters.decoder.layers[0].weights;
-        let inverse = encoder.clone().pseudo_inverse(1e-12).expect("positive");
-        let (z, u_lat) = (&batch.x * encoder, &batch.u * inverse.transpose());
-        let mut variables = z.clone().resize(30, 9, 0.0);
-        (variables.columns_mut(3, 3)).copy_from(&(&batch.dx * encoder));
-        variables.columns_mut(6, 3).copy_from(&u_lat);
-        let theta = features.evaluate(&variables, &mut FeatureValues::default());
-        let predicted = theta * &parameters.xi[1];
-        let mean_square = |m: DMatrix<f64>| m.norm_squared() / m.len() as f64;
-        let close = |found: f64, expected: f64| {
-            let near = (found - expected).abs() < 1e-9 * expected;
-            assert!(near, "{found} {expected}")
-        };
-        close(losses.decoder, mean_square(&batch.x - z * decoder));
-        close(losses.ddz, mean_square(&batch.ddx * encoder - &predicted));
-        close(losses.ddx, mean_square(&batch.ddx - &predicted * decoder));
-        close(losses.l1, 0.2);
-        let missed = &batch.u - u_lat * encoder.transpose();
-        close(losses.lift, missed.norm_squared() / batch.u.norm_squared());
     }
 }

@@ -1,14 +1,9 @@
-//! What Adam moves, the fixed units around the maps, and the maps of a model in which these units and a change of the
-//! latent basis are part of the layers.
-//!
-//! Latent inputs of a batch, forwards and backwards: `u_lat = pinv(J^T) u = (J J^T)^-1 J u` with the Jacobian `J` of
-//! the encoder at every sample. The Gram matrices, as small as the latent space, are factored one by one; directions
-//! that are nearly dependent are damped.
+//! What Adam moves, the fixed units around the maps, and the maps of a model that these and a latent basis are folded
+//! into; latent inputs `u_lat = (J J^T)^-1 J u` of a batch, forwards and backwards.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::loss::Batch;
-use super::network::Network;
+use super::network::{Network, dot, product};
 use crate::model::{Activation, AffineMap, Layer, ModelError, StateMap};
 use crate::train::random::Random;
 
@@ -67,22 +62,11 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// No change of units; `mask` (18) is true for coordinates that the encoder may use.
-    pub(super) fn plain(mask: &[bool]) -> Self {
-        let n = mask.len();
-        Self {
-            mean: DVector::zeros(n),
-            spread: DVector::from_element(n, 1.0),
-            factors: DVector::from_fn(n, |i, _| f64::from(mask[i])),
-            latent: 1.0,
-        }
-    }
-
-    /// `x`, `dx` and `ddx` of a batch, stacked, as the encoder takes them.
-    pub(super) fn enter(&self, batch: &Batch) -> DMatrix<f64> {
-        let n = batch.samples();
-        let mut stack = DMatrix::zeros(3 * n, batch.x.ncols());
-        for (index, block) in [&batch.x, &batch.dx, &batch.ddx].into_iter().enumerate() {
+    /// `x`, `dx` and `ddx` of samples in rows, stacked, as the encoder takes them.
+    pub(super) fn enter(&self, blocks: [&DMatrix<f64>; 3]) -> DMatrix<f64> {
+        let n = blocks[0].nrows();
+        let mut stack = DMatrix::zeros(3 * n, blocks[0].ncols());
+        for (index, block) in blocks.into_iter().enumerate() {
             stack.rows_mut(index * n, n).copy_from(block);
         }
         for (i, mut column) in stack.column_iter_mut().enumerate() {
@@ -174,62 +158,47 @@ fn between(
 /// Added to the diagonal of `J J^T`.
 const DAMPING: f64 = 1e-12;
 
-#[derive(Clone, Debug)]
 pub(super) struct InputProjections {
     /// `n x d`.
     pub u_lat: DMatrix<f64>,
     /// Sum over samples of `(J u) . u_lat`: the energy of the inputs that the latent inputs carry.
     pub carried: f64,
-    factors: Vec<f64>, // Cholesky factors, d x d per sample, row-major
+    factors: Vec<f64>, // Cholesky factors, d x d per Jacobian, row-major
 }
 
 impl InputProjections {
-    /// Projects `u` (`n x 18`) by the Jacobians whose rows are stacked in `rows` (`(d n) x 18`).
-    pub(super) fn new(rows: &DMatrix<f64>, u: &DMatrix<f64>) -> Self {
-        let n = u.nrows();
-        let d = rows.nrows() / n.max(1);
-        let mut u_lat = DMatrix::zeros(n, d);
-        let mut grams = vec![DMatrix::zeros(n, 1); d * d];
+    /// `rows` (`(d m) x 18`) are the Jacobians', one per sample of `u` (`n x 18`) or one for all.
+    pub(super) fn new(rows: &DMatrix<f64>, u: &DMatrix<f64>, d: usize) -> Self {
+        let (n, m) = (u.nrows(), rows.nrows() / d);
+        let mut right = DMatrix::zeros(n, d);
+        let mut grams = vec![vec![0.0; m]; d * d];
         for (jacobian, input) in rows.column_iter().zip(u.column_iter()) {
             let (jacobian, input) = (jacobian.as_slice(), input.as_slice());
-            for (i, row) in jacobian.chunks_exact(n).enumerate() {
-                for (sum, (j, u)) in u_lat.column_mut(i).iter_mut().zip(row.iter().zip(input)) {
-                    *sum += j * u;
-                }
-                for (k, other) in jacobian.chunks_exact(n).take(i + 1).enumerate() {
-                    let gram = grams[i * d + k].as_mut_slice();
-                    for (sum, (a, b)) in gram.iter_mut().zip(row.iter().zip(other)) {
-                        *sum += a * b;
-                    }
+            for (i, row) in jacobian.chunks_exact(m).enumerate() {
+                add_times(right.column_mut(i).as_mut_slice(), row, input, 1.0);
+                for (k, other) in jacobian.chunks_exact(m).take(i + 1).enumerate() {
+                    add_times(&mut grams[i * d + k], row, other, 1.0);
                 }
             }
         }
-        let (mut factors, mut carried) = (vec![0.0; n * d * d], 0.0);
-        let mut right = vec![0.0; d];
+        let mut factors = vec![0.0; m * d * d];
         for (s, factor) in factors.chunks_exact_mut(d * d).enumerate() {
             for (entry, gram) in factor.iter_mut().zip(&grams) {
                 *entry = gram[s];
             }
             factorise(factor, d);
-            (0..d).for_each(|i| right[i] = u_lat[(s, i)]);
-            solve(factor, &mut right);
-            for (i, value) in right.iter().enumerate() {
-                carried += u_lat[(s, i)] * value;
-                u_lat[(s, i)] = *value;
-            }
         }
+        let u_lat = solved(&factors, &right);
+        let pairs = (0..n).flat_map(|s| (0..d).map(move |i| (s, i)));
         Self {
+            carried: pairs.fold(0.0, |sum, at| sum + right[at] * u_lat[at]),
             u_lat,
-            carried,
             factors,
         }
     }
 
-    /// Adjoint of the Jacobians (`(d n) x 18`), given the one of `u_lat` (`n x d`), plus `-lift` times the gradient of
-    /// [`Self::carried`].
-    ///
-    /// With `w = (J J^T)^-1 adjoint`, `v = u_lat` and the rest `r = u - J^T v` it is
-    /// `w r^T - v (J^T w)^T - 2 lift v r^T`.
+    /// Adjoint of the Jacobians, given that of `u_lat`, plus `-lift` times the gradient of [`Self::carried`]: with `w =
+    /// (J J^T)^-1 adjoint`, `v = u_lat` and `r = u - J^T v` it is `w r^T - v (J^T w)^T - 2 lift v r^T`.
     pub(super) fn adjoint(
         &self,
         rows: &DMatrix<f64>,
@@ -238,38 +207,63 @@ impl InputProjections {
         lift: f64,
     ) -> DMatrix<f64> {
         let (n, d) = self.u_lat.shape();
-        let mut solved = onto_u_lat.clone();
-        let mut right = vec![0.0; d];
-        for (s, factor) in self.factors.chunks_exact(d * d).enumerate() {
-            (0..d).for_each(|i| right[i] = onto_u_lat[(s, i)]);
-            solve(factor, &mut right);
-            (0..d).for_each(|i| solved[(s, i)] = right[i]);
-        }
-        let mut onto = DMatrix::zeros(d * n, u.ncols());
+        let (v, w) = (&self.u_lat, solved(&self.factors, onto_u_lat));
+        let lifted = w.zip_map(v, |w, v| w - 2.0 * lift * v);
+        let m = rows.nrows() / d;
+        let mut onto = DMatrix::zeros(d * m, u.ncols());
         let (mut rest, mut crossed) = (vec![0.0; n], vec![0.0; n]);
-        for ((mut onto, row), input) in onto
-            .column_iter_mut()
-            .zip(rows.column_iter())
-            .zip(u.column_iter())
-        {
+        let columns = rows.column_iter().zip(u.column_iter());
+        for (mut onto, (rows, input)) in onto.column_iter_mut().zip(columns) {
             rest.copy_from_slice(input.as_slice());
             crossed.fill(0.0);
-            for (i, jacobian) in row.as_slice().chunks_exact(n).enumerate() {
-                let (v, w) = (self.u_lat.column(i), solved.column(i));
-                for s in 0..n {
-                    rest[s] -= jacobian[s] * v[s];
-                    crossed[s] += jacobian[s] * w[s];
-                }
+            for (i, jacobian) in rows.as_slice().chunks_exact(m).enumerate() {
+                add_times(&mut rest, jacobian, v.column(i).as_slice(), -1.0);
+                add_times(&mut crossed, jacobian, w.column(i).as_slice(), 1.0);
             }
-            for (i, onto) in onto.as_mut_slice().chunks_exact_mut(n).enumerate() {
-                let (v, w) = (self.u_lat.column(i), solved.column(i));
-                for s in 0..n {
-                    onto[s] = (w[s] - 2.0 * lift * v[s]) * rest[s] - v[s] * crossed[s];
-                }
+            for (i, onto) in onto.as_mut_slice().chunks_exact_mut(m).enumerate() {
+                add_outer(onto, lifted.column(i).as_slice(), &rest, 1.0);
+                add_outer(onto, v.column(i).as_slice(), &crossed, -1.0);
             }
         }
         onto
     }
+}
+
+/// Adds `sign` times the products of a row of the Jacobians, of which there may be one for all samples.
+fn add_times(out: &mut [f64], row: &[f64], factors: &[f64], sign: f64) {
+    let each = out.iter_mut().zip(factors);
+    match row {
+        [same] => each.for_each(|(out, factor)| *out += sign * same * factor),
+        _ => (each.zip(row)).for_each(|((out, factor), entry)| *out += sign * entry * factor),
+    }
+}
+
+/// Adds `sign` times the products to each sample's row, or their sum to the one row for all.
+fn add_outer(onto: &mut [f64], left: &[f64], right: &[f64], sign: f64) {
+    match onto {
+        [sum] => *sum += sign * dot(left, right),
+        _ => {
+            for (onto, (left, right)) in onto.iter_mut().zip(left.iter().zip(right)) {
+                *onto += sign * left * right;
+            }
+        }
+    }
+}
+
+/// `(J J^T)^-1` of every sample times its row, by the factors of each or of all.
+fn solved(factors: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, d) = rows.shape();
+    if factors.len() == d * d && n > d {
+        return product(rows, &solved(factors, &DMatrix::identity(d, d)));
+    }
+    let mut solved = rows.clone();
+    let mut right = vec![0.0; d];
+    for (s, factor) in (0..n).zip(factors.chunks_exact(d * d).cycle()) {
+        (0..d).for_each(|i| right[i] = rows[(s, i)]);
+        solve(factor, &mut right);
+        (0..d).for_each(|i| solved[(s, i)] = right[i]);
+    }
+    solved
 }
 
 /// Cholesky factor in place of a Gram matrix whose lower triangle is given, row-major; damped.
@@ -298,55 +292,5 @@ fn solve(factor: &[f64], right: &mut [f64]) {
     for i in (0..d).rev() {
         let known: f64 = (i + 1..d).map(|k| factor[k * d + i] * right[k]).sum();
         right[i] = (right[i] - known) / factor[i * d + i];
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::train::joint::network::Tape;
-
-    #[test]
-    fn folded_maps_are_the_networks_in_their_frames() {
-        let mut random = Random::new(31);
-        let spread = DVector::from_fn(6, |_, _| 1.0 + 0.5 * random.signed());
-        let frame = Frame {
-            mean: DVector::from_fn(6, |_, _| random.signed()),
-            factors: spread.map(f64::recip),
-            spread,
-            latent: 0.4,
-        };
-        let turn = random.matrix(2, 2, 1.0) + DMatrix::identity(2, 2) * 2.0;
-        let basis = LatentBasis {
-            back: turn.clone().try_inverse().expect("dominant diagonal"),
-            turn,
-            shift: DVector::from_fn(2, |_, _| random.signed()),
-        };
-        let batch = Batch::random(0, (3, 6), 1.0, &mut random);
-        for widths in [&[6, 5, 2][..], &[6, 2]] {
-            let network = Network::random(widths, Activation::Tanh, &mut random);
-            let mut back: Vec<usize> = widths.to_vec();
-            back.reverse();
-            let decoding = Network::random(&back, Activation::Tanh, &mut random);
-            let parameters = Parameters {
-                encoder: network.clone(),
-                decoder: decoding.clone(),
-                xi: Vec::new(),
-            };
-            let maps = folded(&parameters, &frame, &basis);
-            let (folded, unfolded) = maps.expect("finite");
-            let mut tape = Tape::default();
-            let stack = network.forward(frame.enter(&batch), 3, &mut tape);
-            let decoded = decoding.forward(stack.clone(), 3, &mut tape);
-            for s in 0..3 {
-                let z = folded.apply(&batch.x.row(s).transpose()).expect("six");
-                let plain = stack.row(s).transpose() * frame.latent;
-                assert!((&z - (&basis.turn * plain + &basis.shift)).amax() < 1e-13);
-                let x = unfolded.apply(&z).expect("two");
-                let expected =
-                    &frame.mean + frame.spread.component_mul(&decoded.row(s).transpose());
-                assert!((x - expected).amax() < 1e-12);
-            }
-        }
     }
 }

@@ -22,9 +22,8 @@ use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///
-/// Every seed is trained on its own, on as many threads as the options say; the one of least score is kept, and a seed
-/// without a model (no stable dynamics, numbers that are not finite) is left out. A cancelled training ends with the
-/// seeds begun by then. Deterministic for a seed, on any number of threads.
+/// The seed of least score is kept, those without a model are left out. A cancelled training ends with the seeds begun
+/// by then. Deterministic, on any number of threads.
 ///
 /// # Errors
 /// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
@@ -36,12 +35,13 @@ pub fn joint(
     monitor: &mut Monitor<'_>,
 ) -> Result<Trained, TrainError> {
     let task = Task::new(recordings, robot, options)?;
-    let cut = |set| batches(set, &task.training);
+    let frame = frame(&task);
+    let cut = |set| batches(set, &task.training, &frame);
     let training = cut(recordings.training)?;
     let trainer = Trainer {
         task: &task,
         batches: &training,
-        frame: frame(&task),
+        frame: &frame,
     };
     let runs = trainer.run_seeds(monitor);
 
@@ -61,24 +61,25 @@ pub fn joint(
     seeds.into_model(task, "joint", origin)
 }
 
-/// Units in which the maps see the states: for linear maps and as published those of the samples, else centred and in
-/// standard deviations.
+/// For linear maps and as published the units of the samples, else centred and in standard deviations.
 fn frame(task: &Task<'_>) -> Frame {
-    let mask: Vec<bool> = (0..STATE_DIM).map(|i| task.active.contains(&i)).collect();
-    let plain = Frame::plain(&mask);
+    let factors = DVector::from_fn(STATE_DIM, |i, _| f64::from(task.active.contains(&i)));
     let options = task.options;
     if options.joint.maps.is_linear() || options.joint.transfer == Transfer::Published {
-        return plain;
+        return Frame {
+            mean: DVector::zeros(STATE_DIM),
+            spread: DVector::from_element(STATE_DIM, 1.0),
+            factors,
+            latent: 1.0,
+        };
     }
     let x = task.training.states(None);
     let least = options.encoder.least_std * options.scaling.state;
-    let spread: DVector<f64> = x
-        .column_variance()
-        .map(|variance| variance.sqrt().max(least).max(1e-6));
+    let spread = (x.column_variance()).map(|variance: f64| variance.sqrt().max(least).max(1e-6));
     let energy: f64 = task.active.iter().map(|&i| spread[i] * spread[i]).sum();
     Frame {
         mean: x.column_mean(),
-        factors: plain.factors.component_div(&spread),
+        factors: factors.component_div(&spread),
         spread,
         latent: (energy / task.active.len().max(1) as f64).sqrt(),
     }
@@ -87,7 +88,7 @@ fn frame(task: &Task<'_>) -> Frame {
 struct Trainer<'a> {
     task: &'a Task<'a>,
     batches: &'a [Batch],
-    frame: Frame,
+    frame: &'a Frame,
 }
 
 struct Run {
@@ -97,16 +98,13 @@ struct Run {
 }
 
 impl Trainer<'_> {
-    /// Trains all seeds on the threads of the options, in rounds, none of which begins after a cancellation; results
-    /// are in the order of the seeds.
+    /// Trains all seeds, in rounds of as many as there are threads, none of which begins after a cancellation.
     fn run_seeds(&self, monitor: &mut Monitor<'_>) -> Vec<Run> {
         let options = &self.task.options.joint;
-        let (threads, epochs) = (options.threads.max(1), options.schedule.total());
         let (seeds, cancel) = (self.task.options.seeds(), monitor.cancel_flag());
-        let steps = seeds.len() * epochs;
-        monitor.stage("training encoder, decoder and dynamics", steps);
+        monitor.stage("training encoder, decoder and dynamics");
         let mut runs = Vec::new();
-        for (round, group) in seeds.chunks(threads).enumerate() {
+        for group in seeds.chunks(options.threads.max(1)) {
             if monitor.cancelled() {
                 break;
             }
@@ -118,9 +116,7 @@ impl Trainer<'_> {
                 });
                 let workers: Vec<_> = started.collect();
                 drop(sender);
-                for (done, text) in receiver.iter().enumerate() {
-                    monitor.done(round * threads * epochs + done + 1, text);
-                }
+                receiver.iter().for_each(|text| monitor.done(text));
                 for worker in workers {
                     runs.push(worker.join().expect("a seed does not panic"));
                 }
@@ -223,30 +219,27 @@ impl Trainer<'_> {
         Ok((report, fitted))
     }
 
-    fn published_score(&self, parameters: &Parameters, judged: &[Batch]) -> f64 {
-        let weights = self.task.options.joint.weights;
-        let mut loss = self.loss(weights, parameters);
-        let totals = (judged.iter()).map(|batch| loss.evaluate(parameters, batch).total(&weights));
-        let total: f64 = totals.sum();
-        total / judged.len().max(1) as f64
-    }
-
+    /// The maps and Xi as they were learned, judged by the combined loss.
     fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted, TrainError> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-        let (encoder, decoder) = folded(&parameters, &self.frame, &plain)?;
+        let (encoder, decoder) = folded(&parameters, self.frame, &plain)?;
+        let weights = self.task.options.joint.weights;
+        let mut loss = self.loss(weights, &parameters);
+        let losses =
+            (judged.iter()).map(|batch| loss.evaluate(&parameters, batch, Moved::All, None));
+        let total: f64 = losses.map(|losses| losses.total(&weights)).sum();
         Ok(Fitted {
-            score: self.published_score(&parameters, judged),
+            score: total / judged.len().max(1) as f64,
             maps: self.task.encoded(encoder, decoder),
             xi: parameters.xi,
             choice: None,
         })
     }
 
-    /// The learned maps in the canonical latent basis, the decoder's last layer by least squares; the encoder of linear
-    /// maps is that over the learned row space.
+    /// The learned maps in the canonical latent basis, the decoder's last layer by least squares.
     fn canonical_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
         let (task, d) = (self.task, self.task.options.latent_dim);
-        let learned = folded(parameters, &self.frame, &LatentBasis::unchanged(d))?.0;
+        let learned = folded(parameters, self.frame, &LatentBasis::unchanged(d))?.0;
         if let (true, Some(linear)) = (self.is_linear(), learned.as_affine()) {
             let rows = linear.weights().transpose().qr().q();
             let encoder = task.encoder_over(&task.frame.nearest(&rows, d))?.into();
@@ -254,7 +247,7 @@ impl Trainer<'_> {
             return Ok((encoder, decoder));
         }
         let basis = self.basis(&learned);
-        let (encoder, decoder) = folded(parameters, &self.frame, &basis)?;
+        let (encoder, decoder) = folded(parameters, self.frame, &basis)?;
         let mut layers = decoder.layers().to_vec();
         let last = layers.pop().expect("invariant: a map has a layer");
         let hidden = match layers.is_empty() {
@@ -266,28 +259,24 @@ impl Trainer<'_> {
         Ok((encoder, StateMap::new("decoder", layers)?))
     }
 
-    /// The latent basis in which `J J^T` is the identity in the mean, rotated by varimax of the mean Jacobian, with the
-    /// latents in canonical order and their mean at 0.
+    /// The basis in which `J J^T` is the identity in the mean, rotated by varimax, with the latents' mean at 0.
     fn basis(&self, encoder: &StateMap) -> LatentBasis {
         let (d, training) = (self.task.options.latent_dim, &self.task.training);
         let x = training.states(None);
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())
-                .expect("invariant: the encoder takes the robot's states");
+                .expect("takes the robot's states");
             sum + &jacobian * jacobian.transpose()
         }) / x.ncols().max(1) as f64;
         // A basis without full rank is left as it is; the regression then reports that no model is stable.
-        let white = match gram.cholesky().and_then(|factor| factor.l().try_inverse()) {
-            Some(inverse) => inverse,
-            None => DMatrix::identity(d, d),
-        };
+        let white = gram.cholesky().and_then(|factor| factor.l().try_inverse());
+        let white = white.unwrap_or_else(|| DMatrix::identity(d, d));
         let mean = &white * mean_jacobian(encoder, training);
         let (_, rotation) = self.task.canonical_basis(&mean.transpose());
         let turn = rotation.transpose() * white;
-        let back = match turn.clone().try_inverse() {
-            Some(back) => back,
-            None => return LatentBasis::unchanged(d),
+        let Some(back) = turn.clone().try_inverse() else {
+            return LatentBasis::unchanged(d);
         };
         let shift = -(&turn * map_samples(encoder, &x).column_mean());
         LatentBasis { turn, back, shift }
@@ -301,7 +290,7 @@ impl Trainer<'_> {
         let training = &self.task.training;
         let terms_at_start = || {
             let plain = LatentBasis::unchanged(self.task.options.latent_dim);
-            let encoder = folded(&self.start(seed), &self.frame, &plain)?.0;
+            let encoder = folded(&self.start(seed), self.frame, &plain)?.0;
             let latent = Latent::of(training, &encoder);
             let set = EncodedSet::new(training, &latent);
             check_terms(set, &self.task.features, &self.task.library)

@@ -1,9 +1,5 @@
-//! The loss over a window of predictions (appendix D of the paper, equations 40 and 41), and its exact gradient.
-//!
-//! From every sample of a batch the model is integrated over a window and its latent positions are compared with the
-//! encoded ones. All starts of a batch are integrated together; the reverse sweep goes back through every stage.
-
-use std::ops::Range;
+//! The loss over a window of predictions from every sample of a batch (appendix D of the paper, equations 40 and 41),
+//! and its exact gradient.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -31,18 +27,6 @@ pub struct Unroll {
     pub integrator: Integrator,
 }
 
-impl Default for Unroll {
-    /// The author's variant: five steps of 10 ms by a second-order rule, decay 0.9.
-    fn default() -> Self {
-        Self {
-            window: 5,
-            stride: 5,
-            decay: 0.9,
-            integrator: Integrator::Rk2,
-        }
-    }
-}
-
 impl Integrator {
     /// Per stage: where in the step it stands, as the share of the earlier stage's slope too, and its weight.
     fn stages(self) -> &'static [(f64, f64)] {
@@ -59,7 +43,8 @@ impl Integrator {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+/// Dynamics and samples that predictions are made of.
+#[derive(Clone, Copy)]
 pub(super) struct Window<'a> {
     pub features: &'a Features,
     /// `n x 3d`: z, dz, u_lat.
@@ -69,32 +54,26 @@ pub(super) struct Window<'a> {
     pub step_s: f64,
 }
 
-#[derive(Debug)]
-pub(super) struct Adjoints<'a> {
-    /// With respect to the variables, `n x 3d`.
-    pub variables: &'a mut DMatrix<f64>,
-    pub xi: &'a mut DMatrix<f64>,
-}
+/// Gradients with respect to the variables (`n x 3d`) and Xi.
+type Adjoints<'a> = [&'a mut DMatrix<f64>; 2];
 
 /// One evaluation of the dynamics for all starts, kept for the reverse sweep.
 struct Stage {
     values: FeatureValues,
     theta: DMatrix<f64>,
-    inputs: Range<usize>, // rows of u_lat
+    first: usize, // row of u_lat
 }
 
 impl Unroll {
     /// Mean over starts, coordinates and (decaying) steps of `(z_pred - z)^2`; 0 for a batch shorter than the window.
-    ///
-    /// Adds `weight` times its gradient to `adjoints`. Inputs are those recorded at the time of each stage, or the
-    /// sample before it.
+    /// Adds `weight` times its gradient to `adjoints`. Inputs are those of the last sample before each stage.
     pub(super) fn evaluate(
         &self,
         samples: Window<'_>,
         weight: f64,
-        adjoints: &mut Adjoints<'_>,
+        mut adjoints: Adjoints<'_>,
     ) -> f64 {
-        let d = samples.features.latent_dim();
+        let d = samples.features.latent_dim;
         let reach = self.window * self.stride;
         let starts = samples.variables.nrows().saturating_sub(reach);
         if starts == 0 {
@@ -116,14 +95,13 @@ impl Unroll {
         let mut adjoint = DMatrix::zeros(starts, 2 * d);
         for (step, (mut stages, residual)) in steps.into_iter().zip(residuals).enumerate().rev() {
             let residual = residual * (2.0 * weight * scale * self.decay.powi(step as i32));
-            let mut target =
-                (adjoints.variables).view_mut(((step + 1) * self.stride, 0), (starts, d));
+            let mut target = adjoints[0].view_mut(((step + 1) * self.stride, 0), (starts, d));
             target -= &residual;
             let mut position = adjoint.columns_mut(0, d);
             position += residual;
-            self.backward(samples, (&mut stages, h), &mut adjoint, adjoints);
+            self.backward(samples, (&mut stages, h), &mut adjoint, &mut adjoints);
         }
-        let mut start = adjoints.variables.view_mut((0, 0), (starts, 2 * d));
+        let mut start = adjoints[0].view_mut((0, 0), (starts, 2 * d));
         start += adjoint;
         loss
     }
@@ -136,18 +114,16 @@ impl Unroll {
         h: f64,
         state: &mut DMatrix<f64>,
     ) -> Vec<Stage> {
-        let (starts, d) = (state.nrows(), samples.features.latent_dim());
+        let (starts, d) = (state.nrows(), samples.features.latent_dim);
         let (before, mut slope) = (state.clone(), DMatrix::zeros(starts, 2 * d));
         let mut stages = Vec::new();
         for &(at, share) in self.integrator.stages() {
             let now = &before + &slope * (h * at);
             let first = step * self.stride + (at * self.stride as f64) as usize;
-            let inputs = first..first + starts;
             let mut variables = DMatrix::zeros(starts, 3 * d);
             variables.columns_mut(0, 2 * d).copy_from(&now);
-            variables
-                .columns_mut(2 * d, d)
-                .copy_from(&samples.variables.view((first, 2 * d), (starts, d)));
+            let inputs = samples.variables.view((first, 2 * d), (starts, d));
+            variables.columns_mut(2 * d, d).copy_from(&inputs);
             let mut values = FeatureValues::default();
             let theta = samples.features.evaluate(&variables, &mut values);
             slope.columns_mut(0, d).copy_from(&now.columns(d, d));
@@ -156,7 +132,7 @@ impl Unroll {
             stages.push(Stage {
                 values,
                 theta,
-                inputs,
+                first,
             });
         }
         stages
@@ -170,20 +146,19 @@ impl Unroll {
         adjoint: &mut DMatrix<f64>,
         adjoints: &mut Adjoints<'_>,
     ) {
-        let (starts, d) = (adjoint.nrows(), samples.features.latent_dim());
+        let (starts, d) = (adjoint.nrows(), samples.features.latent_dim);
         let after = adjoint.clone();
         let mut onto_earlier = DMatrix::zeros(starts, 2 * d);
         let weights = self.integrator.stages();
         for (stage, &(at, share)) in stages.iter_mut().zip(weights).rev() {
             let slope = &after * (h * share) + &onto_earlier;
             let acceleration = slope.columns(d, d);
-            *adjoints.xi += stage.theta.tr_mul(&acceleration);
+            *adjoints[1] += stage.theta.tr_mul(&acceleration);
             let onto_theta = acceleration * samples.xi.transpose();
             let mut variables = DMatrix::zeros(starts, 3 * d);
             let features = samples.features;
             features.backward(&onto_theta, &mut stage.values, &mut variables);
-            let mut inputs =
-                (adjoints.variables).view_mut((stage.inputs.start, 2 * d), (starts, d));
+            let mut inputs = adjoints[0].view_mut((stage.first, 2 * d), (starts, d));
             inputs += variables.columns(2 * d, d);
             let mut own = variables.columns(0, 2 * d).into_owned();
             let mut velocity = own.columns_mut(d, d);
@@ -191,45 +166,5 @@ impl Unroll {
             onto_earlier = &own * (h * at);
             *adjoint += own;
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::train::oscillator::standard_library;
-
-    #[test]
-    fn loss_of_the_true_model_falls_with_the_order_of_the_integrator() {
-        // ddz = -z has z = cos t: the library's row of z1 has coefficient -1.
-        let features = Features::new(&standard_library(1, 1, false));
-        let mut xi = DMatrix::zeros(features.library_dim(), 1);
-        xi[(features.variable_term(0).expect("z1"), 0)] = -1.0;
-        let variables = DMatrix::from_fn(60, 3, |i, column| {
-            let t = i as f64 * 0.02;
-            [t.cos(), -t.sin(), 0.0][column]
-        });
-        let loss = |integrator| {
-            let unroll = Unroll {
-                window: 4,
-                stride: 5,
-                decay: 1.0,
-                integrator,
-            };
-            let samples = Window {
-                features: &features,
-                variables: &variables,
-                xi: &xi,
-                step_s: 0.02,
-            };
-            let mut adjoints = Adjoints {
-                variables: &mut variables.clone(),
-                xi: &mut xi.clone(),
-            };
-            unroll.evaluate(samples, 1.0, &mut adjoints)
-        };
-        let [euler, rk2, rk4] = [Integrator::Euler, Integrator::Rk2, Integrator::Rk4].map(loss);
-        let falls = euler > 100.0 * rk2 && rk2 > 1e4 * rk4 && rk4 < 1e-12;
-        assert!(falls, "{euler} {rk2} {rk4}");
     }
 }

@@ -1,11 +1,9 @@
-//! Where jumps are cut, and their parts at equal shares of the durations.
-//!
-//! How accelerations change with what is changed about a trajectory of the prior.
+//! Parts of jumps at equal shares of their durations, and how accelerations change about a trajectory of the prior.
 //!
 //! Over one interval between nodes of a jump, with `delta` the difference to the prior at the jump's own goal and a bar
 //! the mean of both ends: `delta (dz_(k+1) - dz_k) / h = Xi^T (bar delta z, bar delta dz, bar delta u_lat)`, the very
-//! equation that a plan is made of. Ridge on normalised columns. Shifting the robot forwards changes nothing: that
-//! direction of `delta z` is left out.
+//! equation that a plan is made of. Shifting the robot forwards changes nothing: that direction of `delta z` is left
+//! out.
 
 use std::ops::Range;
 
@@ -15,7 +13,7 @@ use super::super::dataset::{Dataset, Jump};
 use super::super::latent::Latent;
 use super::super::metrics::BODY_Z;
 use super::Sampled;
-use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange, complement};
+use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
 use crate::robot::{ContactFlags, FeetRule};
 
 /// The thrust begins when the body last rises more slowly than this before the feet leave, m/s.
@@ -111,15 +109,12 @@ fn cut(training: &Dataset, jump: &Jump) -> Option<Cut> {
         // A recording that ends on the way up says nothing of its apex.
         return finished(jump, kind, borders).filter(|_| !rising(in_air.end - 1));
     }
-    let lengths = (0..patterns.len()).map(|phase| {
-        let own = landing.iter().filter(|(of, _)| *of == phase);
-        own.map(|(_, range)| range.len()).sum::<usize>()
-    });
-    let commonest = lengths
-        .enumerate()
-        .filter(|(phase, _)| !flies(*phase))
-        .max_by_key(|(_, length)| *length)?;
-    kind.push(landmark("landing", commonest.0)?);
+    let length = |phase: &usize| -> usize {
+        let own = landing.iter().filter(|(of, _)| of == phase);
+        own.map(|(_, range)| range.len()).sum()
+    };
+    let grounded = (0..patterns.len()).filter(|phase| !flies(*phase));
+    kind.push(landmark("landing", grounded.max_by_key(length)?)?);
     borders.extend([in_air.end, last]);
     finished(jump, kind, borders)
 }
@@ -145,9 +140,7 @@ fn feet_of(training: &Dataset, phase: usize) -> Option<ContactFlags> {
 /// The jumps with the parts that most jumps have, and their cuts.
 pub(super) fn of_commonest_kind(cuts: &[Option<Cut>]) -> Vec<(usize, &Cut)> {
     let all = cuts.iter().enumerate();
-    let mut all: Vec<_> = all
-        .filter_map(|(jump, cut)| Some((jump, cut.as_ref()?)))
-        .collect();
+    let mut all: Vec<_> = (all.filter_map(|(jump, cut)| Some((jump, cut.as_ref()?)))).collect();
     let count = |kind: &[Landmark]| all.iter().filter(|(_, cut)| cut.kind == kind).count();
     // `max_by_key` takes the last of equals: reversed, the first is taken.
     let commonest = all.iter().rev().max_by_key(|(_, cut)| count(&cut.kind));
@@ -192,15 +185,14 @@ pub(super) fn sample(
 ) -> PartNodes {
     let samples = cut.samples(part);
     let times = &jump.time_s[samples.clone()];
-    let (first, duration_s) = (times[0], cut.duration_s(part));
+    let (duration_s, last) = (cut.duration_s(part), times.len() - 1);
     let step = duration_s / count as f64;
     let d = latent.z.nrows();
+    let time_of = |node: usize| times[0] + step * node as f64;
     let at_nodes = |rows: &DMatrix<f64>| {
         DMatrix::from_fn(count + 1, d, |node, i| {
-            let time = first + step * node as f64;
-            let after = times
-                .partition_point(|t| *t <= time)
-                .clamp(1, times.len() - 1);
+            let time = time_of(node);
+            let after = times.partition_point(|t| *t <= time).clamp(1, last);
             let (a, b) = (times[after - 1], times[after]);
             let share = ((time - a) / (b - a)).clamp(0.0, 1.0);
             let value = |k: usize| rows[(i, samples.start + k)];
@@ -209,17 +201,13 @@ pub(super) fn sample(
     };
     let averaged = |rows: &DMatrix<f64>| {
         DMatrix::from_fn(count + 1, d, |node, i| {
-            let time = first + step * node as f64;
-            let inside = |t: &f64| (t - time).abs() <= 0.5 * step + 1e-9;
+            let value = |k: usize| rows[(i, samples.start + k)];
+            let is_near = |k: &usize| (times[*k] - time_of(node)).abs() <= 0.5 * step + 1e-9;
             // The last sample is the next part's first, if there is one.
-            let own = times[..times.len() - 1].iter().enumerate();
-            let near = own.filter(|(_, t)| inside(t));
-            let (sum, n) = near.fold((0.0, 0), |(sum, n), (k, _)| {
-                (sum + rows[(i, samples.start + k)], n + 1)
-            });
-            match n {
-                0 => rows[(i, samples.start + times.len() - 2)],
-                _ => sum / f64::from(n),
+            let near = (0..last).filter(is_near);
+            match near.fold((0.0, 0), |(sum, n), k| (sum + value(k), n + 1)) {
+                (_, 0) => value(last - 1),
+                (sum, n) => sum / f64::from(n),
             }
         })
     };
@@ -282,60 +270,17 @@ impl GoalRegression {
 /// Ridge relative to the variance of each column.
 const RIDGE: f64 = 1e-2;
 
-pub(super) struct Deviations {
-    /// `(3 d) x d`.
-    pub xi: DMatrix<f64>,
-    /// Standard deviation over the jumps of the mean residual, each jump left out of the fit.
-    pub acceleration_std: DVector<f64>,
-    /// Coefficient of determination of the accelerations' deviations from the prior, over all latent coordinates, each
-    /// jump left out of prior and fit; 0 is what the prior alone explains.
-    pub ddz_r2: f64,
-}
-
-/// Fits the deviations of one part; `translation` is the change of `z` by a shift forwards.
-pub(super) fn fit_deviations(
-    sampled: &[Sampled],
-    goal: &[GoalRange; GOAL_DIM],
-    part: usize,
-    translation: &DVector<f64>,
-) -> Deviations {
-    let fit = Fit {
-        goal,
-        part,
-        projector: complement(&DMatrix::from_columns(&[translation.column(0)])),
-    };
-    let all: Vec<&Sampled> = sampled.iter().collect();
-    let d = translation.len();
-    let mut square = DVector::zeros(d);
-    let (mut unexplained, mut total) = (0.0, 0.0);
-    for left_out in 0..sampled.len() {
-        let mut others = all.clone();
-        others.remove(left_out);
-        let prior = fit.prior(&others);
-        let xi = fit.xi(&prior, &others);
-        let (variables, target) = fit.deviations(&prior, all[left_out]);
-        total += target.norm_squared();
-        let residual = target - variables * xi;
-        unexplained += residual.norm_squared();
-        let mean = residual.row_mean().transpose();
-        square += mean.component_mul(&mean);
-    }
-    Deviations {
-        xi: fit.xi(&fit.prior(&all), &all),
-        acceleration_std: (square / sampled.len() as f64).map(f64::sqrt),
-        ddz_r2: 1.0 - unexplained / f64::max(total, f64::MIN_POSITIVE),
-    }
-}
-
-struct Fit<'a> {
-    goal: &'a [GoalRange; GOAL_DIM],
-    part: usize,
-    projector: DMatrix<f64>,
+/// Fits the deviations of one part.
+pub(super) struct Fit<'a> {
+    pub goal: &'a [GoalRange; GOAL_DIM],
+    pub part: usize,
+    /// Leaves out the change of `z` by a shift forwards.
+    pub projector: DMatrix<f64>,
 }
 
 impl Fit<'_> {
     /// Tables of `z`, `dz`, `u_lat` and of mean accelerations over the intervals.
-    fn prior(&self, jumps: &[&Sampled]) -> [DMatrix<f64>; 4] {
+    pub(super) fn prior(&self, jumps: &[&Sampled]) -> [DMatrix<f64>; 4] {
         let regression = GoalRegression::of(jumps.iter().copied(), self.goal);
         let parts = || jumps.iter().map(|jump| &jump.parts[self.part]);
         let table = |pick: fn(&PartNodes) -> &DMatrix<f64>| regression.table(parts().map(pick));
@@ -349,7 +294,7 @@ impl Fit<'_> {
     }
 
     /// Variables, one row per interval and `3 d` columns, and accelerations of a jump about a prior.
-    fn deviations(
+    pub(super) fn deviations(
         &self,
         [z, dz, u_lat, ddz]: &[DMatrix<f64>; 4],
         jump: &Sampled,
@@ -374,7 +319,8 @@ impl Fit<'_> {
         (variables, accelerations(nodes) - at(ddz))
     }
 
-    fn xi(&self, prior: &[DMatrix<f64>; 4], jumps: &[&Sampled]) -> DMatrix<f64> {
+    /// `(3 d) x d`.
+    pub(super) fn xi(&self, prior: &[DMatrix<f64>; 4], jumps: &[&Sampled]) -> DMatrix<f64> {
         let d = self.projector.nrows();
         let (mut gram, mut product) = (DMatrix::zeros(3 * d, 3 * d), DMatrix::zeros(3 * d, d));
         for jump in jumps {
@@ -389,9 +335,7 @@ impl Fit<'_> {
         let inverse = DMatrix::from_diagonal(&inverse);
         let normalised = &inverse * gram * &inverse;
         let ridged = normalised + DMatrix::identity(3 * d, 3 * d) * RIDGE;
-        let factor = ridged
-            .cholesky()
-            .expect("invariant: a Gram matrix and a ridge");
+        let factor = (ridged.cholesky()).expect("invariant: a Gram matrix and a ridge");
         let mut xi = &inverse * factor.solve(&(&inverse * product));
         let positions = &self.projector * xi.rows(0, d);
         xi.rows_mut(0, d).copy_from(&positions);

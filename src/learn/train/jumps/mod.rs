@@ -1,8 +1,7 @@
 //! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
 //!
 //! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than [`LEAST_JUMPS`] of them are of
-//! one kind. `landmarks` cuts each jump into parts and samples these at equal shares of their durations; `deviations`
-//! fits nodes and durations over the goals, and how accelerations change about such a trajectory.
+//! one kind. `landmarks` cuts jumps into parts and fits what depends on their goals.
 
 mod landmarks;
 
@@ -11,10 +10,10 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 use super::dataset::{Dataset, centred, mean};
 use super::latent::{EncodedSet, Latent};
 use super::metrics::{BODY_X, BODY_Z, PartScore};
-use crate::model::{self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap};
-use landmarks::{
-    Cut, GoalRegression, PartNodes, fit_deviations, intervals, of_commonest_kind, sample,
+use crate::model::{
+    self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap, complement,
 };
+use landmarks::{Cut, Fit, GoalRegression, PartNodes, intervals, of_commonest_kind, sample};
 
 /// Fewest jumps of one kind that say how jumps depend on their goal.
 pub(super) const LEAST_JUMPS: usize = 6;
@@ -26,8 +25,7 @@ struct Sampled {
     parts: Vec<PartNodes>,
 }
 
-/// Landmarks and prior of the training jumps, and how well its deviations are explained in each of its parts; none for
-/// a nonlinear encoder or too few jumps of one kind.
+/// None for a nonlinear encoder or too few jumps of one kind.
 pub(super) fn learn_jumps(
     set: EncodedSet<'_>,
     encoder: &StateMap,
@@ -43,23 +41,21 @@ pub(super) fn learn_jumps(
         return nothing;
     }
     let (kind, scale) = (&chosen[0].1.kind, &training.scaling.state);
-    let counts: Vec<usize> = (0..kind.len())
-        .map(|part| {
-            let all = chosen.iter().map(|(_, cut)| cut.duration_s(part));
-            intervals(all.sum::<f64>() / chosen.len() as f64)
-        })
-        .collect();
-    let sampled: Vec<Sampled> = chosen
-        .iter()
-        .map(|&(jump, cut)| Sampled {
+    let count = |part: usize| {
+        let all = chosen.iter().map(|(_, cut)| cut.duration_s(part));
+        (part, intervals(all.sum::<f64>() / chosen.len() as f64))
+    };
+    let counts: Vec<(usize, usize)> = (0..kind.len()).map(count).collect();
+    let of_jump = |&(jump, cut): &(usize, &Cut)| {
+        let (samples, latent) = (&training.jumps[jump], &latent[jump]);
+        let parts = counts.iter();
+        let parts = parts.map(|&(part, count)| sample(samples, latent, cut, part, count));
+        Sampled {
             goal: goal_of(training, jump, cut),
-            parts: (counts.iter().enumerate())
-                .map(|(part, &count)| {
-                    sample(&training.jumps[jump], &latent[jump], cut, part, count)
-                })
-                .collect(),
-        })
-        .collect();
+            parts: parts.collect(),
+        }
+    };
+    let sampled: Vec<Sampled> = chosen.iter().map(of_jump).collect();
     let translation = affine.weights().column(BODY_X).into_owned();
     let heights = |jump: usize| training.jumps[jump].x.row(BODY_Z) / scale[BODY_Z];
     let mut start = DVector::zeros(scale.len());
@@ -105,14 +101,12 @@ fn goal_of(training: &Dataset, jump: usize, cut: &Cut) -> [f64; GOAL_DIM] {
     let x = training.jumps[jump].x.columns(0, cut.end() + 1);
     let scale = &training.scaling.state;
     let (row, forwards) = (x.row(BODY_Z) / scale[BODY_Z], x.row(BODY_X) / scale[BODY_X]);
-    [
-        forwards[x.ncols() - 1] - forwards[0],
-        row.max() - row[0],
-        row[0],
-    ]
-    .map(rounded)
+    let distance = forwards[x.ncols() - 1] - forwards[0];
+    [distance, row.max() - row[0], row[0]].map(rounded)
 }
 
+/// A part of the prior, and how well deviations from it are explained, each jump left out of prior and fit in turn;
+/// `translation` is the change of `z` by a shift forwards.
 fn part_of(
     sampled: &[Sampled],
     goal: &[GoalRange; GOAL_DIM],
@@ -120,32 +114,48 @@ fn part_of(
     part: usize,
     translation: &DVector<f64>,
 ) -> (JumpPart, PartScore) {
-    let regression = GoalRegression::of(sampled, goal);
-    let all: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
-    let table = |pick: fn(&PartNodes) -> &DMatrix<f64>| {
-        let values = all.iter().copied().map(pick);
-        regression.table(values).map(rounded)
+    let fit = Fit {
+        goal,
+        part,
+        projector: complement(&DMatrix::from_columns(&[translation.column(0)])),
     };
-    let durations: Vec<f64> = all.iter().map(|nodes| nodes.duration_s).collect();
-    let deviations = fit_deviations(sampled, goal, part, translation);
+    let all: Vec<&Sampled> = sampled.iter().collect();
+    let mut square = DVector::zeros(translation.len());
+    let (mut unexplained, mut total) = (0.0, 0.0);
+    for left_out in 0..sampled.len() {
+        let mut others = all.clone();
+        others.remove(left_out);
+        let prior = fit.prior(&others);
+        let xi = fit.xi(&prior, &others);
+        let (variables, target) = fit.deviations(&prior, all[left_out]);
+        total += target.norm_squared();
+        let residual = target - variables * xi;
+        unexplained += residual.norm_squared();
+        let mean = residual.row_mean().transpose();
+        square += mean.component_mul(&mean);
+    }
     let score = PartScore {
         part: name.to_owned(),
-        ddz_r2: deviations.ddz_r2,
+        ddz_r2: 1.0 - unexplained / f64::max(total, f64::MIN_POSITIVE),
     };
+    let nodes: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
+    let durations: Vec<f64> = nodes.iter().map(|nodes| nodes.duration_s).collect();
+    let prior = fit.prior(&all);
+    let xi = fit.xi(&prior, &all).map(rounded);
+    let [z, dz, u_lat, _] = prior.map(|table| table.map(rounded));
     let part = JumpPart {
-        duration_s: regression.numbers(&durations).map(rounded),
-        z: table(|nodes| &nodes.z),
-        dz: table(|nodes| &nodes.dz),
-        u_lat: table(|nodes| &nodes.u_lat),
-        xi: Some(deviations.xi.map(rounded)),
-        input_covariance: input_covariance(&all).map(rounded),
-        acceleration_std: deviations.acceleration_std.map(rounded),
+        duration_s: (GoalRegression::of(sampled, goal).numbers(&durations)).map(rounded),
+        z,
+        dz,
+        u_lat,
+        xi: Some(xi),
+        input_covariance: input_covariance(&nodes).map(rounded),
+        acceleration_std: (square / sampled.len() as f64).map(|square| rounded(square.sqrt())),
     };
     (part, score)
 }
 
-/// Covariance of the inputs at the nodes of a part over all jumps, with a floor for directions in which they never
-/// moved.
+/// Covariance of the inputs at all nodes of a part, with a floor for directions in which they never moved.
 fn input_covariance(all: &[&PartNodes]) -> DMatrix<f64> {
     /// Share of the mean variance that is added to every variance.
     const FLOOR: f64 = 1e-4;
@@ -183,40 +193,4 @@ fn state_std(latent: &[Latent], chosen: &[(usize, &Cut)]) -> DVector<f64> {
 fn rounded(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().expect("a printed number")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::AffineMap;
-    use crate::robot::STATE_DIM;
-    use crate::train::oscillator::go1;
-
-    /// Score of the thrust, with an encoder of the body's x and z and the front right thigh and knee.
-    fn score(training: &Dataset) -> f64 {
-        let rows = [BODY_X, BODY_Z, 1, 2];
-        let weights = DMatrix::from_fn(4, STATE_DIM, |i, j| f64::from(rows[i] == j));
-        let encoder = AffineMap::new("encoder", weights, DVector::zeros(4));
-        let encoder = encoder.expect("finite").into();
-        let latent = Latent::of(training, &encoder);
-        let (_, scores) = learn_jumps(EncodedSet::new(training, &latent), &encoder);
-        let thrust = scores.iter().find(|score| score.part == "thrust");
-        thrust.expect("a thrust").ddz_r2
-    }
-
-    #[test]
-    fn score_of_deviations_falls_when_inputs_belong_to_other_jumps() {
-        let mut training = go1((1..=8).map(|k| format!("train_{k:02}")));
-        let right = score(&training);
-        let inputs: Vec<DMatrix<f64>> = training.jumps.iter().map(|jump| jump.u.clone()).collect();
-        for (k, jump) in training.jumps.iter_mut().enumerate() {
-            let other = &inputs[(k + 3) % inputs.len()];
-            let last = other.ncols() - 1;
-            jump.u = DMatrix::from_fn(STATE_DIM, jump.u.ncols(), |i, sample| {
-                other[(i, sample.min(last))]
-            });
-        }
-        let wrong = score(&training);
-        assert!(right > 0.3 && wrong < right - 0.1, "{right} {wrong}");
-    }
 }
