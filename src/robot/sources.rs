@@ -8,7 +8,7 @@ macro_rules! sources {
 
 /// File name and text; `lib.rs` declares this module last, and what stands from there on is not for generated crates.
 pub const SOURCES: &[(&str, &str)] = sources! {
-    chain error geometry input_rule joints lib wrench
+    error geometry input_rule joints leg lib wrench
 };
 
 #[cfg(test)]

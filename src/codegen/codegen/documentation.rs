@@ -5,7 +5,7 @@ use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::lower::LowerError;
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::robot::WrenchFrame;
-use crate::robot::chain::{LEAST_HEIGHT, LEAST_SPAN};
+use crate::robot::leg::{LEAST_HEIGHT, LEAST_SPAN};
 
 /// Longest equation that documentation spells out, in terms.
 const MOST_TERMS: usize = 40;

@@ -10,7 +10,7 @@ use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::codegen::wrapped;
 use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings};
 use crate::mpc::{ControlModel, ControlModelParts, ControlPhase};
-use crate::robot::{Leg, LegGeometry, Robot, STATE_DIM, WrenchFrame};
+use crate::robot::{Leg, Robot, STATE_DIM, WrenchFrame};
 
 const WIDTH: usize = 5;
 
@@ -24,7 +24,6 @@ pub(crate) struct ControlModelText<'a> {
     model: &'a str,
     name: &'a str,
     robot: String,
-    leg_types: &'static str,
     frame: &'static str,
     actuators: Vec<(&'static str, String)>,
     plant: &'a ControlModel,
@@ -63,7 +62,6 @@ impl<'a> ControlModelText<'a> {
             model: &entries.name,
             name: &entries.identifier,
             robot: robot_text(plant.robot()),
-            leg_types: leg_types(plant.robot()),
             frame: match rule.wrench_frame() {
                 WrenchFrame::Body => "Body",
                 WrenchFrame::World => "World",
@@ -82,16 +80,6 @@ impl<'a> ControlModelText<'a> {
                 .map(|(entries, phase)| (entries.identifier.to_ascii_uppercase(), entries, phase))
                 .collect(),
         }
-    }
-}
-
-/// The names that the robot's text needs beside `LegGeometry`.
-fn leg_types(robot: &Robot) -> &'static str {
-    let is_planar = |leg: Leg| matches!(robot.geometry(leg), LegGeometry::Planar(_));
-    match Leg::ALL.map(is_planar) {
-        [true, true, true, true] => "PlanarLeg",
-        [false, false, false, false] => "ChainLeg",
-        _ => "ChainLeg, PlanarLeg",
     }
 }
 

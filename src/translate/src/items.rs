@@ -427,7 +427,7 @@ impl Writer<'_> {
         if !written.insert(name.to_owned()) {
             return;
         }
-        let c_name = self.spelling(name);
+        let c_name = self.items.name(&[name]);
         if let Some((docs, variants)) = self.items.enums.get(name) {
             let variants = variants
                 .iter()
