@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::program::{Binary, Program, ResultEntry, Slot, Statement, Table, Unary, ValueId};
+use super::operation::{Binary, Unary};
+use super::program::{Program, ResultEntry, Slot, Statement, Table, ValueId};
 
 /// A number of a program that is not finite.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
