@@ -644,3 +644,23 @@ fn signs_and_offsets_turn_the_same_leg_at_other_angles() {
         assert!((a.column(2) + b.column(2)).norm() < 1e-15);
     }
 }
+
+#[test]
+fn generated_controllers_hold_all_sources_of_the_robot_but_those_of_its_files() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/robot");
+    let mut found: Vec<String> = std::fs::read_dir(root)
+        .expect("a folder of sources")
+        .map(|entry| {
+            entry
+                .expect("an entry")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .filter(|name| name.ends_with(".rs"))
+        .filter(|name| !["sources.rs", "serialised.rs"].contains(&name.as_str()))
+        .collect();
+    found.sort();
+    let held = romc::robot::sources::SOURCES.iter();
+    assert!(held.map(|(name, _)| *name).eq(found));
+}

@@ -56,29 +56,6 @@ pub struct LegShape {
     pub volume: Real,
 }
 
-/// A number of the formulas: a float, or a value of a program that is being built.
-pub trait Value:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Neg<Output = Self>
-    + Add<Real, Output = Self>
-    + Mul<Real, Output = Self>
-{
-}
-
-impl<T> Value for T where
-    T: Copy
-        + Add<Output = T>
-        + Sub<Output = T>
-        + Mul<Output = T>
-        + Neg<Output = T>
-        + Add<Real, Output = T>
-        + Mul<Real, Output = T>
-{
-}
-
 /// Where the foot is and how the joints move it, in the frame of the leg's plane.
 #[derive(Debug, Clone, Copy)]
 pub struct Posture<T = f64> {
@@ -94,7 +71,11 @@ pub struct Posture<T = f64> {
     pub calf: [T; 2],
 }
 
-impl<T: Value> Posture<T> {
+impl<T> Posture<T>
+where
+    T: Copy + Neg<Output = T> + Sub<Output = T>,
+    T: Add<Output = T> + Mul<Output = T> + Add<Real, Output = T> + Mul<Real, Output = T>,
+{
     /// All numbers the same, before a turn.
     pub fn filled(value: T) -> Self {
         Self {

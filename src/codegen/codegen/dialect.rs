@@ -386,22 +386,3 @@ pub fn tidy(text: &str) -> String {
     tidied.truncate(tidied.trim_end_matches('\n').len() + 1);
     tidied
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn comments_keep_paragraphs_and_tidy_text_has_single_blank_lines_and_one_newline_at_its_end() {
-        let lines = comment_lines(&["one two three".to_owned(), "four".to_owned()], 9);
-        assert_eq!(lines, ["one two", "  three", "four"]);
-        for (text, tidied) in [
-            ("", ""),
-            ("\n \n", ""),
-            ("a", "a\n"),
-            ("\n\na  \n\n \nb\n\n", "a\n\nb\n"),
-        ] {
-            assert_eq!(tidy(text), tidied, "{text:?}");
-        }
-    }
-}

@@ -228,19 +228,3 @@ fn place_of<T: PartialEq + Clone>(list: &mut Vec<T>, wanted: &T) -> usize {
         list.len() - 1
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn number_that_is_not_finite_is_refused_with_its_statement() {
-        let mut builder = ProgramBuilder::new("p");
-        let x = builder.input("x", 1);
-        let y = builder.accumulate(&Table::new(2, 1, vec![0.0, f64::INFINITY]), x);
-        builder.output("y", &y);
-        let error = builder.finish().expect_err("infinite");
-        let expected = "program `p`: statement 1 holds the non-finite constant inf";
-        assert_eq!(error.to_string(), expected);
-    }
-}
