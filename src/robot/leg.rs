@@ -102,11 +102,9 @@ where
         self.limb[1] = cosine[1] * leg.thigh[1] - sine[1] * leg.thigh[0] + self.calf[1];
         self.foot[0] = self.limb[0] + leg.hip[0];
         self.foot[2] = self.limb[1] + leg.hip[2];
-        for i in 0..3 {
-            let j = (i + 1) % 3;
-            let k = (i + 2) % 3;
-            self.by_first[i] = self.foot[k] * leg.axis[j] - self.foot[j] * leg.axis[k];
-        }
+        self.by_first[0] = self.foot[2] * leg.axis[1] - self.foot[1] * leg.axis[2];
+        self.by_first[1] = self.foot[0] * leg.axis[2] - self.foot[2] * leg.axis[0];
+        self.by_first[2] = self.foot[1] * leg.axis[0] - self.foot[0] * leg.axis[1];
     }
 
     /// Area that thigh and calf span, with its sign, m^2.
@@ -185,25 +183,23 @@ fn damped_reciprocal(d: Real, least: Real) -> Real {
 }
 
 /// Writes `-J^-T` by cofactors; false if there is none.
-fn minus_inverse_transpose(jacobian: &[[Real; 3]; 3], out: &mut [[Real; 3]; 3]) -> bool {
-    let minor_0 = jacobian[1][1] * jacobian[2][2] - jacobian[1][2] * jacobian[2][1];
-    let minor_1 = jacobian[0][1] * jacobian[2][2] - jacobian[0][2] * jacobian[2][1];
-    let minor_2 = jacobian[0][1] * jacobian[1][2] - jacobian[0][2] * jacobian[1][1];
-    let det = jacobian[0][0] * minor_0 - jacobian[1][0] * minor_1 + jacobian[2][0] * minor_2;
+fn minus_inverse_transpose(j: &[[Real; 3]; 3], out: &mut [[Real; 3]; 3]) -> bool {
+    let minor_0 = j[1][1] * j[2][2] - j[1][2] * j[2][1];
+    let minor_1 = j[0][1] * j[2][2] - j[0][2] * j[2][1];
+    let minor_2 = j[0][1] * j[1][2] - j[0][2] * j[1][1];
+    let det = j[0][0] * minor_0 - j[1][0] * minor_1 + j[2][0] * minor_2;
     if det == 0.0 || !det.is_finite() {
         return false;
     }
-    for i in 0..3 {
-        for j in 0..3 {
-            let next_i = (i + 1) % 3;
-            let last_i = (i + 2) % 3;
-            let next_j = (j + 1) % 3;
-            let last_j = (j + 2) % 3;
-            let cofactor = jacobian[next_i][next_j] * jacobian[last_i][last_j]
-                - jacobian[next_i][last_j] * jacobian[last_i][next_j];
-            out[i][j] = -(cofactor / det);
-        }
-    }
+    out[0][0] = -(minor_0 / det);
+    out[1][0] = minor_1 / det;
+    out[2][0] = -(minor_2 / det);
+    out[0][1] = -((j[1][2] * j[2][0] - j[1][0] * j[2][2]) / det);
+    out[0][2] = -((j[1][0] * j[2][1] - j[1][1] * j[2][0]) / det);
+    out[1][1] = -((j[2][2] * j[0][0] - j[2][0] * j[0][2]) / det);
+    out[1][2] = -((j[2][0] * j[0][1] - j[2][1] * j[0][0]) / det);
+    out[2][1] = -((j[0][2] * j[1][0] - j[0][0] * j[1][2]) / det);
+    out[2][2] = -((j[0][0] * j[1][1] - j[0][1] * j[1][0]) / det);
     true
 }
 
@@ -269,11 +265,10 @@ pub(crate) fn add_wrench(
 
 /// Writes the moment of a force at a foot about where its hip is from.
 fn write_moment(hip: &[Real], foot: &[Real], force: &[Real], moment: &mut [Real]) {
-    for i in 0..3 {
-        let j = (i + 1) % 3;
-        let k = (i + 2) % 3;
-        moment[i] = (hip[j] + foot[j]) * force[k] - (hip[k] + foot[k]) * force[j];
-    }
+    let arm: [Real; 3] = [hip[0] + foot[0], hip[1] + foot[1], hip[2] + foot[2]];
+    moment[0] = arm[1] * force[2] - arm[2] * force[1];
+    moment[1] = arm[2] * force[0] - arm[0] * force[2];
+    moment[2] = arm[0] * force[1] - arm[1] * force[0];
 }
 
 /// Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to

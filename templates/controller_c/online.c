@@ -878,11 +878,9 @@ static inline MAYBE_UNUSED void online_posture_turn(online_posture *restrict sel
     self->limb[1] = cosine[1] * leg->thigh[1] - sine[1] * leg->thigh[0] + self->calf[1];
     self->foot[0] = self->limb[0] + leg->hip[0];
     self->foot[2] = self->limb[1] + leg->hip[2];
-    for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3;
-        const int k = (i + 2) % 3;
-        self->by_first[i] = self->foot[k] * leg->axis[j] - self->foot[j] * leg->axis[k];
-    }
+    self->by_first[0] = self->foot[2] * leg->axis[1] - self->foot[1] * leg->axis[2];
+    self->by_first[1] = self->foot[0] * leg->axis[2] - self->foot[2] * leg->axis[0];
+    self->by_first[2] = self->foot[1] * leg->axis[0] - self->foot[0] * leg->axis[1];
 }
 
 /* Turns a leg by the angles of its joints, rad. */
@@ -933,25 +931,24 @@ static inline MAYBE_UNUSED void online_posture_write_jacobian(online_posture *se
 }
 
 /* Writes -J^-T by cofactors; false if there is none. */
-static inline MAYBE_UNUSED bool online_minus_inverse_transpose(real jacobian[3][3], real out[restrict 3][3])
+static inline MAYBE_UNUSED bool online_minus_inverse_transpose(real j[3][3], real out[restrict 3][3])
 {
-    const real minor_0 = jacobian[1][1] * jacobian[2][2] - jacobian[1][2] * jacobian[2][1];
-    const real minor_1 = jacobian[0][1] * jacobian[2][2] - jacobian[0][2] * jacobian[2][1];
-    const real minor_2 = jacobian[0][1] * jacobian[1][2] - jacobian[0][2] * jacobian[1][1];
-    const real det = jacobian[0][0] * minor_0 - jacobian[1][0] * minor_1 + jacobian[2][0] * minor_2;
+    const real minor_0 = j[1][1] * j[2][2] - j[1][2] * j[2][1];
+    const real minor_1 = j[0][1] * j[2][2] - j[0][2] * j[2][1];
+    const real minor_2 = j[0][1] * j[1][2] - j[0][2] * j[1][1];
+    const real det = j[0][0] * minor_0 - j[1][0] * minor_1 + j[2][0] * minor_2;
     if (det == 0 || !solver_is_finite_number(det)) {
         return false;
     }
-    for (int i = 0; i < 3; ++i) {
-        for (int j = 0; j < 3; ++j) {
-            const int next_i = (i + 1) % 3;
-            const int last_i = (i + 2) % 3;
-            const int next_j = (j + 1) % 3;
-            const int last_j = (j + 2) % 3;
-            const real cofactor = jacobian[next_i][next_j] * jacobian[last_i][last_j] - jacobian[next_i][last_j] * jacobian[last_i][next_j];
-            out[i][j] = -(cofactor / det);
-        }
-    }
+    out[0][0] = -(minor_0 / det);
+    out[1][0] = minor_1 / det;
+    out[2][0] = -(minor_2 / det);
+    out[0][1] = -((j[1][2] * j[2][0] - j[1][0] * j[2][2]) / det);
+    out[0][2] = -((j[1][0] * j[2][1] - j[1][1] * j[2][0]) / det);
+    out[1][1] = -((j[2][2] * j[0][0] - j[2][0] * j[0][2]) / det);
+    out[1][2] = -((j[2][0] * j[0][1] - j[2][1] * j[0][0]) / det);
+    out[2][1] = -((j[0][2] * j[1][0] - j[0][0] * j[1][2]) / det);
+    out[2][2] = -((j[0][0] * j[1][1] - j[0][1] * j[1][0]) / det);
     return true;
 }
 
@@ -1011,11 +1008,10 @@ static inline MAYBE_UNUSED bool online_write_force_map(const online_leg_shape *l
 static inline MAYBE_UNUSED void online_write_moment(const real *hip, const real *foot, const real *force,
         real *restrict moment)
 {
-    for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3;
-        const int k = (i + 2) % 3;
-        moment[i] = (hip[j] + foot[j]) * force[k] - (hip[k] + foot[k]) * force[j];
-    }
+    real arm[3] = {hip[0] + foot[0], hip[1] + foot[1], hip[2] + foot[2]};
+    moment[0] = arm[1] * force[2] - arm[2] * force[1];
+    moment[1] = arm[2] * force[0] - arm[0] * force[2];
+    moment[2] = arm[0] * force[1] - arm[1] * force[0];
 }
 
 /* Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false

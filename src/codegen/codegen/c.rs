@@ -47,9 +47,6 @@ enum File<'a> {
 }
 
 /// The C files of a model; `provenance` is the text of the first line.
-///
-/// # Errors
-/// [`CodegenError::Template`] if a template fails.
 pub fn emit(
     entries: &ModelInterface,
     provenance: &str,

@@ -45,9 +45,6 @@ pub struct ModelInterface {
 
 impl ModelInterface {
     /// Lowers all functions of a model.
-    ///
-    /// # Errors
-    /// [`LowerError`] if a phase cannot be lowered.
     pub fn new(system: &Equations<'_>, form: Form, units: Units) -> Result<Self, LowerError> {
         let model = &units.convert(system.model())?;
         let phases = (0..model.phases().len())

@@ -61,9 +61,6 @@ impl Precision {
     }
 
     /// Whether every constant of the functions is finite in this precision.
-    ///
-    /// # Errors
-    /// [`CodegenError::BeyondSingle`] for the first that is not.
     pub fn check(self, entries: &ModelInterface) -> Result<(), CodegenError> {
         let beyond =
             |entry: &FunctionSpec| Some((entry.name.clone(), beyond_single(&entry.program)?));

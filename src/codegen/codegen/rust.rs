@@ -37,9 +37,6 @@ enum File<'a> {
 }
 
 /// The crate of a model; `provenance` is the text of each file's first line.
-///
-/// # Errors
-/// [`CodegenError::Template`] if a template fails.
 pub fn emit(
     entries: &ModelInterface,
     provenance: &str,

@@ -62,9 +62,6 @@ enum File<'a> {
 
 impl Script {
     /// The file of a model; `provenance` is the text of the first line.
-    ///
-    /// # Errors
-    /// [`CodegenError::Template`] if a template fails.
     pub fn emit(
         self,
         entries: &ModelInterface,

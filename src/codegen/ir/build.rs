@@ -168,9 +168,6 @@ impl ProgramBuilder {
     }
 
     /// The finished program.
-    ///
-    /// # Errors
-    /// [`IrError`] for the first constant that is not finite.
     pub fn finish(self) -> Result<Program, IrError> {
         let of_table = |table: &usize| {
             let mut entries = self.program.tables[*table].entries.iter().copied();

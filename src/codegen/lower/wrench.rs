@@ -23,9 +23,6 @@ use crate::robot::{
 /// `net` is `tau` less viscous and dry friction; the inertia of the motors needs accelerations, which are not measured,
 /// and is left out. A foot's force and moment are multiplied with its element of `feet`; at 0 they are zero in every
 /// posture.
-///
-/// # Errors
-/// [`LowerError::Program`] if the program breaks one of its promises.
 pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
     rule_of(model).map(|rule| input_of(&rule)).transpose()
 }
@@ -33,9 +30,6 @@ pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>, LowerE
 /// Torques of the motors behind torques at the links, `tau = net + b dq + c tanh(dq / v) + I ddq`: inputs `dx` and
 /// `ddx` (velocities and accelerations of the 18 robot coordinates, of which the joints count), `net` (12, N m); output
 /// `tau` (12, N m). `None` as for [`generalised_input`], of which it is the inverse at the joints for `ddx = 0`.
-///
-/// # Errors
-/// As [`generalised_input`].
 pub fn actuator_torque(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
     rule_of(model).map(|rule| torque_of(&rule)).transpose()
 }
