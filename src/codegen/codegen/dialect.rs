@@ -12,7 +12,7 @@ use super::options::Precision;
 use crate::ir::{Table, Unary};
 
 /// The patterns of a language. Those with two entries are for double and single precision.
-pub struct Spelling {
+pub(crate) struct Spelling {
     /// Words that no variable may be called, with blanks between them.
     pub reserved: &'static str,
     pub reals: [&'static str; 2],
@@ -174,7 +174,7 @@ impl Dialect {
         }
     }
 
-    pub fn table(&self, name: &Ident, table: &Table) -> String {
+    pub(crate) fn table(&self, name: &Ident, table: &Table) -> String {
         let [open, between, close] = self.spelling.rows;
         let row = |row: &[f64]| {
             let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
@@ -281,7 +281,7 @@ impl Span {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub(crate) enum Role {
     Input,
     Output,
     InOut,
@@ -290,14 +290,14 @@ pub enum Role {
 
 /// A parameter of a generated function, in a language or, with a text for a name, in any.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Parameter<N = Ident> {
+pub(crate) struct Parameter<N = Ident> {
     pub name: N,
     /// Number of elements; an output may have none.
     pub len: usize,
     pub role: Role,
 }
 
-pub struct Function {
+pub(crate) struct Function {
     pub name: Ident,
     pub docs: Vec<String>,
     pub parameters: Vec<Parameter>,

@@ -7,7 +7,7 @@ use crate::ir::{FUNCTIONS, Table};
 
 /// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Ident(String);
+pub(crate) struct Ident(String);
 
 impl Ident {
     pub(crate) fn as_str(&self) -> &str {

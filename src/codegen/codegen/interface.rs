@@ -10,7 +10,7 @@ use crate::model::{ModelError, ReducedModel};
 
 /// A function to be generated from a program.
 #[derive(Clone, Debug)]
-pub struct FunctionSpec {
+pub(crate) struct FunctionSpec {
     pub name: String,
     pub program: Program,
     pub parameters: Vec<Parameter<String>>,
@@ -20,10 +20,10 @@ pub struct FunctionSpec {
 #[derive(Clone, Debug)]
 pub struct PhaseInterface {
     pub identifier: String,
-    pub dynamics: FunctionSpec,
-    pub jacobian: FunctionSpec,
+    pub(crate) dynamics: FunctionSpec,
+    pub(crate) jacobian: FunctionSpec,
     pub pattern: JacobianPattern,
-    pub step: FunctionSpec,
+    pub(crate) step: FunctionSpec,
 }
 
 /// Everything that is generated for a model.
@@ -39,7 +39,7 @@ pub struct ModelInterface {
     /// Number of robot coordinates, if the model speaks of any.
     pub state_dim: Option<usize>,
     /// The generalised inputs and the maps, where the model has the data for them.
-    pub maps: Vec<FunctionSpec>,
+    pub(crate) maps: Vec<FunctionSpec>,
     pub phases: Vec<PhaseInterface>,
 }
 

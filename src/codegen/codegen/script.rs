@@ -153,7 +153,7 @@ fn column(numbers: &[usize]) -> String {
 }
 
 /// C99. Reserved are the keywords of C and C++, and the library names that generated files use.
-pub const C: Spelling = Spelling {
+pub(crate) const C: Spelling = Spelling {
     reserved: "
     auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union
