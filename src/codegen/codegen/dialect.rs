@@ -97,7 +97,6 @@ impl Dialect {
         self.spelling.reals[usize::from(self.precision.is_single())]
     }
 
-    /// What literals and library functions of that type end with.
     pub(crate) fn suffix(&self) -> &'static str {
         self.spelling.suffixes[usize::from(self.precision.is_single())]
     }
@@ -334,7 +333,6 @@ impl Function {
         self.of(&[Role::Output])
     }
 
-    /// Whether a statement mentions a table or a function.
     pub(crate) fn mentions(&self, name: &str) -> bool {
         self.body.contains(&format!("{name}[")) || self.body.contains(&format!("{name}("))
     }

@@ -8,7 +8,6 @@ use crate::ir::{Program, Statement};
 use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
 use crate::model::{ModelError, ReducedModel};
 
-/// A function to be generated from a program.
 #[derive(Clone, Debug)]
 pub(crate) struct FunctionSpec {
     pub name: String,
@@ -38,7 +37,6 @@ pub struct ModelInterface {
     pub latent_dim: usize,
     /// Number of robot coordinates, if the model speaks of any.
     pub state_dim: Option<usize>,
-    /// The generalised inputs and the maps, where the model has the data for them.
     pub(crate) maps: Vec<FunctionSpec>,
     pub phases: Vec<PhaseInterface>,
 }

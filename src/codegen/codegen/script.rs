@@ -144,7 +144,6 @@ fn tuple(numbers: &[usize]) -> String {
     }
 }
 
-/// Numbers of a column, counted from one.
 fn column(numbers: &[usize]) -> String {
     if numbers.is_empty() {
         return "zeros(0, 1)".to_owned();

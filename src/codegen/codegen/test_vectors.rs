@@ -51,7 +51,6 @@ pub(crate) struct ParameterVectors<'a> {
     pub before: Vec<Vec<f64>>,
     /// A row per point; empty for inputs.
     pub after: Vec<Vec<f64>>,
-    /// Of each point.
     tolerances: Vec<String>,
 }
 
@@ -78,7 +77,6 @@ fn spelled(bound: f64, precision: Precision) -> String {
     }
 }
 
-/// The vectors of all functions.
 pub(crate) fn all(entries: &ModelInterface, precision: Precision) -> Vec<FunctionVectors<'_>> {
     let vectors = entries.all().map(|entry| {
         let mut phases = entries.phases.iter();
@@ -160,7 +158,6 @@ const MAX_CHANGES: usize = 600;
 
 const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
 
-/// Inputs of a function and what it computes from them.
 struct TestPoint {
     pub inputs: Vec<Vec<f64>>,
     pub outputs: Vec<Vec<f64>>,

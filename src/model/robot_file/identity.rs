@@ -202,7 +202,6 @@ pub(crate) struct JointEntry {
     /// Recorded angle at the zero posture, rad; 0, if it is not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) offset_rad: Option<f64>,
-    /// Lowest and highest recorded angle, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) limits_rad: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
