@@ -1,5 +1,5 @@
 //! The rooms of `src` and of the crates in it import only what the table of ARCHITECTURE.md allows, and only from rows above
-//! their own; a setting of the controller stands in few files.
+//! their own; a setting of the controller and an elementary function stand in few files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -290,6 +290,18 @@ fn naming(folder: &Path, word: &str, found: &mut Vec<PathBuf>) {
             }
         }
     }
+}
+
+#[test]
+fn an_elementary_function_is_named_in_few_files() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = Vec::new();
+    for word in ["tan", "Tan"] {
+        naming(&src, word, &mut found);
+    }
+    found.sort();
+    found.dedup();
+    assert!((1..=15).contains(&found.len()), "{found:?}");
 }
 
 #[test]

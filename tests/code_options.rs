@@ -418,7 +418,9 @@ fn physical_latex_has_the_units_of_a_mass_and_of_times() {
     assert!(file("go1_d4-table.tex").contains(r"\mathrm{m/s^{2}}"));
     assert!(file("go1_d4-nomenclature.tex").contains(r"$\mathrm{N}$"));
     assert!(file("go1_d4.md").contains(r"\mathrm{m/s^{2}}"));
-    assert!(file("go1_d4.h").contains("1/kg"));
+    for unit in ["m/s^2", "1/kg", "rad/(kg m^2)", "rad/(m s^2)", "1/(kg m)"] {
+        assert!(file("go1_d4.h").contains(unit), "{unit}");
+    }
     assert!(!file("go1_d4.h").contains("scaled"));
 }
 
@@ -532,4 +534,44 @@ fn digits_that_would_round_beyond_floats_are_not_left_out() {
             );
         }
     }
+}
+
+#[test]
+fn literals_read_back_to_the_nearest_number_and_are_no_integers() {
+    for value in [
+        0.36,
+        -0.0,
+        5e-324,
+        1e16,
+        123_456_789.0,
+        0.1 + 0.2,
+        1e-44,
+        16_777_217.0,
+    ] {
+        let [double, single] = [Precision::Double, Precision::Single].map(|of| of.digits(value));
+        assert_eq!(double.parse().map(f64::to_bits), Ok(value.to_bits()));
+        let nearest = (value as f32).to_bits();
+        assert_eq!(single.parse().map(f32::to_bits), Ok(nearest));
+        assert!(
+            [double, single]
+                .iter()
+                .all(|text| text.contains(['.', 'e']))
+        );
+    }
+}
+
+#[test]
+fn tidy_text_has_single_blank_lines_and_one_newline_at_its_end_and_comments_break_at_spaces() {
+    for (text, tidied) in [
+        ("", ""),
+        ("\n \n", ""),
+        ("a", "a\n"),
+        ("\n\na  \n\n \nb\n\n", "a\n\nb\n"),
+    ] {
+        assert_eq!(romc::codegen::tidy(text), tidied, "{text:?}");
+    }
+    assert_eq!(
+        romc::codegen::wrapped("one two three", 9, " "),
+        ["one two", "  three"]
+    );
 }

@@ -192,3 +192,21 @@ impl fmt::Display for Function {
         formatter.write_str(self.name())
     }
 }
+
+impl Function {
+    /// The derivative at `argument`, where the function has this value; 0 at a kink.
+    pub fn slope(self, argument: f64, value: f64) -> f64 {
+        match self {
+            Function::Sin => argument.cos(),
+            Function::Cos => -argument.sin(),
+            Function::Tan => 1.0 + value * value,
+            Function::Tanh => 1.0 - value * value,
+            Function::Exp => value,
+            Function::Log => 1.0 / argument,
+            Function::Sqrt => 0.5 / value,
+            Function::Abs if argument == 0.0 => 0.0,
+            Function::Abs => argument.signum(),
+            Function::Sign => 0.0,
+        }
+    }
+}

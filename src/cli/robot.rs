@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     let read = robot_file::open(&arguments.robot, &options)?;
     let robot = read.robot;
     note_all(&arguments.robot, &read.notes);
-    let geometry = |joint: usize| robot.geometry(Leg::ALL[joint / 3]).chain();
+    let geometry = |joint: usize| robot.geometry(Leg::ALL[joint / 3]);
     let limits = robot.joint_limit_rad();
     let (torques, speeds) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
     let table = Table::of(0..JOINT_NAMES.len())
@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     let (name, mass) = (robot.name(), number(robot.mass_kg()));
     let mut text = format!("{name}: {mass} kg\n\n{table}\n");
     for leg in Leg::ALL {
-        let foot = vector(robot.geometry(leg).chain().links[2]);
+        let foot = vector(robot.geometry(leg).links[2]);
         let _ = writeln!(text, "foot {leg}: {foot} m from its last joint");
     }
     if let Some(path) = &arguments.output {

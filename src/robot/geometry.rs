@@ -1,22 +1,24 @@
-//! The shape of one leg: the usual one in its short formulas, or any chain of three joints.
-//!
-//! One robot: geometry, mass and limits.
+//! The legs of a robot with all that is asked of one, its mass and its limits.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::chain::{self, ChainLeg, PlanarLeg};
 use super::input_rule::rotation;
 use super::joints::{
     BODY_NAMES, FOOT_DIM, JOINT_DIM, JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM, WRENCH_NAMES,
 };
+use super::leg::{LEAST_HEIGHT, LEAST_SPAN, LegShape, Posture, write_force_map};
 
-/// The shape of one leg. Both forms agree where both apply; the planar one has fewer operations.
+/// A leg: axes and links at its zero posture in the body's axes, and what follows from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum LegGeometry {
-    /// Abduction about x, flexion and knee about y, links straight down.
-    Planar(PlanarLeg),
-    /// Any axes and links.
-    Chain(ChainLeg),
+pub struct LegGeometry {
+    /// Unit vectors of the joints' axes, from the trunk to the foot; the last two are parallel.
+    pub axes: [[f64; 3]; 3],
+    /// From each joint to the next and from the last to the foot, in m.
+    pub links: [[f64; 3]; 3],
+    /// Lengths of thigh and calf, in m; see [`LegGeometry::new`].
+    pub lengths_m: [f64; 2],
+    /// The same leg in the frame of its plane.
+    pub shape: LegShape,
 }
 
 /// Directions and lengths of a leg at its zero posture, in the body's axes.
@@ -34,133 +36,119 @@ pub struct LegLinks {
     pub calf: Vector3<f64>,
 }
 
-/// Axes of a planar leg: x, y, y.
+/// Axes of the usual leg: x, y, y.
 const USUAL_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
 
-impl LegGeometry {
-    /// The simplest form of a chain.
-    pub fn of_chain(chain: ChainLeg) -> Self {
-        let [hip, thigh, calf] = chain.links;
-        let is_usual = chain.axes == USUAL_AXES
-            && (hip[0], hip[2]) == (0.0, 0.0)
-            && (thigh[0], thigh[1]) == (0.0, 0.0)
-            && calf[1] == 0.0
-            && thigh[2] < 0.0
-            && calf[2] < 0.0;
-        match is_usual {
-            false => LegGeometry::Chain(chain),
-            true => LegGeometry::Planar(PlanarLeg {
-                hip_m: hip[1],
-                thigh_m: -thigh[2],
-                calf_m: -calf[2],
-                foot_forward_m: calf[0],
-            }),
-        }
-    }
+/// Whether a leg abducts about x, bends about y and hangs straight down but for its foot.
+fn is_usual(axes: &[[f64; 3]; 3], [hip, thigh, calf]: &[[f64; 3]; 3]) -> bool {
+    *axes == USUAL_AXES
+        && (hip[0], hip[2]) == (0.0, 0.0)
+        && (thigh[0], thigh[1]) == (0.0, 0.0)
+        && calf[1] == 0.0
+        && thigh[2] < 0.0
+        && calf[2] < 0.0
+}
 
-    /// The leg as a chain.
-    pub fn chain(&self) -> ChainLeg {
-        match self {
-            LegGeometry::Chain(chain) => *chain,
-            LegGeometry::Planar(leg) => ChainLeg {
-                axes: USUAL_AXES,
-                links: [
-                    [0.0, leg.hip_m, 0.0],
-                    [0.0, 0.0, -leg.thigh_m],
-                    [leg.foot_forward_m, 0.0, -leg.calf_m],
+impl LegGeometry {
+    /// A leg of axes and links. Lengths are those across the second joint's axis; of a leg of the usual shape, whose
+    /// calf may have the foot a little before or behind its end, they are along thigh and calf.
+    pub fn new(axes: [[f64; 3]; 3], links: [[f64; 3]; 3]) -> Self {
+        let [first, normal, third] = axes.map(Vector3::from);
+        let [hip, thigh, calf] = links.map(Vector3::from);
+        let [thigh_m, calf_m] = match is_usual(&axes, &links) {
+            true => [-thigh.z, -calf.z],
+            false => [thigh, calf].map(|link| normal.cross(&link).norm()),
+        };
+        let along_x = normal.x.abs() < 0.9;
+        let near = if along_x { Vector3::x() } else { Vector3::z() };
+        let forward = (near - normal * normal.dot(&near)).normalize();
+        let frame = [forward, normal, forward.cross(&normal)];
+        let along = |vector: Vector3<f64>| frame.map(|axis| axis.dot(&vector) + 0.0);
+        let of_frame = |share: &dyn Fn(Vector3<f64>) -> Vector3<f64>| {
+            frame.map(|axis| share(axis).map(|v| v + 0.0).into()) // no -0.0
+        };
+        let fixed = |axis: Vector3<f64>| first * first.dot(&axis);
+        let in_plane = |link: Vector3<f64>| [along(link)[0], along(link)[2]];
+        let mut to_plane = along(hip);
+        to_plane[1] += along(thigh)[1] + along(calf)[1];
+        Self {
+            axes,
+            links,
+            lengths_m: [thigh_m, calf_m],
+            shape: LegShape {
+                fixed: of_frame(&fixed),
+                cosine: of_frame(&|axis| axis - fixed(axis)),
+                sine: of_frame(&|axis| first.cross(&axis)),
+                axis: along(first),
+                hip: to_plane,
+                thigh: in_plane(thigh),
+                calf: in_plane(calf),
+                knee: normal.dot(&third).signum(),
+                least: [
+                    LEAST_SPAN * thigh_m * calf_m,
+                    LEAST_HEIGHT * (thigh_m + calf_m),
                 ],
+                volume: thigh_m * calf_m * (thigh_m + calf_m),
             },
         }
     }
 
+    fn posture(&self, q: &[f64; 3]) -> Posture {
+        let mut posture = Posture::filled(0.0);
+        posture.bend(&self.shape, q);
+        posture
+    }
+
     /// Foot position from the first joint, in the body's axes, m, at joint angles `q` in rad.
-    pub(crate) fn foot_position(&self, q: &[f64; 3]) -> Vector3<f64> {
-        match self {
-            LegGeometry::Planar(leg) => leg.foot_position(q),
-            LegGeometry::Chain(leg) => leg.foot_position(q),
-        }
+    pub fn foot_position(&self, q: &[f64; 3]) -> Vector3<f64> {
+        let (posture, mut foot) = (self.posture(q), [0.0; 3]);
+        posture.write_in_body(&posture.foot, &mut foot);
+        foot.into()
     }
 
     /// Position of the third joint from the first, in the body's axes, m.
     pub fn knee_position(&self, q: &[f64; 3]) -> Vector3<f64> {
-        match self {
-            LegGeometry::Planar(leg) => PlanarLeg {
-                calf_m: 0.0,
-                foot_forward_m: 0.0,
-                ..*leg
-            }
-            .foot_position(q),
-            LegGeometry::Chain(leg) => {
-                let [hip, thigh, _] = leg.links;
-                let links = [hip, thigh, [0.0; 3]];
-                ChainLeg { links, ..*leg }.foot_position(q)
-            }
-        }
+        let [hip, thigh, _] = self.links;
+        Self::new(self.axes, [hip, thigh, [0.0; 3]]).foot_position(q)
     }
 
-    /// Jacobian of `Self::foot_position`: `J[i][j] = d p_i / d q_j`, in m.
+    /// Jacobian of [`Self::foot_position`]: `J[i][j] = d p_i / d q_j`, in m.
     pub fn foot_jacobian(&self, q: &[f64; 3]) -> Matrix3<f64> {
-        match self {
-            LegGeometry::Planar(leg) => leg.foot_jacobian(q),
-            LegGeometry::Chain(leg) => leg.foot_jacobian(q),
-        }
-    }
-
-    /// Lengths of thigh and calf, in m.
-    pub fn lengths(&self) -> [f64; 2] {
-        match self {
-            LegGeometry::Planar(leg) => [leg.thigh_m, leg.calf_m],
-            LegGeometry::Chain(leg) => leg.lengths(),
-        }
-    }
-
-    /// The volume that bounds `|det J|`: thigh times calf times their sum.
-    pub fn volume_m3(&self) -> f64 {
-        chain::volume_m3(self.lengths())
+        let mut jacobian = [[0.0; 3]; 3];
+        self.posture(q).write_jacobian(&self.shape, &mut jacobian);
+        matrix(&jacobian)
     }
 
     /// `|det J| / volume`: 0 at full extension or with the foot on the axis of the first joint, at most about 1.
     pub fn manipulability(&self, q: &[f64; 3]) -> f64 {
-        match self {
-            LegGeometry::Planar(leg) => leg.manipulability(q),
-            LegGeometry::Chain(leg) => leg.foot_jacobian(q).determinant().abs() / self.volume_m3(),
-        }
-    }
-
-    /// Below which the area that thigh and calf span (m^2) and the height of the foot in the plane of the leg (m) are
-    /// damped.
-    pub fn least_levers(&self) -> [f64; 2] {
-        chain::least_levers(self.lengths())
+        let posture = self.posture(q);
+        (posture.area() * posture.lever()).abs() / self.shape.volume
     }
 
     /// Span of thigh and calf over the product of their lengths, and height of the foot over the length of the
-    /// stretched leg, as absolute values: what [`LEAST_SPAN`](super::chain::LEAST_SPAN) and
-    /// [`LEAST_HEIGHT`](super::chain::LEAST_HEIGHT) are compared with.
+    /// stretched leg, as absolute values: what [`LEAST_SPAN`] and [`LEAST_HEIGHT`] are compared with.
     pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
-        let [area, lever] = match self {
-            LegGeometry::Planar(leg) => leg.levers(q),
-            LegGeometry::Chain(leg) => leg.levers(q),
-        };
-        let [thigh, calf] = self.lengths();
-        [area.abs() / (thigh * calf), lever.abs() / (thigh + calf)]
+        let (posture, [thigh, calf]) = (self.posture(q), self.lengths_m);
+        let [area, lever] = [posture.area(), posture.lever()].map(f64::abs);
+        [area / (thigh * calf), lever / (thigh + calf)]
     }
 
-    /// `-J^-T` with levers that are never shorter than [`Self::least_levers`]; none where neither is that short.
-    pub fn damped_force_map(&self, q: &[f64; 3]) -> Option<Matrix3<f64>> {
-        match self {
-            LegGeometry::Planar(leg) => leg.damped_force_map(q),
-            LegGeometry::Chain(leg) => leg.damped_force_map(q),
-        }
+    /// `-J^-T`, from torques to the force on the body: with levers that are never shorter than the least of
+    /// [`LegShape`], or exact. None where there is none.
+    pub fn force_map(&self, q: &[f64; 3], is_exact: bool) -> Option<Matrix3<f64>> {
+        let (mut map, mut foot) = ([[0.0; 3]; 3], [0.0; 3]);
+        write_force_map(&self.shape, q, is_exact, &mut map, &mut foot).then(|| matrix(&map))
     }
 
-    /// Directions and lengths at the zero posture. The foot's offset from a straight calf is left out of a planar leg.
+    /// Directions and lengths at the zero posture. The foot's offset from a straight calf is left out of a leg of the
+    /// usual shape.
     pub fn links(&self) -> LegLinks {
-        let mut chain = self.chain();
-        if let LegGeometry::Planar(_) = self {
-            chain.links[2][0] = 0.0;
+        let mut links = self.links;
+        if is_usual(&self.axes, &self.links) {
+            links[2][0] = 0.0;
         }
-        let [abduction, flexion, _] = chain.axes.map(Vector3::from);
-        let [hip, thigh, calf] = chain.links.map(Vector3::from);
+        let [abduction, flexion, _] = self.axes.map(Vector3::from);
+        let [hip, thigh, calf] = links.map(Vector3::from);
         let aside = flexion * (flexion.dot(&thigh) + flexion.dot(&calf));
         let in_plane = |link: Vector3<f64>| link - flexion * flexion.dot(&link);
         LegLinks {
@@ -171,6 +159,10 @@ impl LegGeometry {
             calf: in_plane(calf),
         }
     }
+}
+
+fn matrix(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| rows[row][column])
 }
 
 /// A quadruped with three joints per leg: abduction, flexion, knee.
@@ -220,7 +212,7 @@ impl Robot {
     /// How a joint's angle on the left, mirrored, reads on the right: 1 where both turn alike in a mirrored motion (the
     /// usual flexions), -1 where they turn against each other (abductions about the same axis).
     pub fn mirror_sign(&self, joint: usize) -> f64 {
-        let of_pair = |leg: Leg| self.geometry(leg).chain().axes[joint % LEG_JOINT_DIM];
+        let of_pair = |leg: Leg| self.geometry(leg).axes[joint % LEG_JOINT_DIM];
         let (left, right) = match joint / LEG_JOINT_DIM < 2 {
             true => (of_pair(Leg::FrontLeft), of_pair(Leg::FrontRight)),
             false => (of_pair(Leg::RearLeft), of_pair(Leg::RearRight)),

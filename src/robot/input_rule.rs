@@ -10,11 +10,12 @@
 //! friction, dry friction, and the rotor's inertia seen through the gear (the armature). The dry part is smooth around
 //! standstill, with `v` = [`DRY_SPEED_RAD_S`].
 
-use nalgebra::{ArrayStorage, Matrix3, Rotation3, SMatrix, Vector6};
+use nalgebra::{ArrayStorage, Matrix3, SMatrix, Vector6};
 
 use super::error::RobotError;
 use super::geometry::Robot;
 use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, STATE_DIM};
+use super::leg::write_world_axes;
 
 /// Axes of the force and moment in an input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -154,19 +155,26 @@ fn product(
 }
 
 /// Rotation from the body's axes to the world's, `R_z(yaw) R_y(pitch) R_x(roll)`.
-pub fn rotation([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
-    Rotation3::from_euler_angles(roll, pitch, yaw).into_inner()
+pub fn rotation(attitude: [f64; 3]) -> Matrix3<f64> {
+    let [turned, _] = world_axes(attitude);
+    turned
+}
+
+/// Rotation of forces from the body's axes to the world's, and the map of moments to those of roll, pitch and yaw.
+fn world_axes(attitude: [f64; 3]) -> [Matrix3<f64>; 2] {
+    let mut maps = [[[0.0; 3]; 3]; 2];
+    let [turned, rates] = &mut maps;
+    write_world_axes(&attitude, turned, rates);
+    maps.map(|rows| Matrix3::from_fn(|row, column| rows[row][column]))
 }
 
 /// From force and moment about the body's origin in the body's axes to the generalised forces of position and of roll,
 /// pitch and yaw: `[R F; E^T M]` with the angular velocity `E (d roll, d pitch, d yaw)` in the body's axes.
 fn generalised(attitude: [f64; 3]) -> SMatrix<f64, BODY_DIM, BODY_DIM> {
-    let [(s_r, c_r), (s_p, c_p)] = [attitude[0].sin_cos(), attitude[1].sin_cos()];
-    let rates = Matrix3::new(1.0, 0.0, 0.0, 0.0, c_r, -s_r, -s_p, c_p * s_r, c_p * c_r);
     let mut map = SMatrix::<f64, BODY_DIM, BODY_DIM>::zeros();
-    map.fixed_view_mut::<3, 3>(0, 0)
-        .copy_from(&rotation(attitude));
-    map.fixed_view_mut::<3, 3>(3, 3).copy_from(&rates);
+    for (first, block) in [0, 3].into_iter().zip(world_axes(attitude)) {
+        map.fixed_view_mut::<3, 3>(first, first).copy_from(&block);
+    }
     map
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Enters: joint angles, joint torques and contact flags. Leaves: foot positions, leg Jacobians, the force and moment
 //! that the legs put on the body (equations 4 to 8, 22 and 23), and the limits a command has to keep. Read [`joints`]
-//! for names and order first, then [`kinematics`] and [`chain`] for one leg, `wrench` for all four and [`input_rule`]
+//! for names and order first, then [`leg`] for one leg, `wrench` for all four and [`input_rule`]
 //! for the inputs of a model; `romc_model::robot_file` reads robots from files; generated controllers hold these
 //! sources.
 //!
@@ -20,15 +20,14 @@
 //! # Ok::<(), romc::robot::RobotError>(())
 //! ```
 
-pub mod chain;
 pub(crate) mod geometry;
 pub mod input_rule;
 pub mod joints;
+pub mod leg;
 pub(crate) mod wrench;
 
 mod error;
 
-pub use chain::{ChainLeg, PlanarLeg, SINGULAR_BOUND};
 pub use error::RobotError;
 pub use geometry::{LegGeometry, LegLinks, Robot};
 pub use input_rule::{Actuators, DRY_SPEED_RAD_S, InputRule, WrenchFrame};
@@ -36,6 +35,7 @@ pub use joints::{
     BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
     JOINT_NAMES, Leg, STATE_DIM,
 };
+pub use leg::{LegShape, SINGULAR_BOUND};
 pub use wrench::FeetRule;
 
 #[cfg(feature = "serde")]

@@ -46,7 +46,6 @@ impl<'de> Deserialize<'de> for FeetRule {
     }
 }
 
-/// Three arrays of twelve numbers, as [`Actuators`] has them.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Actuators", deny_unknown_fields)]
 struct ActuatorsEntry {
@@ -67,7 +66,6 @@ impl<'de> Deserialize<'de> for Actuators {
     }
 }
 
-/// `"body"` or `"world"`.
 impl Serialize for WrenchFrame {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.name().serialize(serializer)

@@ -11,11 +11,11 @@ use std::fmt;
 
 use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
 
-use super::chain::SINGULAR_BOUND;
 use super::error::RobotError;
 use super::geometry::Robot;
 use super::input_rule::WrenchFrame;
-use super::joints::{ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg};
+use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg};
+use super::leg::{SINGULAR_BOUND, add_wrench};
 
 impl Robot {
     /// Force of a leg in contact on the body, in N: `F = -J^-T tau` (equation 4).
@@ -39,33 +39,27 @@ impl Robot {
     /// The matrix `-J^-T` that takes a leg's torques (N m) to its force on the body (N).
     pub fn foot_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
-        let singular = |determinant| RobotError::SingularLeg {
+        let geometry = self.geometry(leg);
+        let singular = || RobotError::SingularLeg {
             robot: self.name().to_owned(),
             leg,
             joints_rad: *q,
-            determinant,
+            determinant: geometry.manipulability(q),
             bound: SINGULAR_BOUND,
         };
-        let determinant = self.geometry(leg).manipulability(q);
-        if determinant < SINGULAR_BOUND {
-            return Err(singular(determinant));
-        }
-        match self.foot_jacobian(leg, q).transpose().try_inverse() {
-            Some(inverse) => Ok(-inverse),
-            None => Err(singular(determinant)),
-        }
+        geometry.force_map(q, true).ok_or_else(singular)
     }
 
     /// As [`Robot::foot_force_map`], for any posture.
     ///
     /// Near a singularity small torques would mean any force: a stretched knee, or a foot at the height of its hip,
     /// where the abduction has no lever. There the levers are kept from getting shorter than
-    /// [`LEAST_SPAN`](super::chain::LEAST_SPAN) thigh calf over the distance of the foot and
-    /// [`LEAST_HEIGHT`](super::chain::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm; everywhere else the
+    /// [`LEAST_SPAN`](super::leg::LEAST_SPAN) thigh calf over the distance of the foot and
+    /// [`LEAST_HEIGHT`](super::leg::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm; everywhere else the
     /// matrix is the exact one.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
-        match self.geometry(leg).damped_force_map(q) {
+        match self.geometry(leg).force_map(q, false) {
             Some(map) => Ok(map),
             None => self.foot_force_map(leg, q),
         }
@@ -90,19 +84,19 @@ impl Robot {
         torque: &[f64; JOINT_DIM],
         contact: ContactFlags,
     ) -> Result<Vector6<f64>, RobotError> {
-        let mut wrench = Vector6::zeros();
+        let mut wrench = [0.0; BODY_DIM];
         for leg in Leg::down(contact) {
-            let q = leg.of_joints(joints);
-            let tau = leg.of_joints(torque);
+            let (q, tau) = (leg.of_joints(joints), leg.of_joints(torque));
+            self.require_finite(leg, "joint angle", &q)?;
             self.require_finite(leg, "torque", &tau)?;
-            let force = self.damped_force_map(leg, &q)? * Vector3::from(tau);
-            let moment = self.arm(frame, leg, &q).cross(&force);
-            for axis in 0..3 {
-                wrench[axis] += force[axis];
-                wrench[3 + axis] += moment[axis];
-            }
+            let shape = &self.geometry(leg).shape;
+            let hip = match frame {
+                WrenchFrame::Body => [0.0; 3],
+                WrenchFrame::World => self.hip_position_m[leg.index()],
+            };
+            add_wrench(shape, &hip, &q, &tau, &mut wrench);
         }
-        Ok(wrench)
+        Ok(wrench.into())
     }
 
     /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and contact, by the arms of a frame, in axes

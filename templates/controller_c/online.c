@@ -37,6 +37,10 @@
 /* Weight of the one from before the motion, in first steps. */
 #define ONLINE_PRIOR_WEIGHT (real)10.0
 
+/* Smallest |det J|, divided by LegShape::volume, at which torques still give a foot force: a knee about 1e-3 rad
+ * from full extension. */
+#define ONLINE_SINGULAR_BOUND (real)1e-3
+
 /* Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all multipliers near one and
  * needs two iterations more if it has to bring them to 100. */
 #define ONLINE_SLACK_PRICE (real)10.0
@@ -65,6 +69,44 @@ typedef struct {
     int sample;
     real share;
 } online_instant;
+
+/* A leg in the frame of its plane at the zero posture. */
+typedef struct {
+    /* Shares of forward, normal and up, in the body's axes, that stay as the first joint turns. */
+    real fixed[3][3];
+    /* Shares that its cosine multiplies. */
+    real cosine[3][3];
+    /* Shares that its sine multiplies. */
+    real sine[3][3];
+    /* Axis of the first joint. */
+    real axis[3];
+    /* From the first joint to the foot, without thigh and calf in the plane, m. */
+    real hip[3];
+    /* Forward and up, m. */
+    real thigh[2];
+    /* Forward and up, m. */
+    real calf[2];
+    /* 1 where the third joint turns as the second does, -1 where it turns against it. */
+    real knee;
+    /* Area that thigh and calf span (m^2) and height of the foot (m) below which they are damped. */
+    real least[2];
+    /* Thigh times calf times their sum, m^3, which bounds |det J|. */
+    real volume;
+} online_leg_shape;
+
+/* Where the foot is and how the joints move it, in the frame of the leg's plane. */
+typedef struct {
+    /* The frame in the body's axes. */
+    real frame[3][3];
+    /* Foot from the first joint, m. */
+    real foot[3];
+    /* Velocity of the foot per velocity of the first joint. */
+    real by_first[3];
+    /* From the second joint to the foot: forward and up. */
+    real limb[2];
+    /* From the third joint to the foot. */
+    real calf[2];
+} online_posture;
 
 /* Nodes of the classical Runge-Kutta method: the internal state is x + node . h . previous slope. */
 static const real ONLINE_NODES[4] = {(real)0.0, (real)0.5, (real)0.5, (real)1.0};
@@ -814,6 +856,215 @@ static inline MAYBE_UNUSED void online_change_rows(const real *hessian, const re
         for (int j = 0; j < 12; ++j) {
             rows[12 * row + j] = changed[j];
         }
+    }
+}
+
+/* Turns a leg whose foot is along the normal where it should be; of sines and cosines the third is that of the
+ * calf's angle, the sum of the second and third joint's. */
+static inline MAYBE_UNUSED void online_posture_turn(online_posture *restrict self, const online_leg_shape *leg,
+        const real *sine, const real *cosine)
+{
+    for (int k = 0; k < 3; ++k) {
+        for (int i = 0; i < 3; ++i) {
+            const real turned = cosine[0] * leg->cosine[k][i] + sine[0] * leg->sine[k][i];
+            self->frame[k][i] = turned + leg->fixed[k][i];
+        }
+    }
+    self->calf[0] = sine[2] * leg->calf[1] + cosine[2] * leg->calf[0];
+    self->calf[1] = cosine[2] * leg->calf[1] - sine[2] * leg->calf[0];
+    self->limb[0] = sine[1] * leg->thigh[1] + cosine[1] * leg->thigh[0] + self->calf[0];
+    self->limb[1] = cosine[1] * leg->thigh[1] - sine[1] * leg->thigh[0] + self->calf[1];
+    self->foot[0] = self->limb[0] + leg->hip[0];
+    self->foot[2] = self->limb[1] + leg->hip[2];
+    self->by_first[0] = self->foot[2] * leg->axis[1] - self->foot[1] * leg->axis[2];
+    self->by_first[1] = self->foot[0] * leg->axis[2] - self->foot[2] * leg->axis[0];
+    self->by_first[2] = self->foot[1] * leg->axis[0] - self->foot[0] * leg->axis[1];
+}
+
+/* Turns a leg by the angles of its joints, rad. */
+static inline MAYBE_UNUSED void online_posture_bend(online_posture *restrict self, const online_leg_shape *leg,
+        const real *q)
+{
+    const real calf = q[1] + leg->knee * q[2];
+    real sine[3] = {SIN(q[0]), SIN(q[1]), SIN(calf)};
+    real cosine[3] = {COS(q[0]), COS(q[1]), COS(calf)};
+    self->foot[1] = leg->hip[1];
+    online_posture_turn(self, leg, sine, cosine);
+}
+
+/* Writes a vector of the frame in the body's axes. */
+static inline MAYBE_UNUSED void online_posture_write_in_body(online_posture *self, const real *vector,
+        real out[restrict 3])
+{
+    for (int i = 0; i < 3; ++i) {
+        out[i] = self->frame[0][i] * vector[0] + self->frame[1][i] * vector[1] + self->frame[2][i] * vector[2];
+    }
+}
+
+/* Area that thigh and calf span, with its sign, m^2. */
+static inline MAYBE_UNUSED real online_posture_area(online_posture *self)
+{
+    return self->limb[1] * self->calf[0] - self->limb[0] * self->calf[1];
+}
+
+/* Lever of the first joint along the normal, m; times the area it is det J, up to the sign. */
+static inline MAYBE_UNUSED real online_posture_lever(online_posture *self)
+{
+    return -self->by_first[1];
+}
+
+/* Writes J[i][j] = d p_i / d q_j of the foot in the body's axes, m. */
+static inline MAYBE_UNUSED void online_posture_write_jacobian(online_posture *self, const online_leg_shape *leg,
+        real jacobian[restrict 3][3])
+{
+    real first[3] = {0};
+    online_posture_write_in_body(self, self->by_first, first);
+    for (int i = 0; i < 3; ++i) {
+        const real forward = self->frame[0][i];
+        const real up = self->frame[2][i];
+        jacobian[i][0] = first[i];
+        jacobian[i][1] = forward * self->limb[1] - up * self->limb[0];
+        jacobian[i][2] = leg->knee * (forward * self->calf[1] - up * self->calf[0]);
+    }
+}
+
+/* Writes -J^-T by cofactors; false if there is none. */
+static inline MAYBE_UNUSED bool online_minus_inverse_transpose(real j[3][3], real out[restrict 3][3])
+{
+    const real minor_0 = j[1][1] * j[2][2] - j[1][2] * j[2][1];
+    const real minor_1 = j[0][1] * j[2][2] - j[0][2] * j[2][1];
+    const real minor_2 = j[0][1] * j[1][2] - j[0][2] * j[1][1];
+    const real det = j[0][0] * minor_0 - j[1][0] * minor_1 + j[2][0] * minor_2;
+    if (det == 0 || !solver_is_finite_number(det)) {
+        return false;
+    }
+    out[0][0] = -(minor_0 / det);
+    out[1][0] = minor_1 / det;
+    out[2][0] = -(minor_2 / det);
+    out[0][1] = -((j[1][2] * j[2][0] - j[1][0] * j[2][2]) / det);
+    out[0][2] = -((j[1][0] * j[2][1] - j[1][1] * j[2][0]) / det);
+    out[1][1] = -((j[2][2] * j[0][0] - j[2][0] * j[0][2]) / det);
+    out[1][2] = -((j[2][0] * j[0][1] - j[2][1] * j[0][0]) / det);
+    out[2][1] = -((j[0][2] * j[1][0] - j[0][0] * j[1][2]) / det);
+    out[2][2] = -((j[0][0] * j[1][1] - j[0][1] * j[1][0]) / det);
+    return true;
+}
+
+/* 1 / d, but d / least^2 where |d| is below the least. */
+static inline MAYBE_UNUSED real online_damped_reciprocal(real d, real least)
+{
+    const real square = d * d;
+    const real smallest = least * least;
+    return square > smallest ? d / square : d / smallest;
+}
+
+/* Writes -J^-T with damped levers. */
+static inline MAYBE_UNUSED void online_posture_write_damped(online_posture *self, const online_leg_shape *leg,
+        real map[restrict 3][3])
+{
+    const real of_area = online_damped_reciprocal(online_posture_area(self), leg->least[0]);
+    const real of_lever = online_damped_reciprocal(online_posture_lever(self), leg->least[1]);
+    const real calf = -of_area;
+    const real limb = leg->knee * of_area;
+    real forward[3] = {0, self->calf[0] * calf, self->limb[0] * limb};
+    real up[3] = {0, self->calf[1] * calf, self->limb[1] * limb};
+    for (int j = 0; j < 3; ++j) {
+        const real own = j == 0 ? 1 : 0;
+        const real by_plane = self->by_first[0] * forward[j] + self->by_first[2] * up[j];
+        real force[3] = {forward[j], (own + by_plane) * of_lever, up[j]};
+        real column[3] = {0};
+        online_posture_write_in_body(self, force, column);
+        for (int i = 0; i < 3; ++i) {
+            map[i][j] = column[i];
+        }
+    }
+}
+
+/* Writes -J^-T of a leg, which takes its torques (N m) to its force on the body (N), and where its foot is from the
+ * first joint, m. With levers that are never shorter than the least; or exact, then false where the leg is stretched. */
+static inline MAYBE_UNUSED bool online_write_force_map(const online_leg_shape *leg, const real *q, bool is_exact,
+        real map[restrict 3][3], real foot[restrict 3])
+{
+    online_posture posture = {.frame = {{0}}, .foot = {0}, .by_first = {0}, .limb = {0}, .calf = {0}};
+    online_posture_bend(&posture, leg, q);
+    online_posture_write_in_body(&posture, posture.foot, foot);
+    const real area = solver_magnitude(online_posture_area(&posture));
+    const real lever = solver_magnitude(online_posture_lever(&posture));
+    if (is_exact && area * lever / leg->volume < ONLINE_SINGULAR_BOUND) {
+        return false;
+    }
+    if (is_exact || (area >= leg->least[0] && lever >= leg->least[1])) {
+        real jacobian[3][3] = {{0}};
+        online_posture_write_jacobian(&posture, leg, jacobian);
+        return online_minus_inverse_transpose(jacobian, map);
+    }
+    online_posture_write_damped(&posture, leg, map);
+    return true;
+}
+
+/* Writes the moment of a force at a foot about where its hip is from. */
+static inline MAYBE_UNUSED void online_write_moment(const real *hip, const real *foot, const real *force,
+        real *restrict moment)
+{
+    real arm[3] = {hip[0] + foot[0], hip[1] + foot[1], hip[2] + foot[2]};
+    moment[0] = arm[1] * force[2] - arm[2] * force[1];
+    moment[1] = arm[2] * force[0] - arm[0] * force[2];
+    moment[2] = arm[0] * force[1] - arm[1] * force[0];
+}
+
+/* Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false
+ * if they are not finite. */
+static inline MAYBE_UNUSED bool online_add_wrench(const online_leg_shape *leg, const real *hip, const real *q,
+        const real *torque, real *restrict wrench)
+{
+    real map[3][3] = {{0}};
+    real arm[3] = {0};
+    const bool is_finite = solver_is_finite_number(torque[0]) && solver_is_finite_number(torque[1])
+            && solver_is_finite_number(torque[2]);
+    if (!is_finite || !online_write_force_map(leg, q, false, map, arm)) {
+        return false;
+    }
+    real force[3] = {0};
+    for (int i = 0; i < 3; ++i) {
+        force[i] = map[i][0] * torque[0] + map[i][1] * torque[1] + map[i][2] * torque[2];
+    }
+    real moment[3] = {0};
+    online_write_moment(hip, arm, force, moment);
+    for (int i = 0; i < 3; ++i) {
+        wrench[i] += force[i];
+        wrench[3 + i] += moment[i];
+    }
+    return true;
+}
+
+/* Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to
+ * the generalised moments of roll, pitch and yaw, which are the angles (rad). */
+static inline MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turned[restrict 3][3],
+        real rates[restrict 3][3])
+{
+    const real sr = SIN(attitude[0]);
+    const real cr = COS(attitude[0]);
+    const real sp = SIN(attitude[1]);
+    const real cp = COS(attitude[1]);
+    const real sy = SIN(attitude[2]);
+    const real cy = COS(attitude[2]);
+    turned[0][0] = cy * cp;
+    turned[0][1] = cy * sp * sr - sy * cr;
+    turned[0][2] = cy * sp * cr + sy * sr;
+    turned[1][0] = sy * cp;
+    turned[1][1] = sy * sp * sr + cy * cr;
+    turned[1][2] = sy * sp * cr - cy * sr;
+    turned[2][0] = -sp;
+    turned[2][1] = cp * sr;
+    turned[2][2] = cp * cr;
+    rates[0][0] = 1;
+    rates[0][1] = 0;
+    rates[0][2] = 0;
+    rates[1][0] = 0;
+    rates[1][1] = cr;
+    rates[1][2] = -sr;
+    for (int i = 0; i < 3; ++i) {
+        rates[2][i] = turned[2][i];
     }
 }
 

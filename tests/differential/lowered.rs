@@ -142,3 +142,15 @@ fn sign_is_zero_at_zero_and_nan_of_nan() {
     let results = Interpreter::<f32>::new(&program).results(&[vec![f32::NAN; 5]]);
     assert!(results[0][0].is_nan());
 }
+
+#[test]
+fn number_that_is_not_finite_is_refused_with_its_statement() {
+    let mut builder = ProgramBuilder::new("p");
+    let x = builder.input("x", 1)[0];
+    let infinite = builder.constant(f64::INFINITY);
+    let y = builder.binary(Binary::Add, x, infinite);
+    builder.output("y", &[y]);
+    let error = builder.finish().expect_err("infinite");
+    let expected = "program `p`: statement 1 holds the non-finite constant inf";
+    assert_eq!(error.to_string(), expected);
+}

@@ -1,11 +1,11 @@
 //! Joints, legs, forces and inputs of robots: formulas against differences, virtual work and a physics engine.
 
-use nalgebra::{SVector, Vector3, Vector6};
+use nalgebra::{Matrix3, Rotation3, SVector, Unit, Vector3, Vector6};
 use romc::robot::input_rule::rotation;
 use romc::robot::joints::LEG_JOINT_DIM;
 use romc::robot::{
-    Actuators, ChainLeg, ContactFlags, InputRule, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry,
-    PlanarLeg, Robot, RobotError, STATE_DIM, WrenchFrame,
+    Actuators, ContactFlags, InputRule, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, Robot,
+    RobotError, STATE_DIM, WrenchFrame,
 };
 
 #[test]
@@ -47,20 +47,16 @@ fn losses_oppose_the_motion_and_are_dry_friction_alone_when_slow() {
     assert!((slow - 0.5).abs() < 1e-8, "{slow}");
 }
 
-const LEG: PlanarLeg = PlanarLeg {
-    hip_m: 0.08,
-    thigh_m: 0.213,
-    calf_m: 0.21,
-    foot_forward_m: 0.0,
-};
-const RIGHT: PlanarLeg = PlanarLeg {
-    hip_m: -0.08,
-    ..LEG
-};
-const BENT: PlanarLeg = PlanarLeg {
-    foot_forward_m: -0.03,
-    ..LEG
-};
+/// A leg of the usual shape, with its hip to one side and its foot before the calf.
+fn usual(hip_m: f64, forward_m: f64) -> LegGeometry {
+    let [x, y] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let links = [
+        [0.0, hip_m, 0.0],
+        [0.0, 0.0, -0.213],
+        [forward_m, 0.0, -0.21],
+    ];
+    LegGeometry::new([x, y, y], links)
+}
 
 fn postures() -> Vec<[f64; 3]> {
     let mut out = Vec::new();
@@ -74,65 +70,83 @@ fn postures() -> Vec<[f64; 3]> {
     out
 }
 
-/// Tilted axes, the last two parallel, links in all directions.
-fn odd() -> ChainLeg {
+/// Tilted axes, the last two parallel, of the same or of opposite directions, links in all directions.
+fn odd(knee: f64) -> LegGeometry {
     let bend = Vector3::new(0.1, -0.9, 0.3).normalize();
-    ChainLeg {
-        axes: [
-            Vector3::new(0.8, 0.1, -0.4).normalize().into(),
-            bend.into(),
-            bend.into(),
-        ],
-        links: [[0.06, 0.09, -0.01], [0.02, 0.1, -0.28], [0.08, 0.01, -0.3]],
-    }
+    let axes = [
+        Vector3::new(0.8, 0.1, -0.4).normalize().into(),
+        bend.into(),
+        (knee * bend).into(),
+    ];
+    LegGeometry::new(
+        axes,
+        [[0.06, 0.09, -0.01], [0.02, 0.1, -0.28], [0.08, 0.01, -0.3]],
+    )
+}
+
+fn legs() -> [LegGeometry; 5] {
+    [
+        usual(0.08, 0.0),
+        usual(-0.08, 0.0),
+        usual(0.08, -0.03),
+        odd(1.0),
+        odd(-1.0),
+    ]
 }
 
 #[test]
-fn chain_of_planar_links_is_the_planar_leg_damping_included() {
-    let chain = LegGeometry::Planar(BENT).chain();
-    // Lengths of a bent foot count as the calf's, a little more than along the calf.
-    let straight = LegGeometry::Planar(LEG);
-    let straight_chain = LegGeometry::Chain(straight.chain());
-    let mut damped = 0;
-    let stretched = [-0.05, 0.4].map(|knee| [0.6, 0.3, knee]);
-    for q in postures().into_iter().chain(stretched) {
-        assert!((chain.foot_position(&q) - BENT.foot_position(&q)).norm() < 1e-15);
-        assert!((chain.foot_jacobian(&q) - BENT.foot_jacobian(&q)).norm() < 1e-15);
-        match [&straight_chain, &straight].map(|leg| leg.damped_force_map(&q)) {
-            [None, None] => {}
-            [Some(a), Some(b)] => {
-                assert!((a - b).norm() < 1e-11 * b.norm(), "{q:?}: {a} {b}");
-                damped += 1;
-            }
-            [a, b] => panic!("{q:?}: {a:?} {b:?}"),
+fn foot_and_jacobian_are_those_of_turns_about_one_axis_after_the_other() {
+    for (leg, q) in legs()
+        .iter()
+        .flat_map(|leg| postures().into_iter().map(move |q| (leg, q)))
+    {
+        let (mut foot, mut turned) = (Vector3::zeros(), Rotation3::identity());
+        let mut joints = Vec::new();
+        for ((axis, link), angle) in leg.axes.iter().zip(&leg.links).zip(q) {
+            let axis = Vector3::from(*axis);
+            joints.push((turned * axis, foot));
+            turned *= Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle);
+            foot += turned * Vector3::from(*link);
         }
+        let columns: Vec<_> = (joints.iter())
+            .map(|(axis, joint)| axis.cross(&(foot - joint)))
+            .collect();
+        assert!((leg.foot_position(&q) - foot).norm() < 1e-14, "{q:?}");
+        let jacobian = Matrix3::from_columns(&columns);
+        assert!((leg.foot_jacobian(&q) - jacobian).norm() < 1e-14, "{q:?}");
     }
-    assert!(damped > 5);
 }
 
 #[test]
 fn damping_begins_where_the_exact_inverse_ends() {
-    let chain = LegGeometry::Chain(odd());
-    let exact = |q: &[f64; 3]| -chain.foot_jacobian(q).transpose().try_inverse().unwrap();
-    // From bent to stretched: the first damped posture is still almost undamped.
-    let mut last = None;
-    for k in 0..4000 {
-        let q = [0.2, 0.3, -1.5 + 1.2 * f64::from(k) / 4000.0];
-        if let Some(damped) = chain.damped_force_map(&q) {
-            last = Some((damped - exact(&q)).norm() / damped.norm());
-            break;
+    for leg in legs() {
+        let exact = |q: &[f64; 3]| -leg.foot_jacobian(q).transpose().try_inverse().unwrap();
+        // From bent to stretched: the first damped posture is still almost undamped.
+        let mut last = None;
+        for k in 0..4000 {
+            let q = [
+                0.2,
+                0.3,
+                leg.shape.knee * (-1.5 + 1.5 * f64::from(k) / 4000.0),
+            ];
+            let map = leg.force_map(&q, false).unwrap();
+            match leg.spans(&q)[0] >= 0.3 && leg.spans(&q)[1] >= 0.12 {
+                true => assert_eq!(map, exact(&q)),
+                false => {
+                    last = Some((map - exact(&q)).norm() / map.norm());
+                    break;
+                }
+            }
         }
+        assert!(last.is_some_and(|change| change < 0.02), "{last:?}");
     }
-    assert!(last.is_some_and(|change| change < 0.02), "{last:?}");
 }
 
 #[test]
 fn manipulability_is_the_normalised_determinant() {
-    for geometry in [LEG, RIGHT, BENT] {
+    for leg in legs() {
         for q in postures() {
-            let determinant = geometry.foot_jacobian(&q).determinant();
-            let leg = LegGeometry::Planar(geometry);
-            let expected = determinant.abs() / leg.volume_m3();
+            let expected = leg.foot_jacobian(&q).determinant().abs() / leg.shape.volume;
             assert!((leg.manipulability(&q) - expected).abs() < 1e-13, "{q:?}");
         }
     }

@@ -7,7 +7,9 @@ use super::interface::{ModelInterface, computes_angles};
 use super::model_text::{KernelText, ModelText};
 use super::options::{CodegenError, Precision, SineCosine};
 use super::script::C;
-use super::test_vectors::{N_POINTS, ParameterVectors, TOLERANCE_F64, TestVectors};
+use super::test_vectors::{
+    self, FunctionVectors, N_BATCH, N_POINTS, ParameterVectors, TOLERANCE_F64,
+};
 use crate::files::EmittedFile;
 use crate::ir::{Binary, Statement, Unary};
 
@@ -40,14 +42,11 @@ enum File<'a> {
         /// Of results, which have all digits in either precision.
         wide: &'a Dialect,
         latent_dim: usize,
-        vectors: TestVectors<'a>,
+        functions: Vec<FunctionVectors<'a>>,
     },
 }
 
 /// The C files of a model; `provenance` is the text of the first line.
-///
-/// # Errors
-/// [`CodegenError::Template`] if a template fails.
 pub fn emit(
     entries: &ModelInterface,
     provenance: &str,
@@ -73,7 +72,7 @@ pub fn emit(
         d,
         wide: &Dialect::new(&C, name, Precision::Double),
         latent_dim: entries.latent_dim,
-        vectors: TestVectors::new(entries, precision),
+        functions: test_vectors::all(entries, precision),
     };
     let cmake = File::CMake {
         banner: format!("# {provenance}"),

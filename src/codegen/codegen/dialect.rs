@@ -12,7 +12,7 @@ use super::options::Precision;
 use crate::ir::{Table, Unary};
 
 /// The patterns of a language. Those with two entries are for double and single precision.
-pub struct Spelling {
+pub(crate) struct Spelling {
     /// Words that no variable may be called, with blanks between them.
     pub reserved: &'static str,
     pub reals: [&'static str; 2],
@@ -97,7 +97,6 @@ impl Dialect {
         self.spelling.reals[usize::from(self.precision.is_single())]
     }
 
-    /// What literals and library functions of that type end with.
     pub(crate) fn suffix(&self) -> &'static str {
         self.spelling.suffixes[usize::from(self.precision.is_single())]
     }
@@ -174,7 +173,7 @@ impl Dialect {
         }
     }
 
-    pub fn table(&self, name: &Ident, table: &Table) -> String {
+    pub(crate) fn table(&self, name: &Ident, table: &Table) -> String {
         let [open, between, close] = self.spelling.rows;
         let row = |row: &[f64]| {
             let entries: Vec<String> = row.iter().map(|&entry| self.literal(entry)).collect();
@@ -281,7 +280,7 @@ impl Span {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub(crate) enum Role {
     Input,
     Output,
     InOut,
@@ -290,14 +289,14 @@ pub enum Role {
 
 /// A parameter of a generated function, in a language or, with a text for a name, in any.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Parameter<N = Ident> {
+pub(crate) struct Parameter<N = Ident> {
     pub name: N,
     /// Number of elements; an output may have none.
     pub len: usize,
     pub role: Role,
 }
 
-pub struct Function {
+pub(crate) struct Function {
     pub name: Ident,
     pub docs: Vec<String>,
     pub parameters: Vec<Parameter>,
@@ -334,7 +333,6 @@ impl Function {
         self.of(&[Role::Output])
     }
 
-    /// Whether a statement mentions a table or a function.
     pub(crate) fn mentions(&self, name: &str) -> bool {
         self.body.contains(&format!("{name}[")) || self.body.contains(&format!("{name}("))
     }
@@ -385,23 +383,4 @@ pub fn tidy(text: &str) -> String {
     }
     tidied.truncate(tidied.trim_end_matches('\n').len() + 1);
     tidied
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn comments_keep_paragraphs_and_tidy_text_has_single_blank_lines_and_one_newline_at_its_end() {
-        let lines = comment_lines(&["one two three".to_owned(), "four".to_owned()], 9);
-        assert_eq!(lines, ["one two", "  three", "four"]);
-        for (text, tidied) in [
-            ("", ""),
-            ("\n \n", ""),
-            ("a", "a\n"),
-            ("\n\na  \n\n \nb\n\n", "a\n\nb\n"),
-        ] {
-            assert_eq!(tidy(text), tidied, "{text:?}");
-        }
-    }
 }

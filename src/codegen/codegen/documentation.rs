@@ -5,12 +5,10 @@ use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::lower::LowerError;
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::robot::WrenchFrame;
-use crate::robot::chain::{LEAST_HEIGHT, LEAST_SPAN};
+use crate::robot::leg::{LEAST_HEIGHT, LEAST_SPAN};
 
-/// Longest equation that documentation spells out, in terms.
 const MOST_TERMS: usize = 40;
 
-/// Of the generalised inputs and of the torques of the motors.
 pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerError> {
     let robot = model.robot()?.name();
     let axes = match model.wrench_frame() {
@@ -102,7 +100,6 @@ const MAPS: [[&str; 3]; 6] = [
     ],
 ];
 
-/// Of the maps, in the order of [`Map::ALL`](crate::lower::Map::ALL).
 pub(super) fn of_maps(
     model: &ReducedModel,
     units: Units,

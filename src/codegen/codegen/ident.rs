@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 use std::fmt;
 
-use crate::ir::Table;
+use crate::ir::{FUNCTIONS, Table};
 
 /// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Ident(String);
+pub(crate) struct Ident(String);
 
 impl Ident {
     pub(crate) fn as_str(&self) -> &str {
@@ -27,9 +27,10 @@ pub(crate) struct Namer {
 }
 
 impl Namer {
-    /// A scope in which the words of the target are taken, which are a text with blanks between them.
+    /// A scope in which functions and the words of the target are taken, which are a text with blanks between them.
     pub(crate) fn new(reserved: &str) -> Self {
-        let used = reserved.split_whitespace().map(str::to_owned).collect();
+        let used = reserved.split_whitespace().chain(FUNCTIONS);
+        let used = used.map(str::to_owned).collect();
         Self { used }
     }
 

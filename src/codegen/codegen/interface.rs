@@ -8,9 +8,8 @@ use crate::ir::{Program, Statement};
 use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
 use crate::model::{ModelError, ReducedModel};
 
-/// A function to be generated from a program.
 #[derive(Clone, Debug)]
-pub struct FunctionSpec {
+pub(crate) struct FunctionSpec {
     pub name: String,
     pub program: Program,
     pub parameters: Vec<Parameter<String>>,
@@ -20,10 +19,10 @@ pub struct FunctionSpec {
 #[derive(Clone, Debug)]
 pub struct PhaseInterface {
     pub identifier: String,
-    pub dynamics: FunctionSpec,
-    pub jacobian: FunctionSpec,
+    pub(crate) dynamics: FunctionSpec,
+    pub(crate) jacobian: FunctionSpec,
     pub pattern: JacobianPattern,
-    pub step: FunctionSpec,
+    pub(crate) step: FunctionSpec,
 }
 
 /// Everything that is generated for a model.
@@ -38,16 +37,12 @@ pub struct ModelInterface {
     pub latent_dim: usize,
     /// Number of robot coordinates, if the model speaks of any.
     pub state_dim: Option<usize>,
-    /// The generalised inputs and the maps, where the model has the data for them.
-    pub maps: Vec<FunctionSpec>,
+    pub(crate) maps: Vec<FunctionSpec>,
     pub phases: Vec<PhaseInterface>,
 }
 
 impl ModelInterface {
     /// Lowers all functions of a model.
-    ///
-    /// # Errors
-    /// [`LowerError`] if a phase cannot be lowered.
     pub fn new(system: &Equations<'_>, form: Form, units: Units) -> Result<Self, LowerError> {
         let model = &units.convert(system.model())?;
         let phases = (0..model.phases().len())

@@ -10,7 +10,6 @@ use crate::ir::Binary;
 use crate::ir::interpret::{double, single};
 use crate::lower::JacobianPattern;
 
-/// What the files of all languages hold of a model.
 pub(crate) struct ModelText<'a> {
     pub entries: &'a ModelInterface,
     pub tables: Vec<(Ident, String)>,
@@ -90,7 +89,6 @@ impl<'a> ModelText<'a> {
     }
 }
 
-/// The constants of the sine-and-cosine kernel.
 pub(crate) struct KernelText {
     pub limit: String,
     pub two_over_pi: String,

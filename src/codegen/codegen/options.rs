@@ -27,7 +27,7 @@ impl Precision {
 
     /// A finite number with the fewest digits that read back to the nearest number of this precision, always with a
     /// point or an exponent, so that it is no integer in any target.
-    pub(crate) fn digits(self, value: f64) -> String {
+    pub fn digits(self, value: f64) -> String {
         assert!(value.is_finite(), "numbers of programs are finite");
         match self {
             Self::Double => format!("{value:?}"),
@@ -61,9 +61,6 @@ impl Precision {
     }
 
     /// Whether every constant of the functions is finite in this precision.
-    ///
-    /// # Errors
-    /// [`CodegenError::BeyondSingle`] for the first that is not.
     pub fn check(self, entries: &ModelInterface) -> Result<(), CodegenError> {
         let beyond =
             |entry: &FunctionSpec| Some((entry.name.clone(), beyond_single(&entry.program)?));
@@ -147,40 +144,4 @@ pub enum CodegenError {
     /// A template failed to render.
     #[error("a template failed")]
     Template(#[from] askama::Error),
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn literals_read_back_to_the_nearest_number_and_are_no_integers() {
-        for value in [
-            0.36,
-            -0.0,
-            5e-324,
-            1e16,
-            123_456_789.0,
-            0.1 + 0.2,
-            1e-44,
-            16_777_217.0,
-        ] {
-            let [double, single] =
-                [Precision::Double, Precision::Single].map(|of| of.digits(value));
-            assert_eq!(
-                double.parse().map(f64::to_bits),
-                Ok(value.to_bits()),
-                "{double}"
-            );
-            assert_eq!(
-                single.parse().map(f32::to_bits),
-                Ok((value as f32).to_bits())
-            );
-            assert!(
-                [double, single]
-                    .iter()
-                    .all(|text| text.contains(['.', 'e']))
-            );
-        }
-    }
 }

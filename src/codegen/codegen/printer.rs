@@ -4,7 +4,6 @@ use super::dialect::{Dialect, Index};
 use super::ident::Ident;
 use crate::ir::{Binary, Unary};
 
-/// Longest line before an expression is broken, in characters.
 const WIDTH: usize = 100;
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -57,7 +56,6 @@ impl Text {
     }
 }
 
-/// Expressions.
 impl Dialect {
     pub(crate) fn constant(&self, value: f64) -> Text {
         let binds = match value.is_sign_negative() {
@@ -67,7 +65,6 @@ impl Dialect {
         Text::new(self.literal(value), binds, 0)
     }
 
-    /// `array[index]`
     pub(crate) fn element(&self, array: &Ident, index: &Index) -> Text {
         let words = [("name", array.as_str()), ("i", &self.subscript(index))];
         let place = (array.clone(), index.offset);
@@ -77,7 +74,6 @@ impl Dialect {
         }
     }
 
-    /// `table[row][col]`
     pub(crate) fn entry(&self, table: &Ident, row: &Index, col: &Index) -> Text {
         let [row, col] = [row, col].map(|index| self.subscript(index));
         let words = [("name", table.as_str()), ("i", &row), ("j", &col)];
@@ -173,7 +169,6 @@ fn multiply_added(op: Binary, a: &Text, b: &Text) -> Option<[String; 3]> {
     Some([x.clone(), y.clone(), rest])
 }
 
-/// Prints statements in one dialect, at a depth of indentation.
 pub(crate) struct Printer<'a> {
     pub dialect: &'a Dialect,
     depth: usize,
@@ -219,7 +214,6 @@ impl<'a> Printer<'a> {
         self.statement(self.dialect.spelling.assignment, &words);
     }
 
-    /// `target += value` in a loop.
     pub(crate) fn add_assign(&mut self, target: &Text, value: &Text) {
         match self
             .dialect
@@ -238,7 +232,6 @@ impl<'a> Printer<'a> {
         }
     }
 
-    /// Sine and cosine of one argument by the kernel's core.
     pub(crate) fn sin_cos_lane(&mut self, argument: &Text, names: &[Ident; 2], used: [bool; 2]) {
         let spelling = self.dialect.spelling;
         let [sine, cosine] = [0, 1].map(|which| match spelling.unused_lane {
@@ -255,7 +248,6 @@ impl<'a> Printer<'a> {
         }
     }
 
-    /// A loop of the variable from 0 to below the count.
     pub(crate) fn looped(&mut self, variable: &Ident, count: usize, body: impl FnOnce(&mut Self)) {
         let spelling = self.dialect.spelling;
         let [n, last] = [count, count - 1].map(|bound| bound.to_string());

@@ -8,7 +8,7 @@ use super::interface::{ModelInterface, computes_angles};
 use super::model_text::{KernelText, ModelText};
 use super::options::{CodegenError, Precision, SineCosine};
 use super::script::RUST;
-use super::test_vectors::{N_POINTS, ParameterVectors, TestVectors};
+use super::test_vectors::{self, FunctionVectors, N_BATCH, N_POINTS, ParameterVectors};
 use crate::files::EmittedFile;
 
 #[derive(Template)]
@@ -32,14 +32,11 @@ enum File<'a> {
         /// Of results, which have all digits in either precision.
         wide: &'a Dialect,
         latent_dim: usize,
-        vectors: TestVectors<'a>,
+        functions: Vec<FunctionVectors<'a>>,
     },
 }
 
 /// The crate of a model; `provenance` is the text of each file's first line.
-///
-/// # Errors
-/// [`CodegenError::Template`] if a template fails.
 pub fn emit(
     entries: &ModelInterface,
     provenance: &str,
@@ -66,7 +63,7 @@ pub fn emit(
         d,
         wide: &Dialect::new(&RUST, name, Precision::Double),
         latent_dim: entries.latent_dim,
-        vectors: TestVectors::new(entries, precision),
+        functions: test_vectors::all(entries, precision),
     };
     let files = [
         ("Cargo.toml", cargo),

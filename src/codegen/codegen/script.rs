@@ -62,9 +62,6 @@ enum File<'a> {
 
 impl Script {
     /// The file of a model; `provenance` is the text of the first line.
-    ///
-    /// # Errors
-    /// [`CodegenError::Template`] if a template fails.
     pub fn emit(
         self,
         entries: &ModelInterface,
@@ -147,7 +144,6 @@ fn tuple(numbers: &[usize]) -> String {
     }
 }
 
-/// Numbers of a column, counted from one.
 fn column(numbers: &[usize]) -> String {
     if numbers.is_empty() {
         return "zeros(0, 1)".to_owned();
@@ -156,14 +152,14 @@ fn column(numbers: &[usize]) -> String {
 }
 
 /// C99. Reserved are the keywords of C and C++, and the library names that generated files use.
-pub const C: Spelling = Spelling {
+pub(crate) const C: Spelling = Spelling {
     reserved: "
     auto break case char const continue default do double else enum extern float for goto if inline
     int long register restrict return short signed sizeof static struct switch typedef union
     unsigned void volatile while bool true false catch class delete explicit export friend mutable
     namespace new noexcept nullptr operator private protected public template this throw try typeid
-    typename using virtual and or not xor main sin cos tan tanh exp log pow sqrt fabs memcpy size_t
-    uint64_t y0 y1 yn j0 j1 jn gamma signgam abs asm typeof constexpr concept requires import module
+    typename using virtual and or not xor main sin cos pow fabs memcpy size_t
+    uint64_t y0 y1 yn j0 j1 jn gamma signgam asm typeof constexpr concept requires import module
     alignas alignof static_assert thread_local decltype div index time erf I NULL errno stdin stdout
     stderr
 ",
@@ -300,8 +296,7 @@ pub(crate) const MATLAB: Spelling = Spelling {
     arguments break case catch classdef continue else elseif end for function global if otherwise
     parfor persistent return spmd switch try while do until unwind_protect end_try_catch endif
     endfor endwhile endfunction endswitch methods properties events enumeration columns rows_of
-    model n zeros size numel repmat cell max error nargin sin cos tan tanh exp log sqrt abs sign
-    power select
+    model n zeros size numel repmat cell max error nargin sin cos power select
 ",
     scalar: "$name = $value;",
     array: "$name = rows_of(n, $value);",

@@ -3,7 +3,7 @@
 //! Points of self-tests, where possible those at which the functions have finite values.
 
 use super::dialect::Role;
-use super::interface::{FunctionSpec, ModelInterface, PhaseInterface};
+use super::interface::{FunctionSpec, ModelInterface};
 use super::options::Precision;
 use crate::ir::{Binary, Interpreter, Slot, Statement, Unary};
 use crate::robot::JOINT_DIM;
@@ -23,52 +23,15 @@ const TOLERANCE_F32: f64 = 1e-4;
 /// round otherwise.
 const ERROR_MARGIN: f64 = 16.0;
 
-pub(crate) struct TestVectors<'a> {
-    pub functions: Vec<FunctionVectors<'a>>,
-    pub batches: Vec<Batch<'a>>,
-}
-
-impl<'a> TestVectors<'a> {
-    pub(crate) fn new(entries: &'a ModelInterface, precision: Precision) -> Self {
-        let batches = entries.phases.iter();
-        Self {
-            functions: entries
-                .all()
-                .map(|entry| vectors(entry, precision))
-                .collect(),
-            batches: batches.map(|phase| Batch::new(phase, precision)).collect(),
-        }
-    }
-}
-
-pub(crate) struct Batch<'a> {
-    pub phase: &'a str,
-    /// First elements of the arrays, and an angle that the batch meets.
-    pub points: BatchPoints,
-    pub tolerance: String,
-}
-
-impl<'a> Batch<'a> {
-    fn new(phase: &'a PhaseInterface, precision: Precision) -> Self {
-        let points = BatchPoints::new(phase, precision);
-        // Single calls and the batch both have errors.
-        let of_point = |point| {
-            let point = points.at(phase, point, precision);
-            tolerances(&phase.dynamics, precision, &point.inputs, &point.outputs)
-        };
-        let largest = (0..N_BATCH).flat_map(of_point).fold(0.0, f64::max);
-        Self {
-            phase: phase.identifier.as_str(),
-            tolerance: spelled(2.0 * largest, precision),
-            points,
-        }
-    }
-}
+/// Points of the batch that self-tests run, which are those of single calls again and again.
+pub(crate) const N_BATCH: usize = 21;
 
 pub(crate) struct FunctionVectors<'a> {
     pub name: &'a str,
     pub parameters: Vec<ParameterVectors<'a>>,
     pub is_defined: bool,
+    /// Whether there is a function of the same name for batches.
+    pub has_batch: bool,
 }
 
 impl FunctionVectors<'_> {
@@ -88,12 +51,20 @@ pub(crate) struct ParameterVectors<'a> {
     pub before: Vec<Vec<f64>>,
     /// A row per point; empty for inputs.
     pub after: Vec<Vec<f64>>,
-    pub tolerance: String,
+    tolerances: Vec<String>,
 }
 
 impl ParameterVectors<'_> {
     pub(crate) fn is_written(&self) -> bool {
         matches!(self.role, Role::Output | Role::InOut)
+    }
+
+    /// The tolerance of a point: a number, or an element of an array in these brackets of a language.
+    pub(crate) fn tolerance(&self, [open, close]: &[&str; 2]) -> String {
+        match &self.tolerances[..] {
+            [first, rest @ ..] if rest.iter().all(|other| other == first) => first.clone(),
+            all => format!("{open}{}{close}[point % {N_POINTS}]", all.join(", ")),
+        }
     }
 }
 
@@ -106,43 +77,55 @@ fn spelled(bound: f64, precision: Precision) -> String {
     }
 }
 
+pub(crate) fn all(entries: &ModelInterface, precision: Precision) -> Vec<FunctionVectors<'_>> {
+    let vectors = entries.all().map(|entry| {
+        let mut phases = entries.phases.iter();
+        let has_batch = phases.any(|phase| std::ptr::eq(&phase.dynamics, entry));
+        vectors(entry, has_batch, precision)
+    });
+    vectors.collect()
+}
+
 /// The vectors of all parameters of an entry, at points where its results are finite if such points are found; inputs
-/// are numbers of the precision.
-fn vectors(entry: &FunctionSpec, precision: Precision) -> FunctionVectors<'_> {
+/// are numbers of the precision. Functions of the state are run at rest at last, those with batches at an angle beyond
+/// the limit of the inline sine at first.
+fn vectors(entry: &FunctionSpec, has_batch: bool, precision: Precision) -> FunctionVectors<'_> {
     let mut random = Random::new();
     let points = (0..N_POINTS).map(|position| {
         let point = point(entry, precision, &mut random);
         match N_POINTS - position {
+            N_POINTS if has_batch => point.far_away(entry, precision),
             1 => point.at_rest(entry, precision, &["z", "dz", "u_lat"]),
             2 => point.at_rest(entry, precision, &["dz", "u_lat"]),
             _ => point,
         }
     });
     let points: Vec<_> = points.collect();
-    let tolerances = points
-        .iter()
-        .map(|p| tolerances(entry, precision, &p.inputs, &p.outputs));
-    let tolerances: Vec<Vec<f64>> = tolerances.collect();
+    let accepted = points.iter();
+    let accepted = accepted.map(|p| tolerances(entry, precision, &p.inputs, &p.outputs));
+    let accepted: Vec<Vec<f64>> = accepted.collect();
     let place = |slots: &[Slot], name: &str| slots.iter().position(|slot| slot.name == name);
     let parameters = entry.parameters.iter().map(|parameter| {
         let read = place(entry.program.inputs(), &parameter.name);
         let written = place(entry.program.outputs(), &parameter.name);
         let before = read.map(|slot| points.iter().map(|p| p.inputs[slot].clone()).collect());
         let after = written.map(|slot| points.iter().map(|p| p.outputs[slot].clone()).collect());
-        let errors = written.map(|slot| tolerances.iter().map(|t| t[slot]).fold(0.0, f64::max));
+        let tolerance =
+            |point: &Vec<f64>| spelled(written.map_or(0.0, |slot| point[slot]), precision);
         ParameterVectors {
             role: parameter.role,
             name: &parameter.name,
             len: parameter.len,
             before: before.unwrap_or_default(),
             after: after.unwrap_or_default(),
-            tolerance: spelled(errors.unwrap_or(0.0), precision),
+            tolerances: accepted.iter().map(tolerance).collect(),
         }
     });
     FunctionVectors {
         name: &entry.name,
         parameters: parameters.collect(),
         is_defined: points.iter().any(TestPoint::is_defined),
+        has_batch,
     }
 }
 
@@ -175,8 +158,7 @@ const MAX_CHANGES: usize = 600;
 
 const REACHES: [f64; 6] = [1.0, 3.0, 0.3, 10.0, 0.1, 0.01];
 
-/// Inputs of a function and what it computes from them.
-pub(crate) struct TestPoint {
+struct TestPoint {
     pub inputs: Vec<Vec<f64>>,
     pub outputs: Vec<Vec<f64>>,
     undefined: usize,
@@ -196,7 +178,7 @@ impl TestPoint {
     /// The point with some arrays at zero, as a robot that stands still has them, if the function of the state has
     /// kinks and finite results there. A slope that is not a number there although the accelerations are counts as
     /// zero, so that the test fails.
-    pub(crate) fn at_rest(self, entry: &FunctionSpec, precision: Precision, zero: &[&str]) -> Self {
+    fn at_rest(self, entry: &FunctionSpec, precision: Precision, zero: &[&str]) -> Self {
         let is_of_state = entry.program.inputs().iter().any(|slot| slot.name == "dz");
         if !is_of_state || !entry.program.has(has_kink) {
             return self;
@@ -221,7 +203,23 @@ impl TestPoint {
         }
     }
 
-    pub(crate) fn is_defined(&self) -> bool {
+    /// The point with far angles in place of the first coordinate and the last velocity, where nothing overflows there.
+    fn far_away(self, entry: &FunctionSpec, precision: Precision) -> Self {
+        let far = match precision {
+            Precision::Double => 9000.125,
+            Precision::Single => 160.125,
+        };
+        let mut inputs = self.inputs.clone();
+        inputs[0][0] = far;
+        inputs[1]
+            .last_mut()
+            .into_iter()
+            .for_each(|rate| *rate = far);
+        let point = Self::new(entry, inputs, precision);
+        if point.is_defined() { point } else { self }
+    }
+
+    fn is_defined(&self) -> bool {
         self.undefined == 0
     }
 }
@@ -238,7 +236,7 @@ fn has_kink(statement: &Statement) -> bool {
 
 /// A point between -1 and 1. Where the function is not finite there, points around it are tried: all elements positive,
 /// all drawn again, a few of the best point changed; the best is returned.
-pub(crate) fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> TestPoint {
+fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> TestPoint {
     let slots = entry.program.inputs().iter();
     let drawn = slots.map(|slot| match slot.name.as_str() {
         "h" => vec![precision.nearest(0.002)],
@@ -297,80 +295,11 @@ fn element(entry: &FunctionSpec, slot: &str, k: usize, random: f64) -> f64 {
     }
 }
 
-/// Points of the batch that self-tests run.
-pub(crate) const N_BATCH: usize = 21;
-
-/// The inputs of that batch: element `i` of its arrays is `z + 0.01 (i mod 97)`, `dz - 0.01 (i mod 89)` and `u_lat +
-/// 0.01 (i mod 83)`, except for `far_angle` in point 3 of `z1` and in the last but one of `dz1`.
-pub(crate) struct BatchPoints {
-    pub z: f64,
-    pub dz: f64,
-    pub u_lat: f64,
-    /// An angle beyond the limit of the inline sine, where the accelerations do not overflow there.
-    pub far_angle: f64,
-}
-
-impl BatchPoints {
-    /// Numbers of both signs, or positive ones where the accelerations are finite at more of these.
-    pub(crate) fn new(phase: &PhaseInterface, precision: Precision) -> Self {
-        let overflows = |statement: &Statement| match statement {
-            Statement::Unary(op, _) => op.is_by_library(),
-            Statement::Binary(op, ..) => *op == Binary::Pow,
-            _ => false,
-        };
-        let statements = phase.dynamics.program.statements();
-        let far_angle = match (statements.iter().any(overflows), precision) {
-            (true, _) => 0.125,
-            (false, Precision::Double) => 9000.125,
-            (false, Precision::Single) => 160.125,
-        };
-        let [signed, positive] = [[-0.5, 0.5, -0.3], [0.0625, 0.9375, 0.0625]].map(|start| {
-            let [z, dz, u_lat] = start;
-            Self {
-                z,
-                dz,
-                u_lat,
-                far_angle,
-            }
-        });
-        let defined = |points: &Self| {
-            let at = (0..N_BATCH).map(|point| points.at(phase, point, precision));
-            at.filter(TestPoint::is_defined).count()
-        };
-        match defined(&positive) > defined(&signed) {
-            true => positive,
-            false => signed,
-        }
-    }
-
-    pub(crate) fn at(
-        &self,
-        phase: &PhaseInterface,
-        point: usize,
-        precision: Precision,
-    ) -> TestPoint {
-        let element = |slot: &str, k: usize| {
-            let i = k * N_BATCH + point;
-            let cycle = |modulus: usize| 0.01 * (i % modulus) as f64;
-            match slot {
-                "z" if i == 3 => self.far_angle,
-                "dz" if i == N_BATCH - 2 => self.far_angle,
-                "z" => self.z + cycle(97),
-                "dz" => self.dz - cycle(89),
-                _ => self.u_lat + cycle(83),
-            }
-        };
-        let slots = phase.dynamics.program.inputs().iter();
-        let inputs = slots.map(|slot| (0..slot.len).map(|k| element(&slot.name, k)).collect());
-        TestPoint::new(&phase.dynamics, inputs.collect(), precision)
-    }
-}
-
 /// Numbers between -1 and 1 with three decimals, the same in every run.
-pub(crate) struct Random(u64);
+struct Random(u64);
 
 impl Random {
-    pub(crate) fn new() -> Self {
+    fn new() -> Self {
         Self(0x5eed)
     }
 

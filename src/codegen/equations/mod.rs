@@ -2,7 +2,7 @@
 //!
 //! For each phase the accelerations are sums of coefficients times expressions over named variables, in library order,
 //! in one pool, in their shortest form unless asked otherwise; nothing else reads Xi to print or emit. Read `system.rs`
-//! first, then `exact.rs`.
+//! first.
 //!
 //! ```
 //! use nalgebra::DMatrix;

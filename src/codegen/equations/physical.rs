@@ -381,26 +381,3 @@ impl fmt::Display for Unit {
         f.write_str(&self.spelled(" ", |power| format!("^{power}")))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_gain_of_a_force_on_an_acceleration_is_one_over_a_mass() {
-        let [metre, radian] = ["m", "rad"].map(|name| Unit::from_name(name).expect("known"));
-        let [force, moment] = [metre, radian].map(|unit| unit.dual().expect("known"));
-        assert_eq!([force, moment].map(|unit| unit.to_string()), ["N", "N m"]);
-        let [linear, angular] = [metre, radian].map(|unit| unit.per_second().per_second());
-        for (unit, text) in [
-            (linear, "m/s^2"),
-            (linear / force, "1/kg"),
-            (angular / moment, "rad/(kg m^2)"),
-            (linear / radian, "m/(rad s^2)"),
-            (linear / linear, "1"),
-        ] {
-            assert_eq!(unit.to_string(), text);
-        }
-        assert_eq!((Unit::from_name("deg"), force.dual()), (None, None));
-    }
-}

@@ -172,9 +172,6 @@ impl<'a> Equations<'a> {
     }
 
     /// The phase with this index.
-    ///
-    /// # Errors
-    /// [`ModelError::PhaseIndex`].
     pub fn phase(&self, phase: usize) -> Result<&PhaseEquations, ModelError> {
         self.phases.get(phase).ok_or(ModelError::PhaseIndex {
             found: phase,

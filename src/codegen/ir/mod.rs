@@ -20,9 +20,12 @@
 
 mod build;
 pub mod interpret;
+mod operation;
 mod program;
 
 pub use build::{IrError, ProgramBuilder};
 pub use interpret::Interpreter;
+pub(crate) use operation::FUNCTIONS;
+pub use operation::{Binary, Unary};
 pub(crate) use program::Table;
-pub use program::{Binary, Program, Slot, Statement, Unary, ValueId};
+pub use program::{Program, Slot, Statement, ValueId};

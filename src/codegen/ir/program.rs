@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use super::operation::{Binary, Unary};
+
 /// A named, contiguous array of scalars that enters or leaves a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Slot {
@@ -54,66 +56,6 @@ impl<T> Table<T> {
     pub(crate) fn entries(&self) -> &[T] {
         &self.entries
     }
-}
-
-/// Operations on one scalar.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Unary {
-    /// `-a`
-    Neg,
-    /// Square root, correctly rounded.
-    Sqrt,
-    /// Absolute value.
-    Abs,
-    /// `1`, `-1` or `0` as `a` is positive, negative or zero; NaN of NaN.
-    Sign,
-    /// Tangent of the target's library.
-    Tan,
-    /// Hyperbolic tangent of the target's library.
-    Tanh,
-    /// Exponential of the target's library.
-    Exp,
-    /// Natural logarithm of the target's library.
-    Log,
-}
-
-impl Unary {
-    /// What most languages call the function; of the negative, `neg`.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Neg => "neg",
-            Self::Sqrt => "sqrt",
-            Self::Abs => "abs",
-            Self::Sign => "sign",
-            Self::Tan => "tan",
-            Self::Tanh => "tanh",
-            Self::Exp => "exp",
-            Self::Log => "log",
-        }
-    }
-
-    /// Whether a mathematics library computes it, which takes many times longer than a product.
-    pub(crate) fn is_by_library(self) -> bool {
-        match self {
-            Self::Tan | Self::Tanh | Self::Exp | Self::Log => true,
-            Self::Neg | Self::Sqrt | Self::Abs | Self::Sign => false,
-        }
-    }
-}
-
-/// Operations on two scalars, each rounded once except powers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Binary {
-    /// `a + b`
-    Add,
-    /// `a - b`
-    Sub,
-    /// `a * b`
-    Mul,
-    /// `a / b`
-    Div,
-    /// `a ^ b` of the target's library, for exponents that are no integers.
-    Pow,
 }
 
 /// One step of the schedule; defines one or several values.

@@ -32,9 +32,6 @@ struct CompiledPhase {
 
 impl CompiledModel {
     /// Lowers all phases of a model.
-    ///
-    /// # Errors
-    /// As [`lower::dynamics_jacobian`].
     pub fn new(model: &ReducedModel) -> Result<Self, LowerError> {
         let system = &Equations::of(model);
         let form = Form::default();

@@ -68,9 +68,6 @@ pub fn dynamics(system: &Equations<'_>, phase: usize, form: Form) -> Result<Prog
 
 /// The program of the accelerations and the structural nonzeros of their exact Jacobian by `(z, dz, u_lat)`: outputs
 /// `ddz` and `jacobian`, the latter absent if the accelerations are constant.
-///
-/// # Errors
-/// As [`dynamics`].
 pub fn dynamics_jacobian(
     system: &Equations<'_>,
     phase: usize,
@@ -204,9 +201,6 @@ fn values(lowering: &mut ExpressionLowering, sums: &[Nested]) -> Vec<ValueId> {
 /// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over `h` seconds with constant
 /// `u_lat`: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz` after the step. It calls the program of the accelerations
 /// four times.
-///
-/// # Errors
-/// As [`dynamics`].
 pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program, LowerError> {
     let accelerations = dynamics(system, phase, form)?;
     let d = system.latent_dim();

@@ -51,7 +51,9 @@ impl<'a> ExpressionLowering<'a> {
                     level += 1;
                     true
                 }
-                Node::Apply(function, _) => unary(*function).is_none_or(Unary::is_by_library),
+                Node::Apply(function, _) => {
+                    Unary::by_name(function.name()).is_none_or(Unary::is_by_library)
+                }
                 Node::Power(_, exponent) => self.pool.as_number(*exponent).is_none(),
                 Node::Number(_) | Node::Symbol(_) | Node::Sum(_) | Node::Product(_) => false,
             };
@@ -235,7 +237,7 @@ impl<'a> ExpressionLowering<'a> {
     }
 
     fn apply(&mut self, function: Function, argument: ExprId) -> ValueId {
-        match (function, unary(function)) {
+        match (function, Unary::by_name(function.name())) {
             (Function::Sin, _) => self.angle(argument).0,
             (_, None) => self.angle(argument).1,
             (_, Some(op)) => {
@@ -259,18 +261,4 @@ fn reciprocal_power(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, u32)> {
     let exponent = pool.as_integer(*exponent)?;
     let magnitude = u32::try_from(exponent.checked_neg()?).ok()?;
     Some((*base, magnitude))
-}
-
-/// The operation of a function; none for sines and cosines, which are computed together.
-fn unary(function: Function) -> Option<Unary> {
-    Some(match function {
-        Function::Sin | Function::Cos => return None,
-        Function::Tan => Unary::Tan,
-        Function::Tanh => Unary::Tanh,
-        Function::Exp => Unary::Exp,
-        Function::Log => Unary::Log,
-        Function::Sqrt => Unary::Sqrt,
-        Function::Abs => Unary::Abs,
-        Function::Sign => Unary::Sign,
-    })
 }

@@ -90,9 +90,6 @@ impl Map {
     }
 
     /// The same for `output = weights input`, for input maps in other units than the model's.
-    ///
-    /// # Errors
-    /// [`LowerError::Program`] if a weight is not finite.
     pub(crate) fn of_weights(self, weights: &DMatrix<f64>) -> Result<Program, LowerError> {
         affine(self, weights, None)
     }

@@ -48,7 +48,7 @@ pub(crate) fn priors(
     mass_kg: f64,
     losses: &[f64; PARAMETER_DIM],
 ) -> Vec<Prior> {
-    let [thigh, calf] = geometry.lengths();
+    let [thigh, calf] = geometry.lengths_m;
     let side = geometry.links().hip.norm().max(LEAST_SIDE * thigh);
     let leg = LEG_SHARE * mass_kg;
     let singles = [

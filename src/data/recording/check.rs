@@ -10,8 +10,8 @@ use super::error::{Outcome, RecordingFault};
 use super::preprocess::median;
 use super::reader::Column;
 use super::segment::{Recording, Segment, stretches};
-use crate::robot::chain::{LEAST_HEIGHT, LEAST_SPAN};
 use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::leg::{LEAST_HEIGHT, LEAST_SPAN};
 use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 
 const TORQUE_FACTOR: f64 = 1.1; // torque and speed over a joint's limit that are still accepted

@@ -72,7 +72,7 @@ impl<'a> Facts<'a> {
             defaults: Settings::default(),
             settings: SettingText::all(),
             has_plan,
-            link_m: format!("{:?}", robot.geometry(Leg::FrontRight).lengths()[0]),
+            link_m: format!("{:?}", robot.geometry(Leg::FrontRight).lengths_m[0]),
             rust_version: env!("CARGO_PKG_RUST_VERSION"),
         }
     }

@@ -17,8 +17,7 @@ use crate::mpc::{
     ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings,
 };
 use crate::robot::{
-    ChainLeg, DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegGeometry, PlanarLeg, Robot,
-    SINGULAR_BOUND, WrenchFrame,
+    DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, Robot, WrenchFrame,
 };
 
 /// `NAME_controller.c`.
@@ -42,7 +41,9 @@ pub(super) struct Source<'a> {
     online: String,
     /// Arrays of constants.
     constants: String,
-    legs: Legs,
+    legs: String,
+    hips: String,
+    arm_from: String,
     torque_mean: String,
     torque_deviation: String,
     weight_n: f64,
@@ -96,10 +97,15 @@ impl<'a> Source<'a> {
             lift_functions: of_lift(),
             online: online(facts.name),
             constants: constants(plant, facts.rows, numbers),
-            legs: Legs::of(plant.robot(), numbers),
+            legs: nested(Leg::ALL.map(|leg| numbers.leg(&robot.geometry(leg).shape))),
+            hips: numbers.matrix(robot.hip_position_m),
+            arm_from: numbers.matrix(match plant.input_rule().wrench_frame() {
+                WrenchFrame::Body => [[0.0; 3]; 4],
+                WrenchFrame::World => robot.hip_position_m,
+            }),
             torque_mean: numbers.matrix(phases.iter().map(|phase| &phase.torque_mean)),
             torque_deviation: nested(deviations),
-            weight_n: plant.robot().mass_kg() * GRAVITY_M_S2,
+            weight_n,
             fallback: mpc.fallback,
             phases: &entries.phases,
         })
@@ -222,6 +228,24 @@ impl Numbers {
         list(values.into_iter().map(|value| self.one(*value.borrow())))
     }
 
+    fn leg(self, leg: &LegShape) -> String {
+        let square = |rows: &[[f64; 3]; 3]| self.matrix(*rows);
+        let fields = [
+            ("fixed", square(&leg.fixed)),
+            ("cosine", square(&leg.cosine)),
+            ("sine", square(&leg.sine)),
+            ("axis", self.vector(leg.axis)),
+            ("hip", self.vector(leg.hip)),
+            ("thigh", self.vector(leg.thigh)),
+            ("calf", self.vector(leg.calf)),
+            ("knee", self.one(leg.knee)),
+            ("least", self.vector(leg.least)),
+            ("volume", self.one(leg.volume)),
+        ];
+        let fields = fields.map(|(name, value)| format!(".{name} = {value}"));
+        format!("{{{}}}", fields.join(",\n     "))
+    }
+
     /// The first rows of a matrix.
     fn rows(self, matrix: &DMatrix<f64>, count: usize) -> String {
         let row = |i| (0..matrix.ncols()).map(move |j| matrix[(i, j)]);
@@ -259,57 +283,6 @@ pub(in crate::deploy) fn list(values: impl Iterator<Item = String>) -> String {
     }
     let lines: Vec<String> = values.chunks(WIDTH).map(|line| line.join(", ")).collect();
     format!("{{{}}}", lines.join(",\n     "))
-}
-
-/// Initialisers for the four legs, in the order of [`Leg::ALL`]; a leg of one kind is zeros in the table of the other.
-pub(super) struct Legs {
-    pub has_planar: bool,
-    pub has_chain: bool,
-    pub is_chain: String,
-    pub planar: String,
-    pub axes: String,
-    pub links: String,
-    pub least_levers: String,
-    pub volumes: String,
-    pub hips: String,
-}
-
-impl Legs {
-    pub(super) fn of(robot: &Robot, numbers: Numbers) -> Self {
-        let legs = Leg::ALL.map(|leg| robot.geometry(leg));
-        let planar = legs.map(|leg| match leg {
-            LegGeometry::Planar(leg) => {
-                let PlanarLeg {
-                    hip_m,
-                    thigh_m,
-                    calf_m,
-                    foot_forward_m,
-                } = *leg;
-                [hip_m, thigh_m, calf_m, foot_forward_m]
-            }
-            LegGeometry::Chain(_) => [0.0; 4],
-        });
-        let chains = legs.map(|leg| match leg {
-            LegGeometry::Planar(_) => [[[0.0; 3]; 3]; 2],
-            LegGeometry::Chain(ChainLeg { axes, links }) => [*axes, *links],
-        });
-        let is_chain = legs.map(|leg| matches!(leg, LegGeometry::Chain(_)));
-        let table = |part: usize| nested(chains.map(|chain| numbers.matrix(chain[part])));
-        Self {
-            has_planar: is_chain.contains(&false),
-            has_chain: is_chain.contains(&true),
-            is_chain: integers(is_chain.map(i64::from)),
-            planar: numbers.matrix(planar),
-            axes: table(0),
-            links: table(1),
-            least_levers: numbers.matrix(legs.map(LegGeometry::least_levers)),
-            volumes: numbers.vector(legs.map(LegGeometry::volume_m3)),
-            hips: numbers.matrix(Leg::ALL.map(|leg| {
-                let hip = robot.hip_position(leg);
-                [hip.x, hip.y, hip.z]
-            })),
-        }
-    }
 }
 
 /// A stage of the solver, and all else.

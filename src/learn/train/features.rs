@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::ir::interpret::{LIMIT, reduced_sin_cos, sin_cos};
 use crate::model::{LatentVariable, Library, Step, Tape};
-use crate::symbolic::{Function, SymbolId};
+use crate::symbolic::SymbolId;
 
 /// Declares a function without result that runs with the widest vectors that the processor has.
 macro_rules! vectorised {
@@ -286,7 +286,7 @@ fn add_adjoints(
         }
         Step::Apply(function, argument) => {
             for (i, a) in adjoint.iter().enumerate() {
-                earlier[*argument][i] += a * slope(*function, values[*argument][i], values[own][i]);
+                earlier[*argument][i] += a * function.slope(values[*argument][i], values[own][i]);
             }
         }
     }
@@ -302,21 +302,5 @@ fn add_times(out: &mut [f64], adjoint: &[f64], values: &[Vec<f64>], factors: &[u
             let factors = factors.iter().map(|&other| values[other][i]);
             *o += a * factors.product::<f64>();
         }),
-    }
-}
-
-/// Derivative of `function` at `argument`, where it has the value `value`.
-fn slope(function: Function, argument: f64, value: f64) -> f64 {
-    match function {
-        Function::Sin => argument.cos(),
-        Function::Cos => -argument.sin(),
-        Function::Tan => 1.0 + value * value,
-        Function::Tanh => 1.0 - value * value,
-        Function::Exp => value,
-        Function::Log => 1.0 / argument,
-        Function::Sqrt => 0.5 / value,
-        Function::Abs if argument == 0.0 => 0.0,
-        Function::Abs => argument.signum(),
-        Function::Sign => 0.0,
     }
 }

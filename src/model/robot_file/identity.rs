@@ -11,7 +11,7 @@ use super::legs::{Part, Places, build};
 use super::read::{RobotFileError, keep};
 use crate::files::{Located, Place};
 use crate::robot::joints::LEG_JOINT_DIM;
-use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, LegGeometry, Robot};
 
 /// Largest angle of a joint or frame, rad: two turns either way.
 pub(super) const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
@@ -107,7 +107,7 @@ fn doubts(robot: &Robot) -> Vec<String> {
     let (torque_nm, speed_rad_s) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
     let (limits, mass_kg) = (robot.joint_limit_rad(), robot.mass_kg());
     let share = |joint: usize| {
-        let [thigh, calf] = robot.geometry(Leg::ALL[joint / LEG_JOINT_DIM]).lengths();
+        let [thigh, calf] = robot.geometry(Leg::ALL[joint / LEG_JOINT_DIM]).lengths_m;
         torque_nm[joint] / (mass_kg * GRAVITY_M_S2 * (thigh + calf))
     };
     let is_weak = (0..JOINT_DIM).all(|joint| share(joint) < *TORQUE_SHARE.start());
@@ -202,7 +202,6 @@ pub(crate) struct JointEntry {
     /// Recorded angle at the zero posture, rad; 0, if it is not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) offset_rad: Option<f64>,
-    /// Lowest and highest recorded angle, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) limits_rad: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -270,17 +269,17 @@ impl RobotEntry {
     /// The entry that gives this robot again, bit for bit: signs and offsets are in its axes and links.
     pub fn of(robot: &Robot) -> Self {
         let leg = Leg::ALL.map(|leg| {
-            let chain = robot.geometry(leg).chain();
-            let joint = (0..chain.axes.len()).map(|index| {
-                let joint = chain.axes.len() * leg.index() + index;
+            let LegGeometry { axes, links, .. } = *robot.geometry(leg);
+            let joint = (0..axes.len()).map(|index| {
+                let joint = axes.len() * leg.index() + index;
                 let (low, high) = robot.joint_limit_rad()[joint];
                 JointEntry {
                     name: robot.joint_names()[joint].to_owned(),
                     at: match index {
                         0 => robot.hip_position(leg).into(),
-                        _ => chain.links[index - 1],
+                        _ => links[index - 1],
                     },
-                    axis: Axis::of(chain.axes[index]),
+                    axis: Axis::of(axes[index]),
                     sign: None,
                     offset_rad: None,
                     limits_rad: Some([low, high]),
@@ -291,7 +290,7 @@ impl RobotEntry {
             });
             LegEntry {
                 joint: joint.collect(),
-                foot: chain.links[2],
+                foot: links[2],
             }
         });
         Self {

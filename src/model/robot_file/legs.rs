@@ -13,7 +13,7 @@ use super::read::{RobotFileError, from_toml_text, keep, text_of, word};
 use crate::files::is_invisible;
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{
-    Actuators, ChainLeg, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, Robot,
+    Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, Robot,
 };
 
 const MAX_NAME_LEN: usize = 80;
@@ -88,10 +88,7 @@ pub(super) fn build(entry: &RobotEntry, places: &Places<'_>) -> Result<Robot, Ro
     let mut robot = Robot {
         name: word(&entry.name),
         mass_kg: entry.mass_kg,
-        legs: [LegGeometry::Chain(ChainLeg {
-            axes: [[0.0; 3]; 3],
-            links: [[0.0; 3]; 3],
-        }); FOOT_DIM],
+        legs: [LegGeometry::new([[0.0; 3]; 3], [[0.0; 3]; 3]); FOOT_DIM],
         hip_position_m: [[0.0; 3]; FOOT_DIM],
         joint_names: [""; JOINT_DIM],
         torque_limit_nm: [0.0; JOINT_DIM],
@@ -101,7 +98,7 @@ pub(super) fn build(entry: &RobotEntry, places: &Places<'_>) -> Result<Robot, Ro
     let mut names: Vec<&str> = Vec::with_capacity(JOINT_DIM);
     for (index, (leg, entry)) in corners.iter().zip(&entry.leg).enumerate() {
         let k = leg.index();
-        robot.legs[k] = LegGeometry::of_chain(places.chain(index, entry)?);
+        robot.legs[k] = places.geometry(index, entry)?;
         robot.hip_position_m[k] = entry.joint[0].at;
         for (offset, joint) in entry.joint.iter().enumerate() {
             let part = |key: &'static str| Part::Joint(index, offset, key);
@@ -258,7 +255,7 @@ impl Places<'_> {
         Ok((unit * sign).map(|v| v + 0.0))
     }
 
-    fn chain(&self, index: usize, leg: &LegEntry) -> Result<ChainLeg, RobotFileError> {
+    fn geometry(&self, index: usize, leg: &LegEntry) -> Result<LegGeometry, RobotFileError> {
         let mut axes = [Vector3::zeros(); LEG_JOINT_DIM];
         for (offset, joint) in leg.joint.iter().enumerate() {
             axes[offset] = self.axis(Part::Joint(index, offset, "axis"), joint)?;
@@ -279,10 +276,8 @@ impl Places<'_> {
                 }
             }
         }
-        let chain = ChainLeg {
-            axes: axes.map(Into::into),
-            links: links.map(|link| link.map(|v| v + 0.0).into()),
-        };
+        let links = links.map(|link| link.map(|v| v + 0.0).into());
+        let geometry = LegGeometry::new(axes.map(Into::into), links);
         let part = Part::Leg(index);
         let names = |a: usize, b: usize| {
             let [a, b] = [a, b].map(|joint| leg.joint[joint].name.as_str());
@@ -296,12 +291,12 @@ impl Places<'_> {
         let found = format!("{} almost parallel", names(0, 1));
         let expected = "a first joint that moves the plane of the leg";
         self.check(!is_stiff, part, found, expected)?;
-        let lengths = chain.lengths();
+        let lengths = geometry.lengths_m;
         let is_short = lengths.iter().any(|length| *length < MIN_LINK_M);
         let found = format!("thigh and calf of {} and {} m", lengths[0], lengths[1]);
         let expected = "lengths across the axes of the last two joints";
         self.check(!is_short, part, found, expected)?;
-        Ok(chain)
+        Ok(geometry)
     }
 }
 

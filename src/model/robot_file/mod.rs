@@ -2,8 +2,8 @@
 //!
 //! What enters: a name, or the path or text of a file. What leaves: a checked [`Robot`] with its legs in romc's order,
 //! or file, place, what was found and what was expected. Legs are matched by where their first joints stand, joints by
-//! their order from the trunk. Read `entry.rs` first, the grammar; `legs.rs` makes a robot of it, `urdf` finds the legs
-//! of a tree, `identity.rs` compares with romc's own robots and doubts numbers. `docs/robots.md` describes the file.
+//! their order from the trunk. Read `identity.rs` first, the grammar, which compares with romc's own robots and doubts
+//! numbers; `legs.rs` makes a robot of it, `urdf` finds the legs of a tree. `docs/robots.md` describes the file.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};

@@ -115,7 +115,9 @@ impl<'a> Writer<'a> {
     }
 
     pub(crate) fn spelling(&self, name: &str) -> String {
-        self.items.name(&[name])
+        let is_fixed = self.items.unit.fixed.contains(&name);
+        let start = if is_fixed { "const " } else { "" };
+        format!("{start}{}", self.items.name(&[name]))
     }
 
     /// Writes a function for sizes unless that was done; its name.

@@ -396,7 +396,7 @@ impl Writer<'_> {
         if !written.insert(name.to_owned()) {
             return;
         }
-        let c_name = self.spelling(name);
+        let c_name = self.items.name(&[name]);
         if let Some((docs, variants)) = self.items.enums.get(name) {
             let variants: Vec<String> = (variants
                 .iter()

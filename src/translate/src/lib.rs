@@ -77,6 +77,8 @@ pub struct Unit<'a> {
     pub roots: &'a [&'a str],
     /// Constants that whoever includes the C reads.
     pub constants: &'a [&'a str],
+    /// Structs that nothing changes, which are `const` wherever they are pointed to.
+    pub fixed: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
     pub header: &'a [&'a str],
     /// Constants of the Rust, and methods that state a condition, that whoever includes the C defines, with their names there.
@@ -114,25 +116,30 @@ pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Faul
     writer.finish(unit)
 }
 
+fn fault(path: &str, error: std::io::Error) -> Fault {
+    let (path, message) = (path.to_owned(), error.to_string());
+    Fault {
+        path,
+        line: 0,
+        message,
+    }
+}
+
+fn file(root: &Path, path: String) -> Result<Source, Fault> {
+    let text = fs::read_to_string(root.join(&path)).map_err(|error| fault(&path, error))?;
+    Ok(Source { path, text })
+}
+
 /// The sources of a folder of `src/control`.
 fn read(root: &Path, folder: &str) -> Result<Vec<Source>, Fault> {
     let folder = format!("src/control/{folder}");
-    let fault = |path: &str, error: std::io::Error| Fault {
-        path: path.to_owned(),
-        line: 0,
-        message: error.to_string(),
-    };
     let entries = fs::read_dir(root.join(&folder)).map_err(|error| fault(&folder, error))?;
     let names = entries.flatten().map(|entry| entry.file_name());
     let mut paths: Vec<String> = names
         .map(|name| format!("{folder}/{}", name.to_string_lossy()))
         .collect();
     paths.sort();
-    let read = |path: String| match fs::read_to_string(root.join(&path)) {
-        Ok(text) => Ok(Source { path, text }),
-        Err(error) => Err(fault(&path, error)),
-    };
-    paths.into_iter().map(read).collect()
+    paths.into_iter().map(|path| file(root, path)).collect()
 }
 
 fn head(what: &str) -> String {
@@ -174,6 +181,9 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "write_foot",
             "write_hessian",
             "change_rows",
+            "add_wrench",
+            "write_force_map",
+            "write_world_axes",
         ],
         constants: &[
             "CURVATURE",
@@ -184,6 +194,7 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "SLACK_PRICE",
             "SOFTENED_FROM",
         ],
+        fixed: &["LegShape"],
         header: &["Share"],
         elsewhere: &[
             ("MOST_LATENT", "D"),
@@ -193,7 +204,9 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
         ],
         attribute: "MAYBE_UNUSED ",
     };
-    let Translated { header, source } = translate(&read(root, "online")?, &unit)?;
+    let mut sources = read(root, "online")?;
+    sources.push(file(root, "src/robot/leg.rs".to_owned())?);
+    let Translated { header, source } = translate(&sources, &unit)?;
     let state = head("state of the controller's own steps.") + &header;
     let steps = head("the controller's own steps.") + &source;
     texts.push(("templates/controller_c/online_state.h", state));

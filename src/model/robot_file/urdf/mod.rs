@@ -17,7 +17,6 @@ use tree::{Element, Joint, Tree, document};
 
 /// Components of axes and positions that are rounding of zero or one.
 const ROUNDING: f64 = 1e-12;
-/// Limits of a joint that turns without end, rad.
 const ENDLESS_RAD: f64 = 2.0 * std::f64::consts::PI;
 const AXIS: std::ops::Range<f64> = 1e-6..1e6;
 

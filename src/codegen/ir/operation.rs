@@ -1,0 +1,134 @@
+//! Operations on scalars: their names, and their values in either precision.
+
+use std::fmt::Debug;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::interpret::{double, single};
+
+/// Operations on one scalar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Unary {
+    /// `-a`
+    Neg,
+    /// Square root, correctly rounded.
+    Sqrt,
+    /// Absolute value.
+    Abs,
+    /// `1`, `-1` or `0` as `a` is positive, negative or zero; NaN of NaN.
+    Sign,
+    /// Tangent; this and those below by the target's library.
+    Tan,
+    /// Hyperbolic tangent.
+    Tanh,
+    /// Exponential.
+    Exp,
+    /// Natural logarithm.
+    Log,
+}
+
+/// What most languages call the functions, in the order of [`Unary`].
+pub(crate) const FUNCTIONS: [&str; 8] = ["neg", "sqrt", "abs", "sign", "tan", "tanh", "exp", "log"];
+
+impl Unary {
+    const ALL: [Self; FUNCTIONS.len()] = {
+        use Unary::*;
+        [Neg, Sqrt, Abs, Sign, Tan, Tanh, Exp, Log]
+    };
+
+    pub(crate) fn name(self) -> &'static str {
+        FUNCTIONS[self as usize]
+    }
+
+    /// None for sines and cosines, which are computed together.
+    pub(crate) fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|op| op.name() == name)
+    }
+
+    /// Whether a mathematics library computes it, which takes many times longer than a product.
+    pub(crate) fn is_by_library(self) -> bool {
+        self >= Self::Tan
+    }
+}
+
+/// Operations on two scalars, each rounded once except powers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Binary {
+    /// `a + b`
+    Add,
+    /// `a - b`
+    Sub,
+    /// `a * b`
+    Mul,
+    /// `a / b`
+    Div,
+    /// `a ^ b` of the target's library, for exponents that are no integers.
+    Pow,
+}
+
+/// A number that programs compute with: `f64` or `f32`.
+///
+/// Each operator rounds once, as generated code does with contraction off.
+pub trait Real:
+    Copy
+    + Debug
+    + PartialEq
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// A constant of a program.
+    fn constant(value: f64) -> Self;
+
+    /// A function of one number.
+    fn unary(op: Unary, a: Self) -> Self;
+
+    /// `self ^ exponent`.
+    fn power(self, exponent: Self) -> Self;
+
+    /// Sine and cosine by the kernel of this precision.
+    fn sin_cos(self) -> (Self, Self);
+}
+
+macro_rules! real {
+    ($float:ident, $kernel:path) => {
+        impl Real for $float {
+            /// The nearest number; infinite beyond the largest.
+            #[inline]
+            fn constant(value: f64) -> Self {
+                value as $float
+            }
+
+            #[inline]
+            fn unary(op: Unary, a: $float) -> $float {
+                match op {
+                    Unary::Neg => -a,
+                    Unary::Sqrt => a.sqrt(),
+                    Unary::Abs => a.abs(),
+                    Unary::Sign if a > 0.0 => 1.0,
+                    Unary::Sign if a < 0.0 => -1.0,
+                    // 0 of either zero, NaN of NaN.
+                    Unary::Sign => a - a,
+                    Unary::Tan => a.tan(),
+                    Unary::Tanh => a.tanh(),
+                    Unary::Exp => a.exp(),
+                    Unary::Log => a.ln(),
+                }
+            }
+
+            #[inline]
+            fn power(self, exponent: $float) -> $float {
+                self.powf(exponent)
+            }
+
+            #[inline]
+            fn sin_cos(self) -> ($float, $float) {
+                $kernel(self)
+            }
+        }
+    };
+}
+
+real!(f64, double::sin_cos);
+real!(f32, single::sin_cos);

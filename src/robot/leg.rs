@@ -1,0 +1,305 @@
+//! One leg of three joints with any axes, of which the last two are parallel.
+//!
+//! The frame of the leg's plane is (forward, normal, up): the normal is the axis of the second joint, and the first
+//! joint turns the frame as a whole. In it thigh and calf are `(forward, up)`, turned by the second angle and by the sum
+//! of the last two; with `(l_f, l_u)` their sum, `(c_f, c_u)` the calf's share and the first joint's axis times the foot
+//! `(m_f, m_n, m_u)`, the Jacobian has the columns `m`, `(l_u, 0, -l_f)` and `(c_u, 0, -c_f)`. Of `J^T F = -tau`
+//! (equation 4) follows
+//!
+//! ```text
+//! F_f = (l_f tau_2 - c_f tau_1) / area     area  = l_u c_f - l_f c_u
+//! F_u = (l_u tau_2 - c_u tau_1) / area     lever = -m_n
+//! F_n = (tau_0 + m_f F_f + m_u F_u) / lever
+//! ```
+//!
+//! in which, near a singularity, `1 / d` of both divisors becomes `d / max(d^2, least^2)`: equal outside, continuous,
+//! and at most `1 / least`. `romc-translate` makes the legs of the controller in C of this file.
+
+use core::ops::{Add, Mul, Neg, Sub};
+
+pub(crate) type Real = f64;
+
+/// Smallest `|det J|`, divided by [`LegShape::volume`], at which torques still give a foot force: a knee about 1e-3 rad
+/// from full extension.
+pub const SINGULAR_BOUND: Real = 1e-3;
+
+/// Smallest area that thigh and calf span, over the product of their lengths (about the sine of the knee), at which
+/// torques are turned into forces without damping.
+pub const LEAST_SPAN: f64 = 0.3;
+
+/// Smallest height of the foot above or below its hip in the plane of the leg, over the length of the stretched leg, at
+/// which torques are turned into forces without damping.
+pub const LEAST_HEIGHT: f64 = 0.12;
+
+/// A leg in the frame of its plane at the zero posture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LegShape {
+    /// Shares of forward, normal and up, in the body's axes, that stay as the first joint turns.
+    pub fixed: [[Real; 3]; 3],
+    /// Shares that its cosine multiplies.
+    pub cosine: [[Real; 3]; 3],
+    /// Shares that its sine multiplies.
+    pub sine: [[Real; 3]; 3],
+    /// Axis of the first joint.
+    pub axis: [Real; 3],
+    /// From the first joint to the foot, without thigh and calf in the plane, m.
+    pub hip: [Real; 3],
+    /// Forward and up, m.
+    pub thigh: [Real; 2],
+    /// Forward and up, m.
+    pub calf: [Real; 2],
+    /// 1 where the third joint turns as the second does, -1 where it turns against it.
+    pub knee: Real,
+    /// Area that thigh and calf span (m^2) and height of the foot (m) below which they are damped.
+    pub least: [Real; 2],
+    /// Thigh times calf times their sum, m^3, which bounds `|det J|`.
+    pub volume: Real,
+}
+
+/// Where the foot is and how the joints move it, in the frame of the leg's plane.
+#[derive(Debug, Clone, Copy)]
+pub struct Posture<T = f64> {
+    /// The frame in the body's axes.
+    pub frame: [[T; 3]; 3],
+    /// Foot from the first joint, m.
+    pub foot: [T; 3],
+    /// Velocity of the foot per velocity of the first joint.
+    pub by_first: [T; 3],
+    /// From the second joint to the foot: forward and up.
+    pub limb: [T; 2],
+    /// From the third joint to the foot.
+    pub calf: [T; 2],
+}
+
+impl<T> Posture<T>
+where
+    T: Copy + Neg<Output = T> + Sub<Output = T>,
+    T: Add<Output = T> + Mul<Output = T> + Add<Real, Output = T> + Mul<Real, Output = T>,
+{
+    /// All numbers the same, before a turn.
+    pub fn filled(value: T) -> Self {
+        Self {
+            frame: [[value; 3]; 3],
+            foot: [value; 3],
+            by_first: [value; 3],
+            limb: [value; 2],
+            calf: [value; 2],
+        }
+    }
+
+    /// Turns a leg whose foot is along the normal where it should be; of sines and cosines the third is that of the
+    /// calf's angle, the sum of the second and third joint's.
+    pub fn turn(&mut self, leg: &LegShape, sine: &[T; 3], cosine: &[T; 3]) {
+        for k in 0..3 {
+            for i in 0..3 {
+                let turned = cosine[0] * leg.cosine[k][i] + sine[0] * leg.sine[k][i];
+                self.frame[k][i] = turned + leg.fixed[k][i];
+            }
+        }
+        self.calf[0] = sine[2] * leg.calf[1] + cosine[2] * leg.calf[0];
+        self.calf[1] = cosine[2] * leg.calf[1] - sine[2] * leg.calf[0];
+        self.limb[0] = sine[1] * leg.thigh[1] + cosine[1] * leg.thigh[0] + self.calf[0];
+        self.limb[1] = cosine[1] * leg.thigh[1] - sine[1] * leg.thigh[0] + self.calf[1];
+        self.foot[0] = self.limb[0] + leg.hip[0];
+        self.foot[2] = self.limb[1] + leg.hip[2];
+        self.by_first[0] = self.foot[2] * leg.axis[1] - self.foot[1] * leg.axis[2];
+        self.by_first[1] = self.foot[0] * leg.axis[2] - self.foot[2] * leg.axis[0];
+        self.by_first[2] = self.foot[1] * leg.axis[0] - self.foot[0] * leg.axis[1];
+    }
+
+    /// Area that thigh and calf span, with its sign, m^2.
+    pub fn area(&self) -> T {
+        self.limb[1] * self.calf[0] - self.limb[0] * self.calf[1]
+    }
+
+    /// Lever of the first joint along the normal, m; times the area it is `det J`, up to the sign.
+    pub fn lever(&self) -> T {
+        -self.by_first[1]
+    }
+
+    /// Writes a vector of the frame in the body's axes.
+    pub fn write_in_body(&self, vector: &[T; 3], out: &mut [T; 3]) {
+        for i in 0..3 {
+            out[i] = self.frame[0][i] * vector[0]
+                + self.frame[1][i] * vector[1]
+                + self.frame[2][i] * vector[2];
+        }
+    }
+}
+
+impl Posture {
+    /// Turns a leg by the angles of its joints, rad.
+    pub(crate) fn bend(&mut self, leg: &LegShape, q: &[Real]) {
+        let calf = q[1] + leg.knee * q[2];
+        let sine: [Real; 3] = [q[0].sin(), q[1].sin(), calf.sin()];
+        let cosine: [Real; 3] = [q[0].cos(), q[1].cos(), calf.cos()];
+        self.foot[1] = leg.hip[1];
+        self.turn(leg, &sine, &cosine);
+    }
+
+    /// Writes `J[i][j] = d p_i / d q_j` of the foot in the body's axes, m.
+    pub(crate) fn write_jacobian(&self, leg: &LegShape, jacobian: &mut [[Real; 3]; 3]) {
+        let mut first: [Real; 3] = [0.0; 3];
+        self.write_in_body(&self.by_first, &mut first);
+        for i in 0..3 {
+            let forward = self.frame[0][i];
+            let up = self.frame[2][i];
+            jacobian[i][0] = first[i];
+            jacobian[i][1] = forward * self.limb[1] - up * self.limb[0];
+            jacobian[i][2] = leg.knee * (forward * self.calf[1] - up * self.calf[0]);
+        }
+    }
+
+    /// Writes `-J^-T` with damped levers.
+    fn write_damped(&self, leg: &LegShape, map: &mut [[Real; 3]; 3]) {
+        let of_area = damped_reciprocal(self.area(), leg.least[0]);
+        let of_lever = damped_reciprocal(self.lever(), leg.least[1]);
+        let calf = -of_area;
+        let limb = leg.knee * of_area;
+        let forward: [Real; 3] = [0.0, self.calf[0] * calf, self.limb[0] * limb];
+        let up: [Real; 3] = [0.0, self.calf[1] * calf, self.limb[1] * limb];
+        for j in 0..3 {
+            let own: Real = if j == 0 { 1.0 } else { 0.0 };
+            let by_plane = self.by_first[0] * forward[j] + self.by_first[2] * up[j];
+            let force: [Real; 3] = [forward[j], (own + by_plane) * of_lever, up[j]];
+            let mut column: [Real; 3] = [0.0; 3];
+            self.write_in_body(&force, &mut column);
+            for i in 0..3 {
+                map[i][j] = column[i];
+            }
+        }
+    }
+}
+
+/// `1 / d`, but `d / least^2` where `|d|` is below the least.
+fn damped_reciprocal(d: Real, least: Real) -> Real {
+    let square = d * d;
+    let smallest = least * least;
+    if square > smallest {
+        d / square
+    } else {
+        d / smallest
+    }
+}
+
+/// Writes `-J^-T` by cofactors; false if there is none.
+fn minus_inverse_transpose(j: &[[Real; 3]; 3], out: &mut [[Real; 3]; 3]) -> bool {
+    let minor_0 = j[1][1] * j[2][2] - j[1][2] * j[2][1];
+    let minor_1 = j[0][1] * j[2][2] - j[0][2] * j[2][1];
+    let minor_2 = j[0][1] * j[1][2] - j[0][2] * j[1][1];
+    let det = j[0][0] * minor_0 - j[1][0] * minor_1 + j[2][0] * minor_2;
+    if det == 0.0 || !det.is_finite() {
+        return false;
+    }
+    out[0][0] = -(minor_0 / det);
+    out[1][0] = minor_1 / det;
+    out[2][0] = -(minor_2 / det);
+    out[0][1] = -((j[1][2] * j[2][0] - j[1][0] * j[2][2]) / det);
+    out[0][2] = -((j[1][0] * j[2][1] - j[1][1] * j[2][0]) / det);
+    out[1][1] = -((j[2][2] * j[0][0] - j[2][0] * j[0][2]) / det);
+    out[1][2] = -((j[2][0] * j[0][1] - j[2][1] * j[0][0]) / det);
+    out[2][1] = -((j[0][2] * j[1][0] - j[0][0] * j[1][2]) / det);
+    out[2][2] = -((j[0][0] * j[1][1] - j[0][1] * j[1][0]) / det);
+    true
+}
+
+/// Writes `-J^-T` of a leg, which takes its torques (N m) to its force on the body (N), and where its foot is from the
+/// first joint, m. With levers that are never shorter than the least; or exact, then false where the leg is stretched.
+pub(crate) fn write_force_map(
+    leg: &LegShape,
+    q: &[Real],
+    is_exact: bool,
+    map: &mut [[Real; 3]; 3],
+    foot: &mut [Real; 3],
+) -> bool {
+    let mut posture: Posture = Posture {
+        frame: [[0.0; 3]; 3],
+        foot: [0.0; 3],
+        by_first: [0.0; 3],
+        limb: [0.0; 2],
+        calf: [0.0; 2],
+    };
+    posture.bend(leg, q);
+    posture.write_in_body(&posture.foot, foot);
+    let area = posture.area().abs();
+    let lever = posture.lever().abs();
+    if is_exact && area * lever / leg.volume < SINGULAR_BOUND {
+        return false;
+    }
+    if is_exact || (area >= leg.least[0] && lever >= leg.least[1]) {
+        let mut jacobian: [[Real; 3]; 3] = [[0.0; 3]; 3];
+        posture.write_jacobian(leg, &mut jacobian);
+        return minus_inverse_transpose(&jacobian, map);
+    }
+    posture.write_damped(leg, map);
+    true
+}
+
+/// Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false
+/// if they are not finite.
+pub(crate) fn add_wrench(
+    leg: &LegShape,
+    hip: &[Real],
+    q: &[Real],
+    torque: &[Real],
+    wrench: &mut [Real],
+) -> bool {
+    let mut map: [[Real; 3]; 3] = [[0.0; 3]; 3];
+    let mut arm: [Real; 3] = [0.0; 3];
+    let is_finite = torque[0].is_finite() && torque[1].is_finite() && torque[2].is_finite();
+    if !is_finite || !write_force_map(leg, q, false, &mut map, &mut arm) {
+        return false;
+    }
+    let mut force: [Real; 3] = [0.0; 3];
+    for i in 0..3 {
+        force[i] = map[i][0] * torque[0] + map[i][1] * torque[1] + map[i][2] * torque[2];
+    }
+    let mut moment: [Real; 3] = [0.0; 3];
+    write_moment(hip, &arm, &force, &mut moment);
+    for i in 0..3 {
+        wrench[i] += force[i];
+        wrench[3 + i] += moment[i];
+    }
+    true
+}
+
+/// Writes the moment of a force at a foot about where its hip is from.
+fn write_moment(hip: &[Real], foot: &[Real], force: &[Real], moment: &mut [Real]) {
+    let arm: [Real; 3] = [hip[0] + foot[0], hip[1] + foot[1], hip[2] + foot[2]];
+    moment[0] = arm[1] * force[2] - arm[2] * force[1];
+    moment[1] = arm[2] * force[0] - arm[0] * force[2];
+    moment[2] = arm[0] * force[1] - arm[1] * force[0];
+}
+
+/// Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to
+/// the generalised moments of roll, pitch and yaw, which are the angles (rad).
+pub(crate) fn write_world_axes(
+    attitude: &[Real],
+    turned: &mut [[Real; 3]; 3],
+    rates: &mut [[Real; 3]; 3],
+) {
+    let sr = attitude[0].sin();
+    let cr = attitude[0].cos();
+    let sp = attitude[1].sin();
+    let cp = attitude[1].cos();
+    let sy = attitude[2].sin();
+    let cy = attitude[2].cos();
+    turned[0][0] = cy * cp;
+    turned[0][1] = cy * sp * sr - sy * cr;
+    turned[0][2] = cy * sp * cr + sy * sr;
+    turned[1][0] = sy * cp;
+    turned[1][1] = sy * sp * sr + cy * cr;
+    turned[1][2] = sy * sp * cr - cy * sr;
+    turned[2][0] = -sp;
+    turned[2][1] = cp * sr;
+    turned[2][2] = cp * cr;
+    rates[0][0] = 1.0;
+    rates[0][1] = 0.0;
+    rates[0][2] = 0.0;
+    rates[1][0] = 0.0;
+    rates[1][1] = cr;
+    rates[1][2] = -sr;
+    for i in 0..3 {
+        rates[2][i] = turned[2][i];
+    }
+}
