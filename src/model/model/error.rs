@@ -1,7 +1,5 @@
 //! Faults of models, and of calls of their functions.
 
-use std::ops::RangeInclusive;
-
 use nalgebra::{Matrix, RawStorage};
 
 use super::*;
