@@ -306,6 +306,7 @@ fn object<'de, D: Deserializer<'de>>(source: D) -> Result<Map<String, Value>, D:
     }
 }
 
+/// JSON of any form; the bound is on its number of values, each of which takes up to a hundred times its bytes.
 struct Bounded<'a>(&'a Cell<usize>);
 
 impl<'de> DeserializeSeed<'de> for Bounded<'_> {
