@@ -203,7 +203,6 @@ pub fn usual_settings(recordings: &[Recording]) -> MpcSettings {
     }
 }
 
-/// Speed of a push, m/s.
 const PUSH_M_S: f64 = 0.1;
 const PUSHES: [[f64; 3]; 4] = [
     [1.0, 0.0, 0.0],

@@ -20,7 +20,6 @@ macro_rules! settings {
         #[serde(default, deny_unknown_fields)]
         pub struct PlanSettings {
             $($(#[$doc])* pub $field: $type,)*
-            /// Convex programs at most.
             pub programs: usize,
         }
 
@@ -111,7 +110,6 @@ fn check(name: &str, numbers: &[f64], most: f64) -> Result<(), String> {
     Err(format!("`{name}` is {found}, expected {expected}"))
 }
 
-/// A wanted jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Goal {
     goal_m: [f64; 2],
