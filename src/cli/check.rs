@@ -131,10 +131,9 @@ fn described(verdict: &Verdict) -> (String, Value) {
                 Some(gap) => format!("the largest difference seen is{}", gap_text(gap)),
                 None => "no difference was seen at any point".to_owned(),
             };
-            let text = format!(
-                "not decided: no proof, and no point where the difference is beyond rounding; {seen}{}",
-                terms_text(terms)
-            );
+            let text =
+                "not decided: no proof, and no point where the difference is beyond rounding";
+            let text = format!("{text}; {seen}{}", terms_text(terms));
             let point = largest.as_ref().map(gap_json);
             let json = json!({ "verdict": "not decided", "point": point, "terms": terms });
             (text, json)

@@ -121,10 +121,7 @@ fn text(
     text
 }
 
-fn planned(
-    arguments: &CompileArguments,
-    model: &ReducedModel,
-) -> Result<Option<PlannedJump>, Error> {
+fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<PlannedJump>, Error> {
     let Some(path) = &arguments.plan else {
         return Ok(None);
     };
@@ -156,7 +153,7 @@ fn emit(
         precision: code.precision,
         sines: code.sincos,
         units: code.units.of_interface(),
-        plan: planned(arguments, model)?,
+        plan: jump(arguments, model)?,
         print: PrintOptions {
             rounding,
             width_em: print.width,

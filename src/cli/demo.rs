@@ -15,7 +15,6 @@ use crate::simplify::Tolerance;
 use crate::train::sha256;
 
 const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4.json"));
-
 const JUMP_1: &[u8] = include_bytes!("../../examples/recordings/go1/test_01.csv.gz");
 const JUMP_2: &[u8] = include_bytes!("../../examples/recordings/go1/test_02.csv.gz");
 const JUMP_3: &[u8] = include_bytes!("../../examples/recordings/go1/test_03.csv.gz");

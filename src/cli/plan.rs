@@ -83,27 +83,20 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     }
     let (model, verdict) = (arguments.model.display().to_string(), &planned.verdict);
     let margins = &planned.margins;
-    let [slip, drift] = [margins.foot_slip_m, margins.foot_drift_m].map(|of| of.map(|m| 1e3 * m));
+    let [[slip, lift], [drift, sink]] =
+        [margins.foot_slip_m, margins.foot_drift_m].map(|of| of.map(|m| 1e3 * m));
+    let ([distance, apex], word) = (planned.goal_m, verdict.word());
+    let (cost, deviation) = (planned.cost, planned.input_deviation);
+    let torque = 100.0 * margins.torque_share;
     let mut text = format!(
-        "{model}: a jump of {} m with an apex of {} m: {}\n\n{table}\n\
-         cost {:.3}; largest deviation of the input from the recorded ones: {:.2} standard deviations\n\
-         largest torque {:.0} % of its limit; feet on the ground move {:.1} mm along the floor and \
-         {:.1} mm above it beyond those of the training's mean jump to this goal, {:.1} mm along it and {:.1} mm \
-         below it in all\n{} convex programs, {:.0} ms\n",
-        planned.goal_m[0],
-        planned.goal_m[1],
-        verdict.word(),
-        planned.cost,
-        planned.input_deviation,
-        100.0 * margins.torque_share,
-        slip[0],
-        slip[1],
-        drift[0],
-        drift[1],
-        planned.programs,
-        planned.solve_ms,
+        "{model}: a jump of {distance} m with an apex of {apex} m: {word}\n\n{table}\n\
+         cost {cost:.3}; largest deviation of the input from the recorded ones: {deviation:.2} standard deviations\n\
+         largest torque {torque:.0} % of its limit; feet on the ground move {slip:.1} mm along the floor and \
+         {lift:.1} mm above it beyond those of the training's mean jump to this goal, {drift:.1} mm along it and \
+         {sink:.1} mm below it in all\n{} convex programs, {:.0} ms\n",
+        planned.programs, planned.solve_ms,
     );
-    text += &lines(&format!("{}: ", verdict.word()), verdict.reasons());
+    text += &lines(&format!("{word}: "), verdict.reasons());
     let mut json = json!({ "model": model });
     extend(&mut json, plan_json(planned));
     json["output"] = json!(shown(&arguments.output));

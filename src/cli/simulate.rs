@@ -52,10 +52,9 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     let sums = [&assessment.full, &assessment.restarted].into_iter();
     let kinds = ["full", "restarted"].into_iter().zip(sums);
     for (kind, sums) in kinds.filter(|(_, sums)| sums.diverged > 0) {
-        text += &format!(
-            "{} of {} {kind} rollouts diverged; the table covers them up to there\n\n",
-            sums.diverged, sums.windows
-        );
+        let (diverged, all) = (sums.diverged, sums.windows);
+        let words = "rollouts diverged; the table covers them up to there";
+        text += &format!("{diverged} of {all} {kind} {words}\n\n");
     }
     text += &format!(
         "root mean square by phase, restarted every {} s\n\n{}\n{}\n",
@@ -72,15 +71,14 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     text += &lines("decoder mean square: ", mean_square);
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let (lift, r2) = (&assessment.lift, assessment.lift.torque.r2());
+    let (all, loss) = (lift.torque.r2_all(), assessment.combined_loss());
+    let figures = [loss, r2.contact, r2.flight, all, lift.inconsistency()];
+    let [loss, contact, flight, all, inconsistency] = figures.map(shown);
     text += &format!(
-        "active terms: {}, combined loss L_mod: {}\n\
-         plain lift of exactly projected inputs: torque R^2 {} in contact, {} in flight, {} over all samples; inconsistency {}\n",
-        assessment.active_terms,
-        shown(assessment.combined_loss()),
-        shown(r2.contact),
-        shown(r2.flight),
-        shown(lift.torque.r2_all()),
-        shown(lift.inconsistency())
+        "active terms: {}, combined loss L_mod: {loss}\n\
+         plain lift of exactly projected inputs: torque R^2 {contact} in contact, {flight} in flight, {all} over all \
+         samples; inconsistency {inconsistency}\n",
+        assessment.active_terms
     );
     text + &lines("\nnote: ", &assessment.remarks)
 }

@@ -51,7 +51,7 @@ impl AllFigures {
     }
 }
 
-pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures, ModelError> {
+pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures> {
     let mut figures = AllFigures::default();
     let (model, assessment) = (content.model, content.assessment);
     if let Some(run) = assessment.runs.first() {
@@ -92,7 +92,7 @@ fn encoder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
     run: &SegmentRun<'_>,
-) -> Result<Figure, ModelError> {
+) -> Result<Figure> {
     let x = run.segment.x.column(0).into_owned();
     // d z / d x in SI units; without the scaling it is W_e of a linear encoder
     let weights = model.encoder_jacobian(&x)?;

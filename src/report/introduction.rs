@@ -12,7 +12,7 @@ pub(crate) struct Introduction {
     pub recordings: Table,
 }
 
-pub(crate) fn introduction(content: &Content<'_>) -> Result<Introduction, ModelError> {
+pub(crate) fn introduction(content: &Content<'_>) -> Result<Introduction> {
     let mut sentences = vec![subject(content)?, compared(content), errors(content)];
     sentences.extend(beside_pendulum(content));
     sentences.extend(commands(content));
@@ -60,7 +60,7 @@ fn cause(content: &Content<'_>) -> Option<String> {
     })
 }
 
-fn subject(content: &Content<'_>) -> Result<String, ModelError> {
+fn subject(content: &Content<'_>) -> Result<String> {
     let (model, assessment) = (content.model, content.assessment);
     let robot = model.robot().map_or("a robot", |robot| robot.name());
     let phases: Vec<&str> = model.phases().iter().map(|p| p.name.as_str()).collect();
@@ -204,7 +204,7 @@ fn commands(content: &Content<'_>) -> Option<String> {
     })
 }
 
-fn recordings(content: &Content<'_>) -> Result<Table, ModelError> {
+fn recordings(content: &Content<'_>) -> Result<Table> {
     let rows = Jump::all(content)?.into_iter().map(|jump| {
         let rms = jump.body_rms_m();
         (jump.place.words, jump.run.segment, rms)

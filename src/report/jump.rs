@@ -12,10 +12,7 @@ use crate::sim::Rollout;
 
 const FRAMES: usize = 10;
 
-pub(crate) fn modelled(
-    model: &ReducedModel,
-    run: &SegmentRun<'_>,
-) -> Result<Vec<bool>, ModelError> {
+pub(crate) fn modelled(model: &ReducedModel, run: &SegmentRun<'_>) -> Result<Vec<bool>> {
     let weights = model.encoder_jacobian(&run.segment.x.column(0).into_owned())?;
     Ok((weights.column_iter().map(|column| column.amax() != 0.0)).collect())
 }
@@ -45,8 +42,8 @@ type Samples = Vec<Option<DVector<f64>>>;
 fn predicted(
     run: &SegmentRun<'_>,
     rollout: &Rollout,
-    value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>, ModelError>,
-) -> Result<Samples, ModelError> {
+    value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>>,
+) -> Result<Samples> {
     let states = rollout.states(run.latent.len()).into_iter();
     let value = |(sample, state): (usize, Option<(DVector<f64>, DVector<f64>)>)| {
         state.map(|(z, dz)| value(sample, &z, &dz)).transpose()
@@ -65,11 +62,7 @@ pub(super) struct Jump<'a> {
 }
 
 impl<'a> Jump<'a> {
-    fn new(
-        content: &Content<'a>,
-        index: usize,
-        run: &'a SegmentRun<'a>,
-    ) -> Result<Self, ModelError> {
+    fn new(content: &Content<'a>, index: usize, run: &'a SegmentRun<'a>) -> Result<Self> {
         let (model, assessment, path) = (content.model, content.assessment, &run.segment.path);
         let mut place = JumpName::of_recording(index, path);
         let same = assessment.runs.iter().filter(|of| of.segment.path == *path);
@@ -88,7 +81,7 @@ impl<'a> Jump<'a> {
         })
     }
 
-    pub(super) fn all(content: &Content<'a>) -> Result<Vec<Self>, ModelError> {
+    pub(super) fn all(content: &Content<'a>) -> Result<Vec<Self>> {
         let runs = content.assessment.runs.iter().enumerate();
         (runs.map(|(index, run)| Self::new(content, index, run))).collect()
     }
@@ -188,10 +181,11 @@ impl<'a> Jump<'a> {
             self.panel(format!("{title} (not modelled)"), vec![line])
         };
         let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| {
-            let caption = format!(
-                "{what} of {}: recorded, and decoded from the model's rollouts. Grey: flight.",
-                self.place.words
+            let (of, words) = (
+                &self.place.words,
+                "recorded, and decoded from the model's rollouts",
             );
+            let caption = format!("{what} of {of}: {words}. Grey: flight.");
             self.rollout_figure(id, caption, rows.map(panel).collect())
         };
         let body = JOINT_DIM..names.len();
@@ -202,7 +196,7 @@ impl<'a> Jump<'a> {
     }
 
     /// Figure 12 of the paper.
-    pub(crate) fn accelerations(&self) -> Result<Figure, ModelError> {
+    pub(crate) fn accelerations(&self) -> Result<Figure> {
         let latent = &self.run.latent;
         let ddz = |k: usize, z: &DVector<f64>, dz: &DVector<f64>| {
             let u_lat = latent.u_lat.column(k).into_owned();

@@ -38,3 +38,5 @@ use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
 use crate::typeset::words::counted;
 use crate::typeset::{Cell, Table, rounded, significant};
 use figures::{Film, Motion, Panel, Role, Series, film_strip, floor_m};
+
+type Result<T, E = ModelError> = std::result::Result<T, E>;

@@ -105,7 +105,6 @@ fn layout(figure: &Figure) -> &'static str {
 }
 
 const LONGEST_LIST: usize = 24;
-
 const DIGEST: usize = 12;
 
 #[derive(Default)]

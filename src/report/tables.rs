@@ -306,14 +306,10 @@ fn baseline_json(baseline: &Baseline) -> Value {
     })
 }
 
-fn rollouts_json(
-    model: &ReducedModel,
-    assessment: &Assessment<'_>,
-    sums: &CoordinateSums,
-) -> Value {
+fn rollouts_json(model: &ReducedModel, of: &Assessment<'_>, sums: &CoordinateSums) -> Value {
     let named = |fits: Vec<Option<Fit>>| -> Map<String, Value> {
-        let names = assessment.names.iter().cloned();
-        let fits = assessment.units.iter().zip(fits).map(|(unit, fit)| {
+        let names = of.names.iter().cloned();
+        let fits = of.units.iter().zip(fits).map(|(unit, fit)| {
             let (rms, r2) = (fit.map(|fit| fit.rms), fit.and_then(|fit| fit.r2));
             json!({ "unit": unit, "rms": rms, "r2": r2 })
         });

@@ -102,18 +102,14 @@ impl Store {
 }
 
 fn difference(found: &Plan, expected: &Plan) -> Option<&'static str> {
+    let sets = |plan: &Plan| (plan.recordings.clone(), plan.training);
+    let dims = found.latent_dims != expected.latent_dims;
     let parts = [
         ("the versions of romc", found.romc != expected.romc),
         ("the methods", found.method != expected.method),
         ("the settings", found.settings != expected.settings),
-        (
-            "the recordings",
-            (&found.recordings, found.training) != (&expected.recordings, expected.training),
-        ),
-        (
-            "the latent dimensions",
-            found.latent_dims != expected.latent_dims,
-        ),
+        ("the recordings", sets(found) != sets(expected)),
+        ("the latent dimensions", dims),
         ("the numbers of seeds", found.seeds != expected.seeds),
     ];
     let first = parts.into_iter().find(|(_, differs)| *differs);
@@ -128,11 +124,7 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudyError> {
     })
 }
 
-fn write_json<T: Serialize>(
-    path: &Path,
-    value: &T,
-    overwrite: Overwrite,
-) -> Result<(), StudyError> {
+fn write_json(path: &Path, value: &impl Serialize, overwrite: Overwrite) -> Result<(), StudyError> {
     let text = serde_json::to_string_pretty(value).map_err(io::Error::from);
     let written = text.and_then(|text| write_whole(path, overwrite, |out| writeln!(out, "{text}")));
     written.map_err(refused(path, "write"))

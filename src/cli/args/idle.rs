@@ -11,7 +11,8 @@ use crate::import::Format;
 use crate::mpc::Lift;
 
 impl Arguments {
-    pub(crate) fn refuse_idle(&self) -> Result<(), Error> {
+    /// Refuses the first flag that has no effect.
+    pub fn refuse_idle(&self) -> Result<(), Error> {
         match &self.command {
             Command::Compile(arguments) => of_compile(arguments),
             Command::Inspect(arguments) => of_inspect(arguments),

@@ -24,7 +24,6 @@ use crate::robot::input_rule::DRY_SPEED_RAD_S;
 
 pub(crate) const LEAST_MANIPULABILITY: f64 = 0.04;
 const ROLLING_SPEED_RAD_S: f64 = 0.05;
-
 pub const BODY_ROWS: usize = PARAMETER_DIM + 1;
 pub const JOINT_ROWS: usize = 12;
 

@@ -277,10 +277,7 @@ fn mended(path: &Path, segments: &[Timed]) -> Option<String> {
 const MASS: (f64, f64) = (0.05, 4.0);
 const LEAST_BLOCKS: usize = 3; // fewest blocks of a jump whose mass is compared
 
-pub(super) fn require_physics(
-    recordings: &[Recording],
-    robot: &Robot,
-) -> Result<(), IdentifyError> {
+fn require_physics(recordings: &[Recording], robot: &Robot) -> Result<(), IdentifyError> {
     let balances = (recordings.iter()).map(|recording| Balance::of(recording, robot));
     let balances: Vec<Balance> = balances.collect();
     match contradiction(&balances) {
@@ -289,7 +286,7 @@ pub(super) fn require_physics(
     }
 }
 
-pub(super) fn require_one_robot(
+fn require_one_robot(
     recordings: &[Recording],
     segments: &[Range<usize>],
     windows: &Windows,

@@ -133,8 +133,9 @@ impl Identification {
     /// Why these values are no robot's. Upwards forces alone may fit better: commanded torques are noisy there.
     pub fn contradiction(&self) -> Option<String> {
         if (self.gravity_m_s2 / GRAVITY_M_S2 - 1.0).abs() > NO_GRAVITY_SHARE {
+            let expected = format!("expected {GRAVITY_M_S2}: do not use these values");
             return Some(format!(
-                "gravity is {:.2} m/s^2, expected {GRAVITY_M_S2}: do not use these values",
+                "gravity is {:.2} m/s^2, {expected}",
                 self.gravity_m_s2
             ));
         }

@@ -203,7 +203,6 @@ pub fn usual_settings(recordings: &[Recording]) -> MpcSettings {
     }
 }
 
-/// Speed of a push, m/s.
 const PUSH_M_S: f64 = 0.1;
 const PUSHES: [[f64; 3]; 4] = [
     [1.0, 0.0, 0.0],
@@ -236,10 +235,10 @@ pub(super) struct Recovery {
 }
 
 /// The controller's feedback in a closed loop that no model has a part in: along a recording the measured state is the
-/// reference, so that feedback has nothing to do. Here the trunk gets a push and moves on by Newton's law under what the
-/// commanded torques differ from the recorded ones, `m dv' = sum_k R F_k(tau_command - tau_recorded)` with `F_k = -J_k^-T
-/// tau_k` for each foot `k` on the ground, `dp' = dv`, `J_k dq_k = -R^T dp`. The controller measures the recorded state
-/// plus this deviation.
+/// reference, so that feedback has nothing to do. Here the trunk gets a push and moves on by Newton's law under what
+/// the commanded torques differ from the recorded ones, `m dv' = sum_k R F_k(tau_command - tau_recorded)` with `F_k =
+/// -J_k^-T tau_k` for each foot `k` on the ground, `dp' = dv`, `J_k dq_k = -R^T dp`. The controller measures the
+/// recorded state plus this deviation.
 pub(super) fn recovery(
     controller: &mut Controller,
     recording: &Recording,

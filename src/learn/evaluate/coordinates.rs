@@ -206,12 +206,8 @@ pub fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
     !exceeds(torque_nm, robot.torque_limit_nm(), IMPLAUSIBLE)
 }
 
-pub(super) fn exceeds(
-    torque_nm: &[f64; JOINT_DIM],
-    limits: &[f64; JOINT_DIM],
-    factor: f64,
-) -> bool {
-    let mut pairs = torque_nm.iter().zip(limits);
+pub(super) fn exceeds(torques: &[f64; JOINT_DIM], limits: &[f64; JOINT_DIM], factor: f64) -> bool {
+    let mut pairs = torques.iter().zip(limits);
     pairs.any(|(torque, limit)| torque.is_nan() || torque.abs() > factor * limit)
 }
 

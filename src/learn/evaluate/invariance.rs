@@ -126,7 +126,7 @@ impl<'m> Probe<'m> {
         })
     }
 
-    /// By how much `ddz` changes with each of `(z, dz, u_lat)`, `latent_dim x 3 latent_dim`, by differences over a unit.
+    /// By how much `ddz` changes with each of `(z, dz, u_lat)`, `latent_dim x 3 latent_dim`, over a unit.
     fn gain(&self, ddz: &DVector<f64>) -> Result<DMatrix<f64>, ModelError> {
         let (model, d) = (self.model, self.model.latent_dim());
         let u_lat = &model.tangent(self.rest)?.project * &self.input;

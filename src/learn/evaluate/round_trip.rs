@@ -91,10 +91,8 @@ impl RoundTrip {
     /// What is wrong with the model along the recordings, if anything is, and the option of an import that mends it.
     pub fn fault(&self) -> Option<String> {
         if !self.maps_fit() {
-            let found = format!(
-                "decode(encode(x)) misses the recordings by {:.3} times their variance",
-                self.error
-            );
+            let found = "decode(encode(x)) misses the recordings by";
+            let found = format!("{found} {:.3} times their variance", self.error);
             return Some(match &self.slip {
                 Some((advice, error)) => format!("{found}, by {error:.3} times {advice}"),
                 None => format!(
@@ -244,11 +242,8 @@ impl<'m> Samples<'m> {
         })
     }
 
-    fn best_of(
-        &self,
-        slips: impl Iterator<Item = Slip>,
-    ) -> Result<Option<(Slip, f64)>, ModelError> {
-        let found = slips.map(|slip| self.error(&slip).map(|error| (slip, error)));
+    fn best_of(&self, all: impl Iterator<Item = Slip>) -> Result<Option<(Slip, f64)>, ModelError> {
+        let found = all.map(|slip| self.error(&slip).map(|error| (slip, error)));
         let found: Vec<(Slip, f64)> = found.collect::<Result<_, _>>()?;
         let least = found.iter().map(|(_, error)| *error);
         let least = least.fold(f64::INFINITY, f64::min);

@@ -12,7 +12,6 @@ const TORQUE_R2: f64 = 0.5;
 const UNPLANNED_SHARE: f64 = 0.5;
 /// Least number of latent directions in which inputs act on the ground: forwards and upwards.
 const LEAST_RANK: usize = 2;
-
 const WHOLE: &str = "whole motion";
 const TORQUES: &str = "torques";
 const CONTROL: &str = "control";
@@ -127,13 +126,11 @@ pub struct Verdict {
 
 impl Verdict {
     pub fn fails_predictions(&self) -> bool {
-        let others = [TORQUES, CONTROL];
-        (self.failed.iter()).any(|of| !others.contains(&of.as_str()))
+        (self.failed.iter()).any(|of| ![TORQUES, CONTROL].contains(&of.as_str()))
     }
 
     pub fn fails_control(&self) -> bool {
-        let mut failed = self.failed.iter();
-        failed.any(|of| [TORQUES, CONTROL].contains(&of.as_str()))
+        (self.failed.iter()).any(|of| [TORQUES, CONTROL].contains(&of.as_str()))
     }
 }
 

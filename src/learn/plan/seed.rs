@@ -6,7 +6,6 @@ use crate::model::{JumpPart, Landmark};
 use crate::robot::{BODY_NAMES, InputRule, JOINT_NAMES};
 
 pub(crate) const PITCH: usize = 16;
-
 const LOST_ANGLE_RAD: f64 = 0.15;
 /// Differences of the start to its decoded one from which on they are reported.
 const LOST_PLACE_M: f64 = 0.03;

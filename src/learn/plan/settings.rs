@@ -20,7 +20,6 @@ macro_rules! settings {
         #[serde(default, deny_unknown_fields)]
         pub struct PlanSettings {
             $($(#[$doc])* pub $field: $type,)*
-            /// Convex programs at most.
             pub programs: usize,
         }
 
@@ -111,7 +110,6 @@ fn check(name: &str, numbers: &[f64], most: f64) -> Result<(), String> {
     Err(format!("`{name}` is {found}, expected {expected}"))
 }
 
-/// A wanted jump.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Goal {
     goal_m: [f64; 2],
@@ -149,28 +147,22 @@ impl Goal {
     }
 
     /// Refuses goals that are farther from the training jumps' range than `reach` times its width.
-    pub(super) fn check_within(
-        &self,
-        prior: &JumpPrior,
-        start_height_m: f64,
-        reach: f64,
-    ) -> Result<()> {
+    pub(super) fn check_within(&self, prior: &JumpPrior, height_m: f64, reach: f64) -> Result<()> {
         // Heights count from wherever the recordings have their zero.
         let names = [
             ("distance", 0.0),
             ("apex", 0.0),
             ("height at the start", f64::NEG_INFINITY),
         ];
-        let values = [self.goal_m[0], self.goal_m[1], start_height_m];
+        let values = [self.goal_m[0], self.goal_m[1], height_m];
         for ((found, range), (what, floor)) in values.into_iter().zip(prior.ranges()).zip(names) {
             let width = (range.most - range.least).max(0.02);
             let least = (range.least - reach * width).max(floor);
             let most = range.most + reach * width;
             if !(least..=most).contains(&found) {
-                let expected = format!(
-                    "{least:.3} to {most:.3} m: the recorded jumps have {:.3} to {:.3} m",
-                    range.least, range.most
-                );
+                let recorded = format!("{:.3} to {:.3} m", range.least, range.most);
+                let expected =
+                    format!("{least:.3} to {most:.3} m: the recorded jumps have {recorded}");
                 return Err(PlanError::Goal {
                     what,
                     found,
@@ -182,13 +174,8 @@ impl Goal {
     }
 
     /// Inside the ranges less a `share` at either end: a regression over few jumps is not to be trusted at its ends.
-    pub(super) fn clipped(
-        &self,
-        prior: &JumpPrior,
-        start_height_m: f64,
-        share: f64,
-    ) -> [f64; GOAL_DIM] {
-        let values = [self.goal_m[0], self.goal_m[1], start_height_m];
+    pub(super) fn clipped(&self, prior: &JumpPrior, height_m: f64, share: f64) -> [f64; GOAL_DIM] {
+        let values = [self.goal_m[0], self.goal_m[1], height_m];
         std::array::from_fn(|i| {
             let range = &prior.ranges()[i];
             let inset = share * (range.most - range.least);
@@ -207,27 +194,8 @@ pub enum PlanError {
         found: f64,
         expected: String,
     },
-    #[error(
-        "no plan for {distance_m} m with an apex of {apex_m} m: {outcome:?} in convex program {iteration}"
-    )]
-    Unsolved {
-        distance_m: f64,
-        apex_m: f64,
-        outcome: Outcome,
-        /// Number of the program, from 1.
-        iteration: usize,
-    },
-    #[error(
-        "no plan for {distance_m} m with an apex of {apex_m} m: the equations are still off by \
-         {defect:.1e} after {iterations} convex programs"
-    )]
-    NotConverged {
-        distance_m: f64,
-        apex_m: f64,
-        /// Largest violation of an equation, in standard deviations of its coordinate.
-        defect: f64,
-        iterations: usize,
-    },
+    #[error("no plan for {} m with an apex of {} m: {found}", goal_m[0], goal_m[1])]
+    Unsolved { goal_m: [f64; 2], found: String },
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]

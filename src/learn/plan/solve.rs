@@ -74,7 +74,7 @@ pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Resul
 }
 
 fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize)> {
-    let [distance_m, apex_m] = task.seed.goal.goal_m();
+    let goal_m = task.seed.goal.goal_m();
     let settings = QpSettings {
         profile: SolverProfile::Scaled,
         max_iterations: 60,
@@ -88,12 +88,8 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize)> {
         let usable = matches!(outcome, Outcome::Solved)
             || (outcome == Outcome::Inaccurate && solver.residuals().worst() < 1e-3);
         if !usable || next.iter().any(|value| !value.is_finite()) {
-            return Err(PlanError::Unsolved {
-                distance_m,
-                apex_m,
-                outcome,
-                iteration,
-            });
+            let found = format!("{outcome:?} in convex program {iteration}");
+            return Err(PlanError::Unsolved { goal_m, found });
         }
         let pairs = next.iter().zip(&y);
         let step = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
@@ -108,12 +104,10 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize)> {
             return Ok((y, iteration));
         }
     }
-    Err(PlanError::NotConverged {
-        distance_m,
-        apex_m,
-        defect: task.defect(&y),
-        iterations: task.settings.programs,
-    })
+    let (defect, programs) = (task.defect(&y), task.settings.programs);
+    let found =
+        format!("the equations are still off by {defect:.1e} after {programs} convex programs");
+    Err(PlanError::Unsolved { goal_m, found })
 }
 
 fn input_deviation(task: &Task<'_>, y: &[f64]) -> f64 {
@@ -214,7 +208,6 @@ fn point(model: &ReducedModel, goal_m: [f64; 2], settings: &PlanSettings) -> Res
         Err(
             PlanError::Goal { .. }
             | PlanError::Unsolved { .. }
-            | PlanError::NotConverged { .. }
             | PlanError::Control(_)
             | PlanError::Recording(_),
         ) => ("no plan", None),

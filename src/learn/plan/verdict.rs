@@ -36,14 +36,9 @@ impl Verdict {
     }
 }
 
-/// The verdict on what a point of a task plans; `weight_share` of the weight is carried by its torques.
-pub(crate) fn verdict(
-    task: &Task<'_>,
-    y: &[f64],
-    plan: &Plan,
-    weight_share: Option<f64>,
-) -> Verdict {
-    let refused = refusals(task, y, plan, weight_share);
+/// The verdict on what a point of a task plans; `carried` of the weight is carried by its torques.
+pub(crate) fn verdict(task: &Task<'_>, y: &[f64], plan: &Plan, carried: Option<f64>) -> Verdict {
+    let refused = refusals(task, y, plan, carried);
     if !refused.is_empty() {
         return Verdict::Refused(refused);
     }
@@ -57,7 +52,7 @@ fn reasons(rules: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
     rules.into_iter().flatten().collect()
 }
 
-fn refusals(task: &Task<'_>, y: &[f64], plan: &Plan, weight_share: Option<f64>) -> Vec<String> {
+fn refusals(task: &Task<'_>, y: &[f64], plan: &Plan, carried: Option<f64>) -> Vec<String> {
     let slack = |bound: Bound| {
         let slack = y[task.slack(bound)];
         let percent = 100.0 * slack;
@@ -77,7 +72,7 @@ fn refusals(task: &Task<'_>, y: &[f64], plan: &Plan, weight_share: Option<f64>) 
     let percent = 100.0 * plan.margins.torque_share;
     let joint = plan.margins.beyond_joint_limit_rad;
     let force = plan.margins.beyond_friction_n;
-    let carried = weight_share.filter(|share| *share < LEAST_WEIGHT_SHARE);
+    let carried = carried.filter(|share| *share < LEAST_WEIGHT_SHARE);
     let settings = task.settings;
     let (deviation, most) = (plan.input_deviation, settings.refuse_deviation);
     reasons(Bound::ALL.map(slack).into_iter().chain([

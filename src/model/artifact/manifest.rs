@@ -17,7 +17,6 @@ use crate::robot::{Actuators, Robot, WrenchFrame};
 use crate::robot_file::{self, RobotEntry};
 
 pub(crate) const SCHEMA: &str = "romc-model/1";
-
 /// With `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a `robot` that is described.
 pub(crate) const SCHEMA_2: &str = "romc-model/2";
 
@@ -106,7 +105,7 @@ impl Manifest {
         };
         let robot = self.robot.map(|robot| robot.robot(file)).transpose()?;
         let library = Library::of(self.latent_dim, self.library).map_err(refused)?;
-        let mut builder = ReducedModel::builder(self.name, library)
+        ReducedModel::builder(self.name, library)
             .description(self.description)
             .state(self.state)
             .input(self.input)
@@ -117,11 +116,12 @@ impl Manifest {
             .wrench_frame(self.wrench_frame.unwrap_or_default())
             .jump_prior(prior)
             .sample_time_s(self.sample_time_s)
-            .provenance(self.provenance);
-        builder.encoder = self.encoder;
-        builder.decoder = self.decoder;
-        builder.statistics = self.input_statistics;
-        builder.build().map_err(refused)
+            .provenance(self.provenance)
+            .encoder(self.encoder)
+            .decoder(self.decoder)
+            .all_input_statistics(self.input_statistics)
+            .build()
+            .map_err(refused)
     }
 
     pub(super) fn later_key(&self) -> Option<&'static str> {
@@ -306,6 +306,7 @@ fn object<'de, D: Deserializer<'de>>(source: D) -> Result<Map<String, Value>, D:
     }
 }
 
+/// JSON of any form; the bound is on its number of values, each of which takes up to a hundred times its bytes.
 struct Bounded<'a>(&'a Cell<usize>);
 
 impl<'de> DeserializeSeed<'de> for Bounded<'_> {

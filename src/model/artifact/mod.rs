@@ -1,12 +1,8 @@
 //! The model file, `romc-model/1` and `romc-model/2`.
 //!
-//! The second adds `actuators` and `wrench_frame`, how the model's inputs come from torques, `landmarks` and `prior` of
-//! the training jumps, for planning, inputs given states, and robots that are described in the file; a model without
-//! them is written as the first.
-//!
-//! What enters: a path or bytes; what leaves: a checked [`ReducedModel`], or an error which names file, tensor, index,
-//! what was found and what was expected. The other way, [`write()`] makes files that are equal byte for byte for equal
-//! models, and that appear whole or not at all. Read `manifest.rs` first: it is the file's grammar.
+//! A path or bytes enter; a checked [`ReducedModel`] leaves, or an error which names file, tensor, index, what was found
+//! and what was expected. [`write()`] makes files that are equal byte for byte for equal models. Read `manifest.rs`
+//! first: it is the file's grammar.
 //!
 //! ```
 //! use romc::artifact;

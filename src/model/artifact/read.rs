@@ -4,6 +4,8 @@ use std::error::Error;
 use std::fs::File;
 use std::io::{self, Read};
 
+use serde::Deserialize;
+
 use super::manifest::{SCHEMA, SCHEMA_2, SchemaProbe};
 use super::*;
 use crate::files::size::Format;
@@ -62,10 +64,7 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
     }
 }
 
-fn parse<'de, T: serde::Deserialize<'de>>(
-    file: &str,
-    bytes: &'de [u8],
-) -> Result<T, ArtifactError> {
+fn parse<'de, T: Deserialize<'de>>(file: &str, bytes: &'de [u8]) -> Result<T, ArtifactError> {
     let syntax = |place: String, error: &serde_json::Error| {
         // serde_json ends its messages with line and column, which the fault has anyway.
         let text = error.to_string();

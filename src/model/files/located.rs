@@ -6,7 +6,6 @@ use std::fmt;
 
 use super::*;
 
-/// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     Whole,

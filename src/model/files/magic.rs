@@ -8,9 +8,7 @@ use super::*;
 
 /// Bytes that [`recognised`] needs of a file.
 pub const MAGIC_BYTES: usize = 512;
-
 pub const MCAP: &[u8] = b"\x89MCAP0\r\n";
-
 const SEARCHED: usize = 1 << 16;
 
 /// Arrays become columns; those of two axes one for each of the second.

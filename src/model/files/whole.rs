@@ -77,9 +77,7 @@ pub fn write_whole(
 }
 
 const ENDING: &str = ".part";
-
 const DIGITS: usize = 16;
-
 const MAX_TRIED: usize = 16;
 
 /// A new hidden file, removed unless it is moved to its place; its lock shows that the process lives.

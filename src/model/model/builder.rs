@@ -71,6 +71,8 @@ impl ModelBuilder {
         state: impl Into<Option<CoordinateNames>>;
         input: impl Into<Option<CoordinateNames>>;
         scaling: impl Into<Option<Scaling>>;
+        encoder: impl Into<Option<StateMap>>;
+        decoder: impl Into<Option<StateMap>>;
         robot: impl Into<Option<&'static Robot>>;
         actuators: Option<Actuators>;
         wrench_frame: WrenchFrame;
@@ -84,27 +86,13 @@ impl ModelBuilder {
         self
     }
 
-    pub fn input_statistics(
-        mut self,
-        phase: impl Into<String>,
-        statistics: InputStatistics,
-    ) -> Self {
-        self.statistics.push((phase.into(), statistics));
+    pub fn input_statistics(mut self, phase: impl Into<String>, known: InputStatistics) -> Self {
+        self.statistics.push((phase.into(), known));
         self
     }
 
     pub fn all_input_statistics(mut self, statistics: Vec<(String, InputStatistics)>) -> Self {
         self.statistics = statistics;
-        self
-    }
-
-    pub fn encoder(mut self, encoder: impl Into<StateMap>) -> Self {
-        self.encoder = Some(encoder.into());
-        self
-    }
-
-    pub fn decoder(mut self, decoder: impl Into<StateMap>) -> Self {
-        self.decoder = Some(decoder.into());
         self
     }
 

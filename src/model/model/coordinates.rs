@@ -107,9 +107,7 @@ impl ScaleFactors {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scaling {
-    /// `s_x`, for `x`, `dx`, `ddx`.
     pub state: ScaleFactors,
-    /// `s_u`, for `u`.
     pub input: ScaleFactors,
 }
 

@@ -1,7 +1,5 @@
 //! Faults of models, and of calls of their functions.
 
-use std::ops::RangeInclusive;
-
 use nalgebra::{Matrix, RawStorage};
 
 use super::*;
@@ -10,7 +8,6 @@ use crate::symbolic::ParseError;
 
 pub(super) type Result<T, E = ModelError> = std::result::Result<T, E>;
 
-/// Why a model was refused, or could not answer.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ModelError {
     #[error("{what} {name:?} cannot be used in generated code")]

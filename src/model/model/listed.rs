@@ -5,7 +5,6 @@ use serde::{Deserialize as _, Deserializer};
 
 use super::*;
 
-/// A value with a form as lists.
 pub(super) trait Listed: Sized {
     type List: Serialize + DeserializeOwned;
 

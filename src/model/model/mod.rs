@@ -63,6 +63,7 @@ pub use statistics::{InputGivenState, InputStatistics};
 
 use std::collections::HashMap;
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use nalgebra::{DMatrix, DVector, Dim};
 use serde::{Deserialize, Serialize, Serializer};

@@ -8,13 +8,8 @@
 //! - `u_lat = pinv(W_e^T) (s_u u)` (project), `u = (W_e^T u_lat) / s_u` (lift);
 //! - `ddz = Xi^T Theta(z, dz, u_lat)` with the Xi of the phase that the feet select.
 //!
-//! `project(lift(u_lat)) == u_lat`, because an encoder has full row rank; the reverse does not hold.
-//!
-//! These are the linear maps. A nonlinear encoder or decoder ([`StateMap`]) has a Jacobian `J` at a state instead of
-//! `W`; `maps.rs` states what becomes of the equations.
-//!
-//! A function that needs a part which the model lacks returns [`ModelError::Missing`]; one that gets a vector of the
-//! wrong length, [`ModelError::Invalid`].
+//! `project(lift(u_lat)) == u_lat`, because an encoder has full row rank; the reverse does not hold. `maps.rs` has the
+//! equations of nonlinear maps. A function that needs a part which the model lacks returns [`ModelError::Missing`].
 
 use super::*;
 use crate::robot::{FeetRule, InputRule};

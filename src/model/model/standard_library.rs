@@ -235,11 +235,7 @@ impl StandardLibrary {
 }
 
 /// Monomials of some degrees over the names in an order of the state, graded.
-fn monomials(
-    names: &[String],
-    state: &[usize],
-    degrees: std::ops::RangeInclusive<u32>,
-) -> Vec<String> {
+fn monomials(names: &[String], state: &[usize], degrees: RangeInclusive<u32>) -> Vec<String> {
     let mut texts = Vec::new();
     // The monomials of one degree by their places in the order; with one more, none before the last.
     let mut monomials: Vec<Vec<usize>> = vec![Vec::new()];

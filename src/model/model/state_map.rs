@@ -154,6 +154,12 @@ impl From<AffineMap> for StateMap {
     }
 }
 
+impl From<AffineMap> for Option<StateMap> {
+    fn from(map: AffineMap) -> Self {
+        Some(map.into())
+    }
+}
+
 impl StateMap {
     pub fn new(tensor: &str, layers: Vec<Layer>) -> Result<Self> {
         let map = Self { layers };

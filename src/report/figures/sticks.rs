@@ -10,7 +10,6 @@ use crate::robot::input_rule::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 const TRUNK_HALF_HEIGHT_M: f64 = 0.05;
-
 const MARGIN_M: f64 = 0.04;
 
 pub(crate) struct Sticks {
