@@ -43,11 +43,9 @@ macro_rules! templates {
 mod controller;
 mod controller_c;
 mod emit;
-mod error;
 mod planned;
 
-pub use emit::{EmitOptions, Target, emit};
-pub use error::EmitError;
+pub use emit::{EmitError, EmitOptions, Target, emit};
 pub(crate) use planned::PlannedJump;
 
 /// The first line of a generated file: a comment in its language, or the text for a template to make one of.

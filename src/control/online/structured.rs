@@ -2,6 +2,7 @@
 
 use super::conic::{StageSolver, Start};
 use super::dense::Real;
+use super::error::ControlError;
 use super::qp::QpSettings;
 use super::stage::{Rows, StageCost, StageQp, StageShape};
 use crate::solver::{Cost, Links, Outcome, Program, Report, RowMatrices, Settings, Shape, Stage};
@@ -18,7 +19,7 @@ pub const RATE_SOFTNESS: f64 = 1e-8;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
-/// The solver of a horizon, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]; that of a lift where there are no
+/// The solver of a horizon, refused above [`MAX_STRUCTURED_DIM`] latent coordinates; that of a lift where there are no
 /// states. Dimensions in between those that are compiled are filled up with inputs and states that nothing moves, which
 /// changes no bit.
 pub(super) fn structured(
@@ -26,7 +27,7 @@ pub(super) fn structured(
     shape: StageShape,
     cost: &StageCost,
     settings: QpSettings,
-) -> Option<Box<dyn StageSolver>> {
+) -> Result<Box<dyn StageSolver>, ControlError> {
     let (is_linked, is_lift) = (shape.rate_rows > 0, shape.states == 0);
     let settings = Settings {
         max_iterations: settings.max_iterations,
@@ -41,10 +42,13 @@ pub(super) fn structured(
     macro_rules! of_dimension {
         ($($wide:literal: $(($nx:literal, $nu:literal))*;)*) => {
             match (has_avx2(), is_lift, inputs) {
-                $($(($wide, is_lift, $nu) if is_lift == ($nx < $nu) => Some(Box::new(
+                $($(($wide, is_lift, $nu) if is_lift == ($nx < $nu) => Ok(Box::new(
                     Structured::<$nx, $nu, $wide>::new(horizon, shape, cost, settings)
                 )),)*)*
-                _ => None,
+                _ => Err(ControlError::StructuredDim {
+                    found: shape.inputs,
+                    largest: MAX_STRUCTURED_DIM,
+                }),
             }
         };
     }

@@ -72,18 +72,18 @@ impl Writer<'_> {
         if here.output == Type::Unit {
             return self.statement(here, expression);
         }
-        let output = here.output.clone();
-        let value = self.value_as(here, expression, Some(&output))?;
-        self.return_value(here, value);
-        Ok(())
+        self.return_value(here, expression)
     }
 
-    fn return_value(&mut self, here: &mut Instance<'_>, value: Value) {
+    fn return_value(&mut self, here: &mut Instance<'_>, expression: &Expr) -> Found<()> {
+        let output = here.output.clone();
+        let value = self.value_as(here, expression, Some(&output))?;
         let cast = match &value.ty {
             Type::Named(of) if value.text.starts_with('{') => format!("({})", self.spelling(of)),
             _ => String::new(),
         };
         here.lines.add(&format!("return {cast}{};", value.text));
+        Ok(())
     }
 
     fn local(&mut self, here: &mut Instance<'_>, local: &Local) -> Found<()> {
@@ -201,17 +201,13 @@ impl Writer<'_> {
                 here.lines.add("continue;");
                 Ok(())
             }
-            Expr::Return(returned) => {
-                match &returned.expr {
-                    Some(expression) => {
-                        let output = here.output.clone();
-                        let value = self.value_as(here, expression, Some(&output))?;
-                        self.return_value(here, value);
-                    }
-                    None => here.lines.add("return;"),
+            Expr::Return(returned) => match &returned.expr {
+                Some(expression) => self.return_value(here, expression),
+                None => {
+                    here.lines.add("return;");
+                    Ok(())
                 }
-                Ok(())
-            }
+            },
             Expr::Assign(assign) => self.assign(here, assign),
             Expr::Binary(_) | Expr::Call(_) | Expr::MethodCall(_) => {
                 let value = self.value(here, expression)?;
