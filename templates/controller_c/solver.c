@@ -125,7 +125,7 @@ typedef struct {
     real (*soft)[NU];
 } solver_row_matrices;
 
-/* A program with the memory to solve it, all lent by the caller. */
+/* A program with the memory to solve it, all lent by the caller; LINKED if it has Links. */
 typedef struct {
     /* Stages of the horizon. */
     solver_stage *stages;

@@ -18,7 +18,7 @@ struct Reach<T> {
     second_largest: T,
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// First point of the iterations, to be centred: the guess, or the point of the gains.
     #[inline(always)]
     pub(super) fn start(&mut self, x0: &[T; NX], is_warm: bool) {

@@ -124,7 +124,7 @@ impl<'a, T: Real> Rows<'a, T> {
     }
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     #[inline(always)]
     pub(super) fn rows_of(&mut self, stage: usize) -> Rows<'_, T> {
         let memory = self.shape.memory();

@@ -314,14 +314,18 @@ impl<'a> Items<'a> {
         };
         let is_plain = |argument: &&syn::GenericArgument| match argument {
             syn::GenericArgument::Lifetime(_) => true,
-            syn::GenericArgument::Type(syn::Type::Path(of)) => {
-                ["T", "NX", "NU"].iter().any(|name| of.path.is_ident(name))
-            }
+            syn::GenericArgument::Type(syn::Type::Path(of)) => ["T", "NX", "NU", "LINKED"]
+                .iter()
+                .any(|name| of.path.is_ident(name)),
             _ => false,
         };
         match arguments.args.iter().find(|argument| !is_plain(argument)) {
             None => Ok(name.to_owned()),
-            Some(other) => Err(self.fault(source, other, "arguments of a struct are T, NX and NU")),
+            Some(other) => Err(self.fault(
+                source,
+                other,
+                "arguments of a struct are T, NX, NU and LINKED",
+            )),
         }
     }
 
