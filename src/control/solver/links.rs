@@ -181,16 +181,6 @@ impl<'m, T: Real, const NX: usize, const NU: usize, const LINKED: bool>
         LINKED
     }
 
-    /// How soft the rows are: not at all without links.
-    #[inline(always)]
-    pub(super) fn softness(&self) -> T {
-        if self.is_linked() {
-            self.links.softness
-        } else {
-            T::ZERO
-        }
-    }
-
     #[inline(always)]
     pub(super) fn link_rows(&self, k: usize) -> &'m [[T; NU]] {
         &self.links.rows[self.at(k) * self.shape.link..][..self.shape.link]
