@@ -10,7 +10,6 @@ macro_rules! templates {
     (#[$derive:meta] $($path:literal: $template:ident $source:literal),* $(,)?) => {
         templates! { @each [#[$derive]] $($template $source),* }
 
-        /// Path and text of each file.
         fn texts(facts: &Facts<'_>, provenance: &str) -> askama::Result<Vec<(String, String)>> {
             Ok(vec![$({
                 let banner = &crate::deploy::banner($path, provenance);

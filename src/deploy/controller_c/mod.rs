@@ -36,9 +36,7 @@ struct Facts<'a> {
     real: &'static str,
     /// Torque limits, an initialiser in double precision.
     torque_limit: String,
-    /// Limits of the joints.
     limits: &'a [(f64, f64)],
-    /// Suffix of libm's functions.
     f: &'static str,
     max_rows: usize,
     /// Numbers that the solver keeps per row.

@@ -9,7 +9,6 @@ use crate::function::{Instance, Writer};
 use crate::items::{Field, Items};
 use crate::types::Type;
 
-/// An expression of C.
 #[derive(Debug, Clone)]
 pub(crate) struct Value {
     pub(crate) text: String,
@@ -78,7 +77,6 @@ fn operator(op: &BinOp) -> Option<(&'static str, u8, bool)> {
     })
 }
 
-/// A number as C writes it.
 fn number(literal: &Lit) -> Option<(String, Type)> {
     match literal {
         Lit::Int(number) => Some((number.base10_digits().to_owned(), Type::Int)),
@@ -337,7 +335,6 @@ impl Writer<'_> {
         })
     }
 
-    /// An `if` as a value.
     fn choice(
         &mut self,
         here: &mut Instance<'_>,

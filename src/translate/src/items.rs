@@ -128,7 +128,6 @@ impl<'a> Items<'a> {
         above
     }
 
-    /// The fields of a struct, none of anything else.
     pub(crate) fn fields(&self, name: &str) -> &[Field] {
         self.structs.get(name).map_or(&[], |found| &found.fields)
     }
@@ -358,7 +357,6 @@ impl<'a> Items<'a> {
 }
 
 impl Writer<'_> {
-    /// The text of all that the functions need, and theirs.
     pub(crate) fn finish(self, unit: &Unit<'_>) -> Result<Translated, Fault> {
         let mut header = String::new();
         let mut source = String::new();

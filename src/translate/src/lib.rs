@@ -114,7 +114,6 @@ pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Faul
     writer.finish(unit)
 }
 
-/// The sources of a folder of `src/control`.
 fn read(root: &Path, folder: &str) -> Result<Vec<Source>, Fault> {
     let folder = format!("src/control/{folder}");
     let fault = |path: &str, error: std::io::Error| Fault {

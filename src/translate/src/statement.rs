@@ -11,7 +11,6 @@ use crate::text::comment;
 use crate::types::Type;
 use crate::{Fault, Found};
 
-/// Lines of C with their indent.
 #[derive(Default)]
 pub(crate) struct Lines {
     pub(crate) text: String,
@@ -67,7 +66,6 @@ impl Writer<'_> {
         self.items.fault(here.function.source, at, message)
     }
 
-    /// Returns the value of a body's last expression.
     fn result(&mut self, here: &mut Instance<'_>, expression: &Expr) -> Found<()> {
         if here.output == Type::Unit {
             return self.statement(here, expression);

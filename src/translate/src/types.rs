@@ -28,7 +28,6 @@ impl Type {
         }
     }
 
-    /// Elements of an array or slice.
     pub(crate) fn element(&self) -> Option<&Self> {
         match self.referent() {
             Self::Array(of, _) | Self::Slice(of) => Some(of),
