@@ -245,9 +245,13 @@ impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool> Sta
 /// Whether the processor has vectors of 256 bits.
 pub fn has_avx2() -> bool {
     #[cfg(target_arch = "x86_64")]
-    return is_x86_feature_detected!("avx2");
+    {
+        is_x86_feature_detected!("avx2")
+    }
     #[cfg(not(target_arch = "x86_64"))]
-    false
+    {
+        false
+    }
 }
 
 /// [`Program::prepare`], `WIDE` with AVX2, which the processor must have; the bits are the same.
