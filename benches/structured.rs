@@ -242,12 +242,12 @@ fn run<const NX: usize, const NU: usize>(
                 let x0 = std::array::from_fn(|i| step.x0[i] - step.reference[i]);
                 report = Some(match has_avx2() {
                     true => {
-                        prepare::<true, NX, NU>(&mut program);
-                        solve::<true, NX, NU>(&mut program, &x0, is_warm, &settings)
+                        prepare::<true, NX, NU, false>(&mut program);
+                        solve::<true, NX, NU, false>(&mut program, &x0, is_warm, &settings)
                     }
                     false => {
-                        prepare::<false, NX, NU>(&mut program);
-                        solve::<false, NX, NU>(&mut program, &x0, is_warm, &settings)
+                        prepare::<false, NX, NU, false>(&mut program);
+                        solve::<false, NX, NU, false>(&mut program, &x0, is_warm, &settings)
                     }
                 });
             });
@@ -301,7 +301,7 @@ fn run<const NX: usize, const NU: usize>(
 }
 
 fn write<const NX: usize, const NU: usize>(
-    program: &mut Program<'_, f64, NX, NU>,
+    program: &mut Program<'_, f64, NX, NU, false>,
     shared: &Loop<NU>,
     step: &Step,
 ) {

@@ -5,15 +5,19 @@ use once_cell::unsync::OnceCell;
 
 use super::controller;
 use super::controller_c;
-use super::error::EmitError;
 use super::planned::PlannedJump;
 use crate::codegen::script::Script;
-use crate::codegen::{Precision, SineCosine, Units, c, interface::ModelInterface, rust};
+use crate::codegen::{
+    CodegenError, Precision, SineCosine, Units, c, interface::ModelInterface, rust,
+};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
-use crate::lower::Form;
+use crate::lower::{Form, LowerError};
 use crate::model::ReducedModel;
-use crate::typeset::{PrintOptions, latex, markdown, mathml};
+use crate::mpc::MpcError;
+use crate::recording::RecordingError;
+use crate::robot::RobotError;
+use crate::typeset::{PrintOptions, TypesetError, latex, markdown, mathml};
 
 /// What can be generated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
@@ -51,6 +55,36 @@ impl Target {
         let value = self.to_possible_value().expect("no target is hidden");
         value.get_name().to_owned()
     }
+}
+
+/// Why the files of a target could not be made from a model.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant's message names its fields")]
+pub enum EmitError {
+    #[error(transparent)]
+    Typeset(#[from] TypesetError),
+    #[error(transparent)]
+    Codegen(#[from] CodegenError),
+    #[error(transparent)]
+    Lower(#[from] LowerError),
+    #[error("the controller cannot be generated")]
+    Control(#[from] MpcError),
+    #[error(
+        "model `{model}`: generated controllers take affine encoders and decoders, this one has \
+         layers with an activation"
+    )]
+    Nonlinear { model: String },
+    #[error(
+        "model `{model}`, phase `{phase}`: found the name that the controller's own functions have in C, \
+         expected another"
+    )]
+    PhaseName { model: String, phase: String },
+    #[error("the recorded jump of the example cannot be read")]
+    Jump(#[from] RecordingError),
+    #[error("the recorded jump of the example has a posture without forces")]
+    JumpInput(#[from] RobotError),
+    #[error("a template failed")]
+    Template(#[from] askama::Error),
 }
 
 /// How files are made from a model.

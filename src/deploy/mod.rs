@@ -10,7 +10,6 @@ macro_rules! templates {
     (#[$derive:meta] $($path:literal: $template:ident $source:literal),* $(,)?) => {
         templates! { @each [#[$derive]] $($template $source),* }
 
-        /// Path and text of each file.
         fn texts(facts: &Facts<'_>, provenance: &str) -> askama::Result<Vec<(String, String)>> {
             Ok(vec![$({
                 let banner = &crate::deploy::banner($path, provenance);
@@ -43,11 +42,9 @@ macro_rules! templates {
 mod controller;
 mod controller_c;
 mod emit;
-mod error;
 mod planned;
 
-pub use emit::{EmitOptions, Target, emit};
-pub use error::EmitError;
+pub use emit::{EmitError, EmitOptions, Target, emit};
 pub(crate) use planned::PlannedJump;
 
 /// The first line of a generated file: a comment in its language, or the text for a template to make one of.

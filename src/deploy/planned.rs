@@ -36,7 +36,6 @@ pub struct PlannedJump {
 }
 
 impl PlannedJump {
-    /// The shipped jump.
     pub(super) fn shipped() -> Result<Self, EmitError> {
         let mut recording = recording::read_from_bytes("test_01.csv.gz", SHIPPED)?;
         let segment = recording.segments.swap_remove(0);

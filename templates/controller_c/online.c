@@ -230,6 +230,12 @@ static inline MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *
     }
 }
 
+/* The larger of two numbers; the second if the first is not one. */
+static inline MAYBE_UNUSED real online_greater(real value, real other)
+{
+    return value > other ? value : other;
+}
+
 /* Writes the standard deviation of each of (z, dz), never below a hundredth of the largest of its kind; still
  * if that is a motion within which the trajectory stands still. */
 static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajectory *self, const real *still,
@@ -260,11 +266,11 @@ static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajec
     for (int half = 0; half < 2; ++half) {
         real least = 0;
         for (int i = half * d; i < (half + 1) * d; ++i) {
-            least = deviation[i] > least ? deviation[i] : least;
+            least = online_greater(deviation[i], least);
         }
         least = least > 0 ? ONLINE_DEVIATION_FLOOR * least : 1;
         for (int i = half * d; i < (half + 1) * d; ++i) {
-            const real own = deviation[i] > least ? deviation[i] : least;
+            const real own = online_greater(deviation[i], least);
             deviation[i] = is_still ? still[i] : own;
         }
     }
@@ -465,7 +471,7 @@ static inline MAYBE_UNUSED void online_write_still(const real *decoder, const re
         real largest = 0;
         for (int joint = 0; joint < 12; ++joint) {
             const real share = solver_magnitude(decoder[joint * d + i]) / ((real)0.5 * (upper[joint] - lower[joint]));
-            largest = share > largest ? share : largest;
+            largest = online_greater(share, largest);
         }
         still[i] = largest > 0 ? ONLINE_STILL_SHARE / largest : 1;
         still[d + i] = still[i] / ONLINE_STILL_TIME_S;

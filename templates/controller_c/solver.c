@@ -125,7 +125,7 @@ typedef struct {
     real (*soft)[NU];
 } solver_row_matrices;
 
-/* A program with the memory to solve it, all lent by the caller. */
+/* A program with the memory to solve it, all lent by the caller; LINKED if it has Links. */
 typedef struct {
     /* Stages of the horizon. */
     solver_stage *stages;
@@ -1097,19 +1097,13 @@ static inline bool solver_point_is_optimal(solver_point *self, solver_settings *
             || self->sum <= settings->gap * solver_or_larger(1, self->value));
 }
 
-/* How soft the rows are: not at all without links. */
-static inline real solver_program_softness(solver_program *self)
-{
-    return LINKED ? self->links.softness : 0;
-}
-
 static inline solver_before solver_before_zeros(void)
 {
     return (solver_before){.by_state = {{0}}, .square = {{0}}, .linear = {0}};
 }
 
-/* Weights of the rows, and multipliers aimed at by a step that does not centre, in dmultiplier. */
-static inline void solver_rows_weigh(solver_rows *self, real left, real softness)
+/* The same of rows that are softened. */
+static inline void solver_rows_weigh_softened(solver_rows *self, real softness)
 {
     for (int i = 0; i < self->count; ++i) {
         const real yield_of_row = softness * self->multiplier[i];
@@ -1117,7 +1111,19 @@ static inline void solver_rows_weigh(solver_rows *self, real left, real softness
         const real weight = self->multiplier[i] * inverse;
         self->inverse[i] = inverse;
         self->weight[i] = weight;
-        self->dmultiplier[i] = weight * (left * self->residual[i] + yield_of_row);
+        self->dmultiplier[i] = weight * (self->residual[i] + yield_of_row);
+    }
+}
+
+/* Weights of the rows, and multipliers aimed at by a step that does not centre, in dmultiplier. */
+static inline void solver_rows_weigh(solver_rows *self, real left)
+{
+    for (int i = 0; i < self->count; ++i) {
+        const real inverse = 1 / self->slack[i];
+        const real weight = self->multiplier[i] * inverse;
+        self->inverse[i] = inverse;
+        self->weight[i] = weight;
+        self->dmultiplier[i] = weight * (left * self->residual[i]);
     }
 }
 
@@ -1348,7 +1354,6 @@ static inline bool solver_program_predict(solver_program *self, real left)
     const int memory = solver_shape_memory(&shape);
     const int horizon = self->stages_len;
     const bool linked = LINKED;
-    const real softness = solver_program_softness(self);
     solver_before after = solver_before_zeros();
     solver_products products = solver_products_zeros();
     real p[NX][NX] = {{0}};
@@ -1358,7 +1363,11 @@ static inline bool solver_program_predict(solver_program *self, real left)
         const int at = solver_program_at(self, k);
         const int before = k > 0 ? solver_program_at(self, k - 1) : 0;
         solver_rows rows = solver_rows_of(self->rows + at * memory, solver_shape_rows(&shape));
-        solver_rows_weigh(&rows, left, softness);
+        if (linked) {
+            solver_rows_weigh_softened(&rows, self->links.softness);
+        } else {
+            solver_rows_weigh(&rows, left);
+        }
         const real *w = rows.weight;
         const real *y = rows.dmultiplier;
         solver_stage *stage = &self->stages[at];
@@ -1416,13 +1425,23 @@ static inline real solver_boundary_share(real complementarity)
             ? 1 - solver_or_larger((real)SOLVER_LEAST_MARGIN, margin) : 1 - (real)SOLVER_MOST_MARGIN;
 }
 
-/* Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of the step
- * that does not centre. */
-static inline void solver_rows_aim_at(solver_rows *self, real left, real softness, real aim)
+/* The same of rows that are softened. */
+static inline void solver_rows_aim_softened(solver_rows *self, real softness, real aim)
 {
     for (int i = 0; i < self->count; ++i) {
         const real second = self->dslack[i] * self->dmultiplier[i];
-        const real residual = left * self->residual[i] + softness * self->multiplier[i];
+        const real residual = self->residual[i] + softness * self->multiplier[i];
+        self->dmultiplier[i] = self->weight[i] * residual + (aim - second) * self->inverse[i];
+    }
+}
+
+/* Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of the step
+ * that does not centre. */
+static inline void solver_rows_aim_at(solver_rows *self, real left, real aim)
+{
+    for (int i = 0; i < self->count; ++i) {
+        const real second = self->dslack[i] * self->dmultiplier[i];
+        const real residual = left * self->residual[i];
         self->dmultiplier[i] = self->weight[i] * residual + (aim - second) * self->inverse[i];
     }
 }
@@ -1478,13 +1497,17 @@ static inline void solver_program_pull_all(solver_program *self, real left, real
     solver_shape shape = self->shape;
     const int horizon = self->stages_len;
     const bool linked = LINKED;
-    const real softness = solver_program_softness(self);
+    const real softness = self->links.softness;
     real p[NX] = {0};
     real by_after[NU] = {0};
     for (int k = horizon - 1; k >= 0; --k) {
         const int at = solver_program_at(self, k);
         solver_rows rows = solver_program_rows_of(self, k);
-        solver_rows_aim_at(&rows, left, softness, aim);
+        if (linked) {
+            solver_rows_aim_softened(&rows, softness, aim);
+        } else {
+            solver_rows_aim_at(&rows, left, aim);
+        }
         solver_stage *stage = &self->stages[at];
         const real *weight = solver_cost_state_at(&self->cost, k, horizon);
         real by_v[NU] = {0};
@@ -1579,7 +1602,7 @@ static inline solver_reach solver_program_advance(solver_program *self, real lef
 {
     const int soft = self->shape.soft;
     const bool linked = LINKED;
-    const real softness = solver_program_softness(self);
+    const real softness = self->links.softness;
     real times = 0;
     real second_sum = 0;
     real second_largest = 0;
@@ -1630,7 +1653,7 @@ static inline void solver_program_move_by(solver_program *restrict self, real le
 {
     const int horizon = self->stages_len;
     const bool linked = LINKED;
-    const real softness = solver_program_softness(self);
+    const real softness = self->links.softness;
     /* The rows are linear: each step takes its share of all residuals. */
     const real rest = 1 - length;
     real sum = 0;

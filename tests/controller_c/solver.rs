@@ -95,7 +95,9 @@ impl Reader<'_> {
 }
 
 /// What `solve_programs.c` writes for a program, by the library.
-fn solved<T: Real, const NX: usize, const NU: usize>(values: &[f64]) -> Vec<f64> {
+fn solved<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(
+    values: &[f64],
+) -> Vec<f64> {
     let mut reader = Reader(values);
     let mut counts = [0; 4];
     counts.fill_with(|| reader.count());
@@ -138,7 +140,7 @@ fn solved<T: Real, const NX: usize, const NU: usize>(values: &[f64]) -> Vec<f64>
             input: &inputs,
             soft: &softs,
         },
-        links: Links {
+        links: Links::<'_, T, NU, LINKED> {
             rows: &links,
             gains: &mut gains,
             softness,
@@ -230,7 +232,7 @@ fn compare<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(real: 
     let mut rest = found.as_slice();
     let mut iterated = 0;
     for (number, program) in programs.iter().enumerate() {
-        let expected = solved::<T, NX, NU>(program);
+        let expected = solved::<T, NX, NU, LINKED>(program);
         let (own, others) = rest.split_at(expected.len());
         let is_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan();
         let differs = own.iter().zip(&expected).position(|pair| !is_same(pair));

@@ -104,8 +104,8 @@ impl RandomProgram {
         self.link.len() / HORIZON
     }
 
-    /// Solves with the structured solver; inputs of all stages and the report.
-    fn structured<T: Real>(
+    /// Solves with the structured solver, `LINKED` if it has links; inputs of all stages and the report.
+    fn structured<T: Real, const LINKED: bool>(
         &self,
         tolerance: f64,
         accepted: f64,
@@ -135,7 +135,7 @@ impl RandomProgram {
                 input: &input,
                 soft: &soft,
             },
-            links: Links {
+            links: Links::<'_, T, NU, LINKED> {
                 rows: &link,
                 gains: &mut gains,
                 softness: to(softness),
@@ -277,7 +277,7 @@ fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
             continue;
         };
         let off = |found: &[f64]| off(found, &expected);
-        let (found, report) = program.structured::<f64>(1e-11, 1e-7, 0.0);
+        let (found, report) = program.structured::<f64, false>(1e-11, 1e-7, 0.0);
         assert_eq!(
             report.outcome,
             solver::Outcome::Solved,
@@ -286,7 +286,7 @@ fn riccati_finds_clarabels_optimum_of_random_programs_in_both_precisions() {
         without += usize::from(report.iterations == 0);
         most = most.max(report.iterations);
         worst = worst.max(off(&found));
-        let (found, report) = program.structured::<f32>(1e-5, 6e-3, 0.0);
+        let (found, report) = program.structured::<f32, false>(1e-5, 6e-3, 0.0);
         assert_eq!(
             report.outcome,
             solver::Outcome::Solved,
@@ -317,7 +317,7 @@ fn riccati_finds_clarabels_optimum_of_programs_whose_inputs_are_linked_in_both_p
             continue;
         };
         let off = |found: &[f64]| off(found, &expected);
-        let (found, report) = program.structured::<f64>(1e-12, 1e-7, 1e-8);
+        let (found, report) = program.structured::<f64, true>(1e-12, 1e-7, 1e-8);
         assert_eq!(
             report.outcome,
             solver::Outcome::Solved,
@@ -325,7 +325,7 @@ fn riccati_finds_clarabels_optimum_of_programs_whose_inputs_are_linked_in_both_p
         );
         most = most.max(report.iterations);
         worst = worst.max(off(&found));
-        let (found, report) = program.structured::<f32>(1e-4, 3e-3, 1e-5);
+        let (found, report) = program.structured::<f32, true>(1e-4, 3e-3, 1e-5);
         assert_eq!(
             report.outcome,
             solver::Outcome::Solved,

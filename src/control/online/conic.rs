@@ -10,7 +10,7 @@ use super::error::ControlError;
 use super::qp::{Cone, ConeProgram, QpSettings, QpSolver, position, sparse};
 use super::settings::Solver;
 use super::stage::{CONE_ROWS, FrictionShape, StageCost, StageQp, StageShape};
-use super::structured::{MAX_STRUCTURED_DIM, structured};
+use super::structured::structured;
 use crate::solver::Outcome;
 
 #[derive(Debug)]
@@ -236,13 +236,7 @@ impl Solver {
     ) -> Result<Box<dyn StageSolver>, ControlError> {
         match self {
             Self::Clarabel => Ok(Box::new(Conic::new(horizon, shape, cost, settings)?)),
-            Self::Riccati => {
-                let solver = structured(horizon, shape, cost, settings);
-                solver.ok_or(ControlError::StructuredDim {
-                    found: shape.inputs,
-                    largest: MAX_STRUCTURED_DIM,
-                })
-            }
+            Self::Riccati => structured(horizon, shape, cost, settings),
         }
     }
 }

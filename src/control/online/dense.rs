@@ -50,6 +50,11 @@ pub(super) fn solve_upper(factor: &[Real], dim: usize, b: &mut [Real]) {
     }
 }
 
+/// The larger of two numbers; the second if the first is not one.
+pub(super) fn greater(value: Real, other: Real) -> Real {
+    if value > other { value } else { other }
+}
+
 /// `sum += factor values`.
 pub(super) fn add_scaled(factor: Real, values: &[Real], dim: usize, sum: &mut [Real]) {
     let values = &values[..dim];

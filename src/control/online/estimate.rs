@@ -186,19 +186,15 @@ fn residual_covariance(evidence: &[Evidence], input: &DMatrix<f64>) -> Option<DM
         explained += gain * input * gain.transpose() / count;
     }
     // A latent that is explained exactly has no deviation of its own: any positive scale will do.
-    let variance = |i: usize| f64::max(covariance[(i, i)], explained[(i, i)]);
-    let deviation: Vec<f64> = (0..d)
-        .map(|i| variance(i).sqrt().max(f64::MIN_POSITIVE))
-        .collect();
-    let relative = DMatrix::from_fn(d, d, |row, col| {
-        (covariance[(row, col)] - explained[(row, col)]) / (deviation[row] * deviation[col])
-    });
+    let variance = |i| f64::max(covariance[(i, i)], explained[(i, i)]);
+    let deviation = DVector::from_fn(d, |i, _| variance(i).sqrt().max(f64::MIN_POSITIVE));
+    let scale = &deviation * deviation.transpose();
+    let relative = (covariance - explained).component_div(&scale);
     if relative.iter().any(|value| !value.is_finite()) {
         return None;
     }
     let mut eigen = SymmetricEigen::new(relative);
-    let floor = |value: &mut f64| *value = value.max(RESIDUAL_FLOOR);
-    eigen.eigenvalues.apply(floor);
+    (eigen.eigenvalues).apply(|value| *value = value.max(RESIDUAL_FLOOR));
     let floored = eigen.recompose();
     Some(DMatrix::from_fn(d, d, |row, col| {
         floored[(row, col)] * deviation[row] * deviation[col]

@@ -79,9 +79,7 @@ pub fn last_error() -> *const c_char {
 
 /// Every code that the interface returns, with its text.
 pub fn all_codes() -> impl Iterator<Item = (i32, &'static CStr)> {
-    let of_steps = Status::ALL
-        .iter()
-        .map(|status| (status.code(), status.text()));
+    let of_steps = (Status::ALL.iter()).map(|status| (status.code(), status.text()));
     let texts = of_steps.chain(BEYOND_STEPS.iter().copied());
     texts.map(|(code, text)| {
         let text = CStr::from_bytes_until_nul(text.as_bytes());
@@ -238,13 +236,8 @@ impl<const D: usize> Handle<D> {
     /// No torque, at the posture of the last command.
     fn safe(&self) -> RawCommand<D> {
         RawCommand {
-            torque: [0.0; JOINT_DIM],
-            joint_velocity: [0.0; JOINT_DIM],
-            u_lat: [0.0; D],
-            iterations: 0,
-            solve_us: 0.0,
-            status: INTERNAL,
-            ..self.last
+            joint_position: self.last.joint_position,
+            ..RawCommand::at_rest(self.controller.plant().robot(), INTERNAL)
         }
     }
 }

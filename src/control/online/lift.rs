@@ -287,10 +287,8 @@ impl ConsistentLift {
 pub fn torque_deviation(phase: &ControlPhase) -> Option<[[f64; JOINT_DIM]; JOINT_DIM]> {
     // S⁻¹ = K Kᵀ, C = K⁻ᵀ.
     let inverse = Cholesky::new(phase.torque_precision)?.l().try_inverse()?;
-    let entry = |row: usize, col: usize| if row <= col { inverse[(col, row)] } else { 0.0 };
-    Some(std::array::from_fn(|row| {
-        std::array::from_fn(|col| entry(row, col))
-    }))
+    // Column by column the lower triangle is its transpose row by row.
+    Some(inverse.lower_triangle().into())
 }
 
 /// Writes `m + C y`.

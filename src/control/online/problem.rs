@@ -152,27 +152,22 @@ impl StageRows {
             RowSelection::All => rows,
             RowSelection::Needed => needed_rows(rows, ROW_MARGIN),
         };
-        let torque = match (settings.lift, selection) {
-            (Lift::Consistent, _) => Vec::new(),
-            (Lift::Transpose, RowSelection::All) => torque_rows(plant),
-            (Lift::Transpose, RowSelection::Needed) => {
-                let mut rows = torque_rows(plant);
-                rows.retain(|row| is_reachable(plant, row));
-                pairs_first(select(rows))
-            }
+        let mut torque = match settings.lift {
+            Lift::Consistent => Vec::new(),
+            Lift::Transpose => torque_rows(plant),
         };
-        let rate = match settings.torque_rate_nm_s {
-            None => Vec::new(),
-            Some(rate) => {
-                // Which rows are needed does not depend on the rate: they are chosen for 1 N m a stage.
-                let limit_nm = rate * settings.step_s;
-                let mut rows = select(both_sides(plant, |_| 1.0, 0.0));
-                for entry in rows.iter_mut().flat_map(|row| &mut row.row) {
-                    *entry /= limit_nm;
-                }
-                rows
+        if selection == RowSelection::Needed {
+            torque.retain(|row| is_reachable(plant, row));
+            torque = pairs_first(select(torque));
+        }
+        let mut rate = Vec::new();
+        if let Some(limit) = settings.torque_rate_nm_s {
+            // Which rows are needed does not depend on the rate: they are chosen for 1 N m a stage.
+            rate = select(both_sides(plant, |_| 1.0, 0.0));
+            for entry in rate.iter_mut().flat_map(|row| &mut row.row) {
+                *entry /= limit * settings.step_s;
             }
-        };
+        }
         let friction = settings.body_friction;
         Self {
             torque,
@@ -226,12 +221,8 @@ pub(super) fn row_selection(plant: &ControlModel, settings: &MpcSettings) -> Row
 impl StageRows {
     /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes there, so that the
     /// rows are not the same.
-    pub(super) fn with_maps_of(
-        &self,
-        plant: &ControlModel,
-        settings: &MpcSettings,
-    ) -> Option<Self> {
-        let rows = Self::selected(plant, settings, RowSelection::All);
+    pub(super) fn with_maps_of(&self, plant: &ControlModel, of: &MpcSettings) -> Option<Self> {
+        let rows = Self::selected(plant, of, RowSelection::All);
         let shape = |rows: &Self| (rows.torque.len(), rows.rate.len(), rows.joint.len());
         (shape(&rows) == shape(self)).then_some(rows)
     }
@@ -243,8 +234,7 @@ impl StageRows {
     /// away bends around limits that its reference is nowhere near.
     pub(crate) fn near(mut self, reference: &Reference) -> Self {
         let deviation = reference.deviation();
-        let matters = |row: &Row| reference.comes_near(&row.row, row.bound, deviation);
-        self.joint.retain(matters);
+        (self.joint).retain(|row| reference.comes_near(&row.row, row.bound, deviation));
         self
     }
 }

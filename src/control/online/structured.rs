@@ -2,6 +2,7 @@
 
 use super::conic::{StageSolver, Start};
 use super::dense::Real;
+use super::error::ControlError;
 use super::qp::QpSettings;
 use super::stage::{Rows, StageCost, StageQp, StageShape};
 use crate::solver::{Cost, Links, Outcome, Program, Report, RowMatrices, Settings, Shape, Stage};
@@ -18,7 +19,7 @@ pub const RATE_SOFTNESS: f64 = 1e-8;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
-/// The solver of a horizon, or none for a latent dimension above [`MAX_STRUCTURED_DIM`]; that of a lift where there are no
+/// The solver of a horizon, refused above [`MAX_STRUCTURED_DIM`] latent coordinates; that of a lift where there are no
 /// states. Dimensions in between those that are compiled are filled up with inputs and states that nothing moves, which
 /// changes no bit.
 pub(super) fn structured(
@@ -26,7 +27,7 @@ pub(super) fn structured(
     shape: StageShape,
     cost: &StageCost,
     settings: QpSettings,
-) -> Option<Box<dyn StageSolver>> {
+) -> Result<Box<dyn StageSolver>, ControlError> {
     let (is_linked, is_lift) = (shape.rate_rows > 0, shape.states == 0);
     let settings = Settings {
         max_iterations: settings.max_iterations,
@@ -35,28 +36,36 @@ pub(super) fn structured(
         gap: if is_linked || is_lift { 0.0 } else { GAP },
         accepted_residual: settings.accepted_residual,
     };
-    // Fewer dimensions where vectors are narrow, as each has to be compiled.
-    let multiple = if has_avx2() { 2 } else { 4 };
+    // Programs with rates, which are rare, make do with narrow vectors; without wide ones there are fewer dimensions: each
+    // has to be compiled.
+    let is_wide = has_avx2() && !is_linked;
+    let multiple = if is_wide || is_linked { 2 } else { 4 };
     let inputs = shape.inputs.next_multiple_of(multiple);
     macro_rules! of_dimension {
-        ($($wide:literal: $(($nx:literal, $nu:literal))*;)*) => {
-            match (has_avx2(), is_lift, inputs) {
-                $($(($wide, is_lift, $nu) if is_lift == ($nx < $nu) => Some(Box::new(
-                    Structured::<$nx, $nu, $wide>::new(horizon, shape, cost, settings)
+        ($(($wide:literal, $linked:literal): $(($nx:literal, $nu:literal))*;)*) => {
+            match (is_wide, is_linked, is_lift, inputs) {
+                $($(($wide, $linked, is_lift, $nu) if is_lift == ($nx < $nu) => Ok(Box::new(
+                    Structured::<$nx, $nu, $wide, $linked>::new(horizon, shape, cost, settings)
                 )),)*)*
-                _ => None,
+                _ => Err(ControlError::StructuredDim {
+                    found: shape.inputs,
+                    largest: MAX_STRUCTURED_DIM,
+                }),
             }
         };
     }
     of_dimension! {
-        true: (4, 2) (8, 4) (12, 6) (16, 8) (1, 12);
-        false: (8, 4) (16, 8) (1, 12);
+        (true, false): (4, 2) (8, 4) (12, 6) (16, 8) (1, 12);
+        (false, false): (8, 4) (16, 8) (1, 12);
+        (false, true): (4, 2) (8, 4) (12, 6) (16, 8);
     }
 }
 
-/// Memory of a program with up to `NX` states and `NU` inputs, `WIDE` if it is solved by AVX2.
+/// Memory of a program with up to `NX` states and `NU` inputs, `WIDE` if it is solved by AVX2, `LINKED` if
+/// torque rates are limited.
 #[derive(Debug)]
-pub(super) struct Structured<const NX: usize, const NU: usize, const WIDE: bool> {
+pub(super) struct Structured<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
+{
     /// States and inputs that the stages have; what is beyond them stays zero.
     states: usize,
     inputs: usize,
@@ -77,7 +86,9 @@ pub(super) struct Structured<const NX: usize, const NU: usize, const WIDE: bool>
     has_gains: bool,
 }
 
-impl<const NX: usize, const NU: usize, const WIDE: bool> Structured<NX, NU, WIDE> {
+impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
+    Structured<NX, NU, WIDE, LINKED>
+{
     pub(super) fn new(
         horizon: usize,
         of: StageShape,
@@ -121,7 +132,7 @@ impl<const NX: usize, const NU: usize, const WIDE: bool> Structured<NX, NU, WIDE
         }
     }
 
-    fn program(&mut self) -> Program<'_, f64, NX, NU> {
+    fn program(&mut self) -> Program<'_, f64, NX, NU, LINKED> {
         let memory = self.stages.len() * self.shape.memory();
         Program {
             stages: &mut self.stages,
@@ -190,7 +201,9 @@ fn write_rows<const NU: usize>(matrix: &mut [[f64; NU]], rows: &Rows, width: usi
     }
 }
 
-impl<const NX: usize, const NU: usize, const WIDE: bool> StageSolver for Structured<NX, NU, WIDE> {
+impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool> StageSolver
+    for Structured<NX, NU, WIDE, LINKED>
+{
     fn forget(&mut self) {
         (self.is_warm, self.has_gains) = (false, false);
     }
@@ -206,7 +219,7 @@ impl<const NX: usize, const NU: usize, const WIDE: bool> StageSolver for Structu
             self.write(self.place(index), &stages[index]);
             self.has_gains = false;
         }
-        self.has_gains = self.has_gains || prepare::<WIDE, NX, NU>(&mut self.program());
+        self.has_gains = self.has_gains || prepare::<WIDE, NX, NU, LINKED>(&mut self.program());
     }
 
     fn solve(&mut self, stages: &[StageQp], start: &Start) -> (Outcome, u32) {
@@ -217,7 +230,7 @@ impl<const NX: usize, const NU: usize, const WIDE: bool> StageSolver for Structu
         let mut x0 = [0.0; NX];
         x0[..self.states].copy_from_slice(&start.state);
         let (is_warm, settings) = (self.is_warm, self.settings);
-        let report = solve::<WIDE, NX, NU>(&mut self.program(), &x0, is_warm, &settings);
+        let report = solve::<WIDE, NX, NU, LINKED>(&mut self.program(), &x0, is_warm, &settings);
         self.is_warm = report.outcome == Outcome::Solved;
         self.has_gains = report.iterations == 0;
         (report.outcome, report.iterations)
@@ -232,14 +245,18 @@ impl<const NX: usize, const NU: usize, const WIDE: bool> StageSolver for Structu
 /// Whether the processor has vectors of 256 bits.
 pub fn has_avx2() -> bool {
     #[cfg(target_arch = "x86_64")]
-    return is_x86_feature_detected!("avx2");
+    {
+        is_x86_feature_detected!("avx2")
+    }
     #[cfg(not(target_arch = "x86_64"))]
-    false
+    {
+        false
+    }
 }
 
 /// [`Program::prepare`], `WIDE` with AVX2, which the processor must have; the bits are the same.
-pub fn prepare<const WIDE: bool, const NX: usize, const NU: usize>(
-    program: &mut Program<'_, f64, NX, NU>,
+pub fn prepare<const WIDE: bool, const NX: usize, const NU: usize, const LINKED: bool>(
+    program: &mut Program<'_, f64, NX, NU, LINKED>,
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
     if WIDE {
@@ -251,8 +268,8 @@ pub fn prepare<const WIDE: bool, const NX: usize, const NU: usize>(
 }
 
 /// [`Program::solve`] in the same way.
-pub fn solve<const WIDE: bool, const NX: usize, const NU: usize>(
-    program: &mut Program<'_, f64, NX, NU>,
+pub fn solve<const WIDE: bool, const NX: usize, const NU: usize, const LINKED: bool>(
+    program: &mut Program<'_, f64, NX, NU, LINKED>,
     x0: &[f64; NX],
     is_warm: bool,
     settings: &Settings<f64>,

@@ -3,7 +3,7 @@
 //! In: samples, by the required methods of [`Trajectory`]. Out: states, inputs, phases, accelerations. Between samples
 //! states are on the straight line; before the first and after the last the end is held at rest.
 
-use super::dense::{MOST_LATENT, MOST_STATE, Real, add_scaled};
+use super::dense::{MOST_LATENT, MOST_STATE, Real, add_scaled, greater};
 
 /// Times closer than this are the same, s.
 pub(super) const TIME_TOLERANCE_S: f64 = 1e-9;
@@ -187,11 +187,7 @@ pub(super) trait Trajectory {
         for half in 0..2 {
             let mut least: Real = 0.0;
             for i in half * d..(half + 1) * d {
-                least = if deviation[i] > least {
-                    deviation[i]
-                } else {
-                    least
-                };
+                least = greater(deviation[i], least);
             }
             least = if least > 0.0 {
                 DEVIATION_FLOOR * least
@@ -199,11 +195,7 @@ pub(super) trait Trajectory {
                 1.0
             };
             for i in half * d..(half + 1) * d {
-                let own: Real = if deviation[i] > least {
-                    deviation[i]
-                } else {
-                    least
-                };
+                let own = greater(deviation[i], least);
                 deviation[i] = if is_still { still[i] } else { own };
             }
         }
@@ -336,7 +328,7 @@ pub(super) fn write_still(
         let mut largest: Real = 0.0;
         for joint in 0..12 {
             let share = decoder[joint * d + i].abs() / (0.5 * (upper[joint] - lower[joint]));
-            largest = if share > largest { share } else { largest };
+            largest = greater(share, largest);
         }
         still[i] = if largest > 0.0 {
             STILL_SHARE / largest

@@ -18,7 +18,7 @@ struct Reach<T> {
     second_largest: T,
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// First point of the iterations, to be centred: the guess, or the point of the gains.
     #[inline(always)]
     pub(super) fn start(&mut self, x0: &[T; NX], is_warm: bool) {
@@ -162,7 +162,6 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         let memory = shape.memory();
         let horizon = self.stages.len();
         let linked = self.is_linked();
-        let softness = self.softness();
         let mut after: Before<T, NX, NU> = Before::zeros();
         let mut products: Products<T, NX, NU> = Products::zeros();
         let mut p = [[T::ZERO; NX]; NX];
@@ -172,7 +171,11 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
             let at = self.at(k);
             let before = if k > 0 { self.at(k - 1) } else { 0 };
             let mut rows: Rows<T> = Rows::of(&mut self.rows[at * memory..][..memory], shape.rows());
-            rows.weigh(left, softness);
+            if linked {
+                rows.weigh_softened(self.links.softness);
+            } else {
+                rows.weigh(left);
+            }
             let w = &rows.weight[..rows.count];
             let y = &rows.dmultiplier[..rows.count];
             let stage = &mut self.stages[at];
@@ -229,13 +232,17 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
         let shape = self.shape;
         let horizon = self.stages.len();
         let linked = self.is_linked();
-        let softness = self.softness();
+        let softness = self.links.softness;
         let mut p = [T::ZERO; NX];
         let mut by_after = [T::ZERO; NU];
         for k in (0..horizon).rev() {
             let at = self.at(k);
             let mut rows = self.rows_of(k);
-            rows.aim_at(left, softness, aim);
+            if linked {
+                rows.aim_softened(softness, aim);
+            } else {
+                rows.aim_at(left, aim);
+            }
             let stage = &self.stages[at];
             let weight = self.cost.state_at(k, horizon);
             let mut by_v = [T::ZERO; NU];
@@ -277,7 +284,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     fn advance(&mut self, left: T, is_corrected: bool) -> Reach<T> {
         let soft = self.shape.soft;
         let linked = self.is_linked();
-        let softness = self.softness();
+        let softness = self.links.softness;
         let mut times = T::ZERO;
         let mut second_sum = T::ZERO;
         let mut second_largest = T::ZERO;
@@ -332,7 +339,7 @@ impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
     fn move_by(&mut self, length: T, point: &mut Point<T>) {
         let horizon = self.stages.len();
         let linked = self.is_linked();
-        let softness = self.softness();
+        let softness = self.links.softness;
         // The rows are linear: each step takes its share of all residuals.
         let rest = T::ONE - length;
         let mut sum = T::ZERO;

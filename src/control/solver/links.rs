@@ -24,7 +24,7 @@ use super::scalar::Real;
 
 /// Rows that link inputs, and memory for their gains.
 #[derive(Debug)]
-pub struct Links<'m, T, const NU: usize> {
+pub struct Links<'m, T, const NU: usize, const LINKED: bool> {
     /// `L`: `Shape::link` rows for each place of the ring of stages.
     pub rows: &'m [[T; NU]],
     /// Memory of the solver, one for each place.
@@ -33,7 +33,7 @@ pub struct Links<'m, T, const NU: usize> {
     pub softness: T,
 }
 
-impl<T: Real, const NU: usize> Links<'_, T, NU> {
+impl<T: Real, const NU: usize> Links<'_, T, NU, false> {
     /// No rows of the kind.
     pub fn none() -> Self {
         Self {
@@ -173,20 +173,12 @@ pub(super) fn answer_before<T: Real, const NU: usize>(
     }
 }
 
-impl<'m, T: Real, const NX: usize, const NU: usize> Program<'m, T, NX, NU> {
+impl<'m, T: Real, const NX: usize, const NU: usize, const LINKED: bool>
+    Program<'m, T, NX, NU, LINKED>
+{
     #[inline(always)]
     pub(super) fn is_linked(&self) -> bool {
-        NU <= NX && self.shape.link > 0
-    }
-
-    /// How soft the rows are: not at all without links.
-    #[inline(always)]
-    pub(super) fn softness(&self) -> T {
-        if self.is_linked() {
-            self.links.softness
-        } else {
-            T::ZERO
-        }
+        LINKED
     }
 
     #[inline(always)]

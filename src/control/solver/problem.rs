@@ -134,9 +134,9 @@ impl<T: Real, const NX: usize, const NU: usize> Cost<T, NX, NU> {
     }
 }
 
-/// A program with the memory to solve it, all lent by the caller.
+/// A program with the memory to solve it, all lent by the caller; `LINKED` if it has [`Links`].
 #[derive(Debug)]
-pub struct Program<'m, T, const NX: usize, const NU: usize> {
+pub struct Program<'m, T, const NX: usize, const NU: usize, const LINKED: bool> {
     /// Stages of the horizon.
     pub stages: &'m mut [Stage<T, NX, NU>],
     /// [`Shape::memory`] numbers for each stage; bounds first, see [`Program::bounds_mut`].
@@ -148,12 +148,12 @@ pub struct Program<'m, T, const NX: usize, const NU: usize> {
     /// Coefficients of the rows.
     pub matrices: RowMatrices<'m, T, NU>,
     /// Rows that link the inputs of consecutive stages.
-    pub links: Links<'m, T, NU>,
+    pub links: Links<'m, T, NU, LINKED>,
     /// The cost.
     pub cost: Cost<T, NX, NU>,
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// Where a stage of the horizon stands in the ring.
     #[inline(always)]
     pub fn at(&self, stage: usize) -> usize {

@@ -47,24 +47,46 @@ impl<'a, T: Real> Rows<'a, T> {
 
     /// Weights of the rows, and multipliers aimed at by a step that does not centre, in `dmultiplier`.
     #[inline(always)]
-    pub(super) fn weigh(&mut self, left: T, softness: T) {
+    pub(super) fn weigh(&mut self, left: T) {
+        for i in 0..self.count {
+            let inverse = T::ONE / self.slack[i];
+            let weight = self.multiplier[i] * inverse;
+            self.inverse[i] = inverse;
+            self.weight[i] = weight;
+            self.dmultiplier[i] = weight * (left * self.residual[i]);
+        }
+    }
+
+    /// The same of rows that are softened.
+    #[inline(always)]
+    pub(super) fn weigh_softened(&mut self, softness: T) {
         for i in 0..self.count {
             let yield_of_row = softness * self.multiplier[i];
             let inverse = T::ONE / (self.slack[i] + yield_of_row);
             let weight = self.multiplier[i] * inverse;
             self.inverse[i] = inverse;
             self.weight[i] = weight;
-            self.dmultiplier[i] = weight * (left * self.residual[i] + yield_of_row);
+            self.dmultiplier[i] = weight * (self.residual[i] + yield_of_row);
         }
     }
 
     /// Multipliers aimed at by a step that aims at this product of slacks and multipliers, from the changes of the step
     /// that does not centre.
     #[inline(always)]
-    pub(super) fn aim_at(&mut self, left: T, softness: T, aim: T) {
+    pub(super) fn aim_at(&mut self, left: T, aim: T) {
         for i in 0..self.count {
             let second = self.dslack[i] * self.dmultiplier[i];
-            let residual = left * self.residual[i] + softness * self.multiplier[i];
+            let residual = left * self.residual[i];
+            self.dmultiplier[i] = self.weight[i] * residual + (aim - second) * self.inverse[i];
+        }
+    }
+
+    /// The same of rows that are softened.
+    #[inline(always)]
+    pub(super) fn aim_softened(&mut self, softness: T, aim: T) {
+        for i in 0..self.count {
+            let second = self.dslack[i] * self.dmultiplier[i];
+            let residual = self.residual[i] + softness * self.multiplier[i];
             self.dmultiplier[i] = self.weight[i] * residual + (aim - second) * self.inverse[i];
         }
     }
@@ -124,7 +146,7 @@ impl<'a, T: Real> Rows<'a, T> {
     }
 }
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     #[inline(always)]
     pub(super) fn rows_of(&mut self, stage: usize) -> Rows<'_, T> {
         let memory = self.shape.memory();

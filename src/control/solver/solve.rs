@@ -6,7 +6,7 @@ use super::problem::{Outcome, Program, Report, Residuals, Settings};
 use super::riccati::{Products, add_product, add_transposed, eliminate};
 use super::scalar::Real;
 
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     /// Eliminates all stages without their rows: gains and constant parts of the linear-quadratic optimum from any
     /// initial state. False if a Hessian is not positive definite.
     #[inline(always)]
@@ -249,23 +249,15 @@ fn failure<T: Real>(iterations: u32) -> Report<T> {
     }
 }
 
-/// The same code for vector units of 256 bits: sums keep their order and products are not contracted, so that the bits
-/// are those of [`Program::prepare`] and [`Program::solve`].
+/// [`Program::prepare`] and [`Program::solve`] for vector units of 256 bits: sums keep their order and products are not
+/// contracted, so that the bits are the same.
 #[cfg(target_arch = "x86_64")]
-impl<T: Real, const NX: usize, const NU: usize> Program<'_, T, NX, NU> {
-    /// [`Program::prepare`] on a processor with AVX2.
-    ///
-    /// # Safety
-    /// The processor must have AVX2.
+impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, T, NX, NU, LINKED> {
     #[target_feature(enable = "avx2")]
     pub(crate) fn prepare_avx2(&mut self) -> bool {
         self.prepare()
     }
 
-    /// [`Program::solve`] on a processor with AVX2.
-    ///
-    /// # Safety
-    /// The processor must have AVX2.
     #[target_feature(enable = "avx2")]
     pub(crate) fn solve_avx2(
         &mut self,

@@ -31,7 +31,6 @@ pub(crate) struct ControlModelText<'a> {
     phases: Vec<(String, &'a PhaseInterface, &'a ControlPhase)>,
 }
 
-/// Numbers of a matrix as a Rust array, row by row.
 fn numbers<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(
     matrix: &nalgebra::Matrix<f64, R, C, S>,
 ) -> String {
@@ -119,7 +118,6 @@ impl SettingText {
             .collect()
     }
 
-    /// Its declaration in the crate's header.
     pub(super) fn in_crate(&self, upper: &str) -> String {
         self.declaration("double", self.setting.text, upper)
     }

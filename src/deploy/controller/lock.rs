@@ -51,7 +51,6 @@ fn direct(name: &str) -> &'static str {
     found.expect("the controller depends on it")
 }
 
-/// The version of a direct dependency.
 pub(super) fn version(name: &str) -> &'static str {
     package(direct(name)).version
 }

@@ -39,7 +39,6 @@ pub(super) struct Facts<'a> {
     pub(super) texts: Vec<(i32, String)>,
     pub(super) defaults: Settings,
     pub(super) settings: Vec<SettingText>,
-    /// Whether the example jumps a plan.
     has_plan: bool,
     link_m: String,
     rust_version: &'static str,
@@ -77,7 +76,6 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// The version of a package that the crate needs.
     fn version(&self, package: &str) -> &'static str {
         lock::version(package)
     }
@@ -128,7 +126,6 @@ pub fn emit(
     Ok(files)
 }
 
-/// What a controller knows of a model.
 pub(super) fn plant(model: &ReducedModel) -> Result<ControlModel, EmitError> {
     match model.is_linear() {
         true => Ok(crate::mpc::control_model(model)?),

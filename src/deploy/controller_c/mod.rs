@@ -36,9 +36,7 @@ struct Facts<'a> {
     real: &'static str,
     /// Torque limits, an initialiser in double precision.
     torque_limit: String,
-    /// Limits of the joints.
     limits: &'a [(f64, f64)],
-    /// Suffix of libm's functions.
     f: &'static str,
     max_rows: usize,
     /// Numbers that the solver keeps per row.
@@ -103,11 +101,12 @@ pub fn emit(
     let source = Source::new(facts, &entries, &plant, precision)?;
     let self_test = selftest::text(facts, model, &jump, precision)?;
     let mut texts = texts(facts, provenance)?;
-    texts.extend([
+    let made = [
         (format!("{name}_controller.c"), tidy(&source.render()?)),
-        (format!("{name}_controller_selftest.c"), tidy(&self_test)),
         jump.constants(what, name, provenance, precision),
-    ]);
+        (format!("{name}_controller_selftest.c"), tidy(&self_test)),
+    ];
+    texts.splice(1..1, made);
     texts.extend(ros2_control::files(facts, provenance)?);
     let of_model = c::emit(&entries, provenance, precision, options.sines)?;
     let of_model = of_model.into_iter().map(|file| (file.path, file.contents));

@@ -40,7 +40,6 @@ templates! {
     "ros2_control/README.md": Readme "controller_c/ros2_control/readme.askama",
 }
 
-/// Paths below the controller's folder, and texts.
 pub(super) fn files(
     controller: &super::Facts<'_>,
     provenance: &str,

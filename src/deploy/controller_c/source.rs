@@ -34,12 +34,10 @@ pub(super) struct Source<'a> {
     given_covariance: String,
     acceleration_error: String,
     is_body_frame: bool,
-    /// Where iterations end.
     solver: [(&'static str, f64); 5],
     functions: String,
     lift_functions: String,
     online: String,
-    /// Arrays of constants.
     constants: String,
     legs: String,
     hips: String,
@@ -204,10 +202,8 @@ fn solver_numbers(precision: Precision, accepted_residual: f64) -> [(&'static st
     })
 }
 
-/// Numbers per line.
 const WIDTH: usize = 6;
 
-/// Writes numbers of one precision.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::deploy) struct Numbers(pub Precision);
 
@@ -246,7 +242,6 @@ impl Numbers {
         format!("{{{}}}", fields.join(",\n     "))
     }
 
-    /// The first rows of a matrix.
     fn rows(self, matrix: &DMatrix<f64>, count: usize) -> String {
         let row = |i| (0..matrix.ncols()).map(move |j| matrix[(i, j)]);
         self.matrix((0..count).map(row))
@@ -270,7 +265,6 @@ pub(in crate::deploy) fn nested(rows: impl IntoIterator<Item = String>) -> Strin
     }
 }
 
-/// An initialiser of integers.
 pub(in crate::deploy) fn integers(values: impl IntoIterator<Item = i64>) -> String {
     list(values.into_iter().map(|value| value.to_string()))
 }
@@ -291,7 +285,6 @@ const FUNCTIONS: &str = include_str!("../../../templates/controller_c/solver.c")
 const STATE: &str = include_str!("../../../templates/controller_c/online_state.h");
 const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
 
-/// The controller's own steps.
 fn online(name: &str) -> String {
     renamed(ONLINE, |word| {
         (word == "online_share").then(|| format!("{name}_{word}"))
@@ -312,7 +305,6 @@ pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
     renamed(STAGE, rename) + &renamed(STATE, rename)
 }
 
-/// The solver of the horizon.
 fn of_horizon(name: &str) -> String {
     renamed(FUNCTIONS, |word| {
         (word == "solver_stage").then(|| format!("{name}_{word}"))

@@ -24,7 +24,7 @@ impl Writer<'_> {
         let name = segments.last().expect("a path has segments");
         let owner = match segments.len() {
             1 => String::new(),
-            _ => segments[segments.len() - 2].ident.to_string(),
+            count => segments[count - 2].ident.to_string(),
         };
         let owner = if owner == "Self" {
             here.owner.to_owned()
@@ -100,11 +100,9 @@ impl Writer<'_> {
         else {
             return Err(self.outside(here, call, "a method from elsewhere"));
         };
-        let takes_pointer = matches!(function.parameters[0].1, Type::Ref(..));
-        let is_pointer = matches!(receiver.ty, Type::Ref(..));
-        let receiver = match (takes_pointer, is_pointer) {
-            (true, false) => {
-                let ty = receiver.ty.clone().reference(true);
+        let receiver = match (&function.parameters[0].1, &receiver.ty) {
+            (Type::Ref(..), of) if !matches!(of, Type::Ref(..)) => {
+                let ty = of.clone().reference(true);
                 Value::new(format!("&{}", receiver.at_least(15)), ty, 15)
             }
             _ => receiver,
@@ -166,21 +164,15 @@ impl Writer<'_> {
             }
         }
         sizes.retain(|parameter, _| function.sizes.contains(parameter));
-        if let Some(missing) = function
-            .sizes
-            .iter()
-            .find(|size| !sizes.contains_key(*size))
-        {
+        let mut own = function.sizes.iter();
+        if let Some(missing) = own.find(|size| !sizes.contains_key(*size)) {
             let message = format!("`{name}` with unknown {missing}");
             return Err(self.outside(here, arguments[0], &message));
         }
         let output = self.resolve(&function.output, &sizes);
         let c_name = self.function(owner, name, function, sizes)?;
-        Ok(Value::new(
-            format!("{c_name}({})", texts.join(", ")),
-            output,
-            16,
-        ))
+        let text = format!("{c_name}({})", texts.join(", "));
+        Ok(Value::new(text, output, 16))
     }
 }
 

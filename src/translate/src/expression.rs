@@ -9,7 +9,6 @@ use crate::function::{Instance, Writer};
 use crate::items::{Field, Items};
 use crate::types::Type;
 
-/// An expression of C.
 #[derive(Debug, Clone)]
 pub(crate) struct Value {
     pub(crate) text: String,
@@ -78,7 +77,6 @@ fn operator(op: &BinOp) -> Option<(&'static str, u8, bool)> {
     })
 }
 
-/// A number as C writes it.
 fn number(literal: &Lit) -> Option<(String, Type)> {
     match literal {
         Lit::Int(number) => Some((number.base10_digits().to_owned(), Type::Int)),
@@ -100,10 +98,8 @@ pub(crate) fn constant(items: &Items<'_>, source: usize, value: &Expr) -> Found<
                 let syn::Member::Named(name) = &field.member else {
                     return Err(items.fault(source, field, "a field without name"));
                 };
-                Ok(format!(
-                    ".{name} = {}",
-                    constant(items, source, &field.expr)?
-                ))
+                let value = constant(items, source, &field.expr)?;
+                Ok(format!(".{name} = {value}"))
             };
             let fields: Result<Vec<_>, _> = fields.fields.iter().map(field).collect();
             Ok(format!("{{{}}}", fields?.join(", ")))
@@ -236,16 +232,10 @@ impl Writer<'_> {
             return Err(self.outside(here, field, "a field of what is no struct"));
         };
         let ty = self.resolve(&found.ty, &BTreeMap::new());
-        let arrow = if matches!(base.ty, Type::Ref(..)) {
-            "->"
-        } else {
-            "."
-        };
-        Ok(Value::new(
-            format!("{}{arrow}{name}", base.at_least(16)),
-            ty,
-            16,
-        ))
+        let is_pointer = matches!(base.ty, Type::Ref(..));
+        let arrow = if is_pointer { "->" } else { "." };
+        let text = format!("{}{arrow}{name}", base.at_least(16));
+        Ok(Value::new(text, ty, 16))
     }
 
     /// An element, or from a range what follows its beginning.
@@ -265,39 +255,31 @@ impl Writer<'_> {
                 }
             });
         }
-        let at = self.value(here, &index.index)?;
-        Ok(Value::new(
-            format!("{}[{}]", base.at_least(16), at.text),
-            element,
-            16,
-        ))
+        let at = self.value(here, &index.index)?.text;
+        let text = format!("{}[{at}]", base.at_least(16));
+        Ok(Value::new(text, element, 16))
     }
 
     fn unary(&mut self, here: &mut Instance<'_>, unary: &syn::ExprUnary) -> Found {
         let value = self.value(here, &unary.expr)?;
-        match unary.op {
-            UnOp::Neg(_) if value.text.starts_with('-') => {
-                Ok(Value::new(format!("-({})", value.text), value.ty, 15))
+        let is_negative = value.text.starts_with('-');
+        let (sign, ty) = match (unary.op, value.ty.referent()) {
+            (UnOp::Neg(_), _) => ("-", value.ty.clone()),
+            (UnOp::Not(_), _) => ("!", Type::Bool),
+            (UnOp::Deref(_), ty @ Type::Array(..)) => {
+                let ty = ty.clone();
+                return Ok(Value { ty, ..value });
             }
-            UnOp::Neg(_) => Ok(Value::new(format!("-{}", value.at_least(15)), value.ty, 15)),
-            UnOp::Not(_) => Ok(Value::new(
-                format!("!{}", value.at_least(15)),
-                Type::Bool,
-                15,
-            )),
-            UnOp::Deref(_) => match value.ty.referent().clone() {
-                ty @ Type::Array(..) => Ok(Value { ty, ..value }),
-                ty => Ok(Value::new(format!("*{}", value.at_least(15)), ty, 15)),
-            },
-            _ => Err(self.outside(here, unary, "this operator")),
-        }
+            (UnOp::Deref(_), ty) => ("*", ty.clone()),
+            _ => return Err(self.outside(here, unary, "this operator")),
+        };
+        let operand = value.at_least(if is_negative { 16 } else { 15 });
+        Ok(Value::new(format!("{sign}{operand}"), ty, 15))
     }
 
     fn binary(&mut self, here: &mut Instance<'_>, binary: &syn::ExprBinary) -> Found {
-        let (mut left, mut right) = (
-            self.value(here, &binary.left)?,
-            self.value(here, &binary.right)?,
-        );
+        let mut left = self.value(here, &binary.left)?;
+        let mut right = self.value(here, &binary.right)?;
         if left.ty == Type::Real {
             right = right.into_real();
         } else if right.ty == Type::Real {
@@ -324,12 +306,8 @@ impl Writer<'_> {
             2 => 2,
             rank => rank + 1,
         };
-        let text = format!(
-            "{cast}{} {sign} {}",
-            left.at_least(left_rank),
-            right.at_least(right_rank)
-        );
-        Ok(Value::new(text, ty, rank))
+        let (left, right) = (left.at_least(left_rank), right.at_least(right_rank));
+        Ok(Value::new(format!("{cast}{left} {sign} {right}"), ty, rank))
     }
 
     fn reference(
@@ -357,7 +335,6 @@ impl Writer<'_> {
         })
     }
 
-    /// An `if` as a value.
     fn choice(
         &mut self,
         here: &mut Instance<'_>,
@@ -378,14 +355,13 @@ impl Writer<'_> {
             return Err(self.outside(here, branch, "a value of a block with statements"));
         };
         let first = self.value_as(here, &first, expected)?;
-        let other = self.value_as(here, &other, expected)?;
-        let text = format!(
-            "{} ? {} : {}",
-            condition.at_least(4),
-            first.at_least(4),
-            other.at_least(3)
-        );
-        Ok(Value::new(text, first.ty, 3))
+        let other = self.value_as(here, &other, expected)?.at_least(3);
+        let (condition, value) = (condition.at_least(4), first.at_least(4));
+        Ok(Value::new(
+            format!("{condition} ? {value} : {other}"),
+            first.ty,
+            3,
+        ))
     }
 
     fn repeat(

@@ -28,7 +28,6 @@ pub(crate) struct Instance<'f> {
     /// Variables of the blocks that are open, the innermost last.
     pub(crate) scopes: Vec<BTreeMap<String, Type>>,
     pub(crate) output: Type,
-    /// What is written of it.
     pub(crate) lines: Lines,
 }
 
@@ -81,7 +80,6 @@ impl<'a> Writer<'a> {
         })
     }
 
-    /// A length of the Rust as C has it.
     pub(crate) fn length(&self, length: &str, sizes: &BTreeMap<String, String>) -> String {
         let word = |word: &str| match (self.items.unit.elsewhere(word), sizes.get(word)) {
             (Some(name), _) => name.to_owned(),

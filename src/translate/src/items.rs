@@ -128,7 +128,6 @@ impl<'a> Items<'a> {
         above
     }
 
-    /// The fields of a struct, none of anything else.
     pub(crate) fn fields(&self, name: &str) -> &[Field] {
         self.structs.get(name).map_or(&[], |found| &found.fields)
     }
@@ -314,14 +313,18 @@ impl<'a> Items<'a> {
         };
         let is_plain = |argument: &&syn::GenericArgument| match argument {
             syn::GenericArgument::Lifetime(_) => true,
-            syn::GenericArgument::Type(syn::Type::Path(of)) => {
-                ["T", "NX", "NU"].iter().any(|name| of.path.is_ident(name))
-            }
+            syn::GenericArgument::Type(syn::Type::Path(of)) => ["T", "NX", "NU", "LINKED"]
+                .iter()
+                .any(|name| of.path.is_ident(name)),
             _ => false,
         };
         match arguments.args.iter().find(|argument| !is_plain(argument)) {
             None => Ok(name.to_owned()),
-            Some(other) => Err(self.fault(source, other, "arguments of a struct are T, NX and NU")),
+            Some(other) => Err(self.fault(
+                source,
+                other,
+                "arguments of a struct are T, NX, NU and LINKED",
+            )),
         }
     }
 
@@ -354,7 +357,6 @@ impl<'a> Items<'a> {
 }
 
 impl Writer<'_> {
-    /// The text of all that the functions need, and theirs.
     pub(crate) fn finish(self, unit: &Unit<'_>) -> Result<Translated, Fault> {
         let mut header = String::new();
         let mut source = String::new();

@@ -11,7 +11,6 @@ use crate::text::comment;
 use crate::types::Type;
 use crate::{Fault, Found};
 
-/// Lines of C with their indent.
 #[derive(Default)]
 pub(crate) struct Lines {
     pub(crate) text: String,
@@ -67,23 +66,22 @@ impl Writer<'_> {
         self.items.fault(here.function.source, at, message)
     }
 
-    /// Returns the value of a body's last expression.
     fn result(&mut self, here: &mut Instance<'_>, expression: &Expr) -> Found<()> {
         if here.output == Type::Unit {
             return self.statement(here, expression);
         }
-        let output = here.output.clone();
-        let value = self.value_as(here, expression, Some(&output))?;
-        self.return_value(here, value);
-        Ok(())
+        self.return_value(here, expression)
     }
 
-    fn return_value(&mut self, here: &mut Instance<'_>, value: Value) {
+    fn return_value(&mut self, here: &mut Instance<'_>, expression: &Expr) -> Found<()> {
+        let output = here.output.clone();
+        let value = self.value_as(here, expression, Some(&output))?;
         let cast = match &value.ty {
             Type::Named(of) if value.text.starts_with('{') => format!("({})", self.spelling(of)),
             _ => String::new(),
         };
         here.lines.add(&format!("return {cast}{};", value.text));
+        Ok(())
     }
 
     fn local(&mut self, here: &mut Instance<'_>, local: &Local) -> Found<()> {
@@ -201,17 +199,13 @@ impl Writer<'_> {
                 here.lines.add("continue;");
                 Ok(())
             }
-            Expr::Return(returned) => {
-                match &returned.expr {
-                    Some(expression) => {
-                        let output = here.output.clone();
-                        let value = self.value_as(here, expression, Some(&output))?;
-                        self.return_value(here, value);
-                    }
-                    None => here.lines.add("return;"),
+            Expr::Return(returned) => match &returned.expr {
+                Some(expression) => self.return_value(here, expression),
+                None => {
+                    here.lines.add("return;");
+                    Ok(())
                 }
-                Ok(())
-            }
+            },
             Expr::Assign(assign) => self.assign(here, assign),
             Expr::Binary(_) | Expr::Call(_) | Expr::MethodCall(_) => {
                 let value = self.value(here, expression)?;

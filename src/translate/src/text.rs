@@ -1,6 +1,5 @@
 //! Names, comments and lines of C.
 
-/// Most columns of a line.
 const WIDTH: usize = 118;
 
 /// `IterationCap` or `write_rows` in one case: `iteration_cap`.
@@ -25,7 +24,6 @@ fn ascii(comment: &str) -> String {
     })
 }
 
-/// A comment of C above a definition.
 pub(crate) fn comment(lines: &[String], indent: &str) -> String {
     if lines.is_empty() {
         return String::new();

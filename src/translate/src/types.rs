@@ -28,7 +28,6 @@ impl Type {
         }
     }
 
-    /// Elements of an array or slice.
     pub(crate) fn element(&self) -> Option<&Self> {
         match self.referent() {
             Self::Array(of, _) | Self::Slice(of) => Some(of),
@@ -96,11 +95,8 @@ impl Type {
         let Self::Ref(of, is_mutable) = self else {
             return self.declare(name, spelling);
         };
-        let restrict = if restrict && *is_mutable {
-            "restrict "
-        } else {
-            ""
-        };
+        let is_restrict = restrict && *is_mutable;
+        let restrict = if is_restrict { "restrict " } else { "" };
         match of.as_ref() {
             Self::Array(element, length) if *is_mutable || element.element().is_some() => {
                 element.declare(&format!("{name}[{restrict}{length}]"), spelling)
