@@ -111,7 +111,7 @@ pub(super) fn too_large(file: &str, place: Place, max: u64, unit: &str) -> Impor
     ImportError::text(file, place, text)
 }
 
-pub(super) fn damaged(file: &str, format: &str, found: &str) -> ImportError {
+pub(super) fn damaged(file: &str, format: &str, found: impl fmt::Display) -> ImportError {
     let text = format!("not a usable {format} file: {found}");
     ImportError::text(file, Place::Whole, text)
 }

@@ -7,6 +7,7 @@ use super::reader::{BARE, FONTS, INVISIBLE, Last, Reader};
 use super::token::Kind;
 use super::token::has;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
+use crate::symbolic::Function;
 
 pub(super) struct Symbol {
     pub(super) name: String,
@@ -311,11 +312,10 @@ impl Reader<'_> {
 }
 
 pub(super) fn function(command: &str) -> Option<&str> {
-    match command {
-        "ln" => Some("log"),
-        "sgn" => Some("sign"),
-        known => has("sin cos tan tanh exp sec csc cot sinh cosh log sign", known).then_some(known),
-    }
+    let is_called = |known: &Function| !matches!(known, Function::Abs | Function::Sqrt);
+    let known = Function::by_name(command).filter(is_called);
+    let derived = || has("sec csc cot sinh cosh", command).then_some(command);
+    known.map(Function::name).or_else(derived)
 }
 
 /// The Greek letters that a variable can be named by.
