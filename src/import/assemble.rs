@@ -111,6 +111,10 @@ impl<'a> Assembly<'a, '_> {
         ImportError::unusable(&self.tensors.file, source)
     }
 
+    fn note(&mut self, note: impl Into<String>) {
+        self.report.notes.push(note.into());
+    }
+
     fn wrong_shape(&self, assigned: &Assigned<'_>, expected: String) -> ImportError {
         self.refused(assigned, shape_text(&assigned.info.shape), expected)
     }
@@ -310,8 +314,9 @@ impl<'a> Assembly<'a, '_> {
         }
         let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
         let count = xi.iter().zip(&mask).filter(off).count();
-        let note = format!("the mask of phase {phase} switched {count} coefficients off");
-        self.report.notes.push(note);
+        self.note(format!(
+            "the mask of phase {phase} switched {count} coefficients off"
+        ));
         Ok(xi.zip_map(&mask, |value, flag| if flag == 0.0 { 0.0 } else { value }))
     }
 

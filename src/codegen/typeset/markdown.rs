@@ -38,11 +38,6 @@ fn after_comma(unit: &Option<Unit>) -> String {
 }
 
 /// Text from outside that Markdown shows as it is, in one line.
-///
-/// ```
-/// use romc::typeset::markdown::markdown_text;
-/// assert_eq!(markdown_text("*a* <b>"), r"\*a\* \<b\>");
-/// ```
 pub fn markdown_text(text: &str) -> String {
     let mut markdown = String::new();
     for (place, character) in text.replace(ends_line, " ").chars().enumerate() {

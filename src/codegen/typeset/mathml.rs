@@ -77,11 +77,6 @@ fn after_comma(unit: &Option<Unit>) -> String {
 }
 
 /// Text from outside for the content or an attribute of an element.
-///
-/// ```
-/// use romc::typeset::mathml::HtmlText;
-/// assert_eq!(HtmlText("<b a=\"1\">&").to_string(), "&lt;b a=&quot;1&quot;&gt;&amp;");
-/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct HtmlText<'a>(pub &'a str);
 
@@ -122,12 +117,6 @@ const SYMBOLS: [(&str, &str); 14] = [
 ];
 
 /// Text in which known symbols become `math` elements, hyphens before digits minus signs, and units their signs.
-///
-/// ```
-/// use romc::typeset::mathml::HtmlProse;
-/// let html = HtmlProse("R^2 below -0.5, m/s^2").to_string();
-/// assert!(html.starts_with("<math><msup>") && html.ends_with("below \u{2212}0.5, m/s²"));
-/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct HtmlProse<'a>(pub &'a str);
 

@@ -12,12 +12,6 @@ use crate::model::LatentVariable;
 pub struct RenameError(String);
 
 /// New names for latent coordinates and inputs, such as `z1=x`, `u2=F_z`.
-///
-/// ```
-/// use romc::typeset::SymbolTable;
-/// assert!(SymbolTable::parse(&["z1=x", "z2=z", "u1=u_x"], 2).is_ok());
-/// assert!(SymbolTable::parse(&[r"z1=\input{x}"], 2).is_err());
-/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SymbolTable {
     names: BTreeMap<LatentVariable, Symbol>,

@@ -253,11 +253,6 @@ fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions
 
 /// Text from outside, printed so that TeX shows its characters and runs none of them: in one line, with commands for
 /// special characters and code points for those that pdfTeX does not know.
-///
-/// ```
-/// use romc::typeset::latex::tex_text;
-/// assert_eq!(tex_text(r"50% \input{x}"), r"50\% \textbackslash{}input\{x\}");
-/// ```
 pub fn tex_text(text: &str) -> String {
     let mut tex = String::new();
     let mut previous = ' ';
