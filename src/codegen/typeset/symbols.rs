@@ -1,4 +1,5 @@
 //! How the model's variables are written, and what else a user can choose about printed equations.
+#![allow(missing_docs, reason = "the names say it")]
 
 use std::collections::BTreeMap;
 
@@ -49,7 +50,6 @@ impl SymbolTable {
         }
     }
 
-    /// How a variable is written.
     pub fn symbol(&self, variable: LatentVariable) -> Symbol {
         let (letter, index) = match variable {
             LatentVariable::Z(index) => ('z', index),
@@ -180,18 +180,14 @@ pub enum NumberStyle {
 /// How equations are printed; the default reproduces the form of the paper's equations (25) and (26).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PrintOptions {
-    /// How coefficients are rounded.
     pub rounding: Rounding,
     /// Longest line in em of the text around (1 em is 10 pt in a 10 pt document): 32 suits one column, 22 a column of a
     /// two-column paper. `None` is 32 for LaTeX and 44 for other pages.
     pub width_em: Option<f64>,
-    /// New names for variables.
     pub symbols: SymbolTable,
     /// Digest of the model file, for the first line of each file.
     pub digest: Option<String>,
-    /// How numbers are spelled in LaTeX.
     pub numbers: NumberStyle,
-    /// How equations are arranged in LaTeX.
     pub form: Form,
 }
 
@@ -206,7 +202,6 @@ pub enum TypesetError {
         term: String,
         value: f64,
     },
-    /// A template failed to render.
     #[error("a template failed")]
     Template(#[from] askama::Error),
 }
