@@ -193,7 +193,6 @@ pub struct PrintOptions {
 
 /// Why the equations of a model could not be printed.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum TypesetError {
     /// A coefficient in robot coordinates is too large once folded with weights and scale factors.
     #[error("robot coordinates, {output}: the coefficient of {term:?} is {value} in SI units")]
