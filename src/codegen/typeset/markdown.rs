@@ -5,8 +5,7 @@ use askama::Template;
 use crate::equations::{Equations, Unit};
 use crate::files::{EmittedFile, is_invisible};
 use crate::typeset::latex::{tex, tex_cases, tex_symbol, tex_unit};
-use crate::typeset::page::{Page, rendered};
-use crate::typeset::words::{Spelling, code_point, ends_line};
+use crate::typeset::words::{Page, Spelling, code_point, ends_line, rendered};
 use crate::typeset::{NumberStyle, PrintOptions, TypesetError};
 
 /// The file `NAME.md`: equations in `math` fences and the table of coefficients.

@@ -9,9 +9,8 @@ use crate::equations::{Equations, Unit};
 use crate::files::{EmittedFile, is_invisible};
 use crate::model::LatentVariable;
 use crate::typeset::latex::tex_cases;
-use crate::typeset::page::{Page, rendered};
 use crate::typeset::tree::{function_name, greek_letter};
-use crate::typeset::words::{Spelling, code_point};
+use crate::typeset::words::{Page, Spelling, code_point, rendered};
 use crate::typeset::{
     Decimal, EQUALS, EquationSystem, Glyph, Math, PrintOptions, Signed, Symbol, SymbolTable,
     TypesetError, break_lines, symbol_width,
