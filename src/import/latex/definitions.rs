@@ -2,27 +2,10 @@
 
 use std::rc::Rc;
 
-use super::commands::BY_COMMAND;
 use super::expander::{Expander, Macro, Meaning, Refusal};
-use super::sections::{CASES, LAYOUTS, is_one_of};
-use super::token::{Kind, Token, has, spelled};
+use super::sections::is_one_of;
+use super::token::{Kind, Token, has, is_in, spelled};
 
-/// Commands that define: those whose form is read, then those behind which the macro that comes next is unknown.
-pub(super) const DEFINITIONS: &str = "newcommand renewcommand providecommand DeclareRobustCommand def gdef edef xdef \
-    let DeclareMathOperator newif newenvironment renewenvironment sisetup excludecomment excludeversion \
-    lstnewenvironment DefineVerbatimEnvironment newverbatim \
-    chardef mathchardef font DeclarePairedDelimiter DeclarePairedDelimiterX DeclareMathSymbol DeclareMathAccent \
-    newcommandx renewcommandx LetLtxMacro letcs patchcmd xpatchcmd appto gappto eappto xappto preto gpreto apptocmd \
-    pretocmd robustify csdef csgdef csedef csxdef @namedef g@addto@macro NewDocumentCommand RenewDocumentCommand \
-    ProvideDocumentCommand DeclareDocumentCommand NewExpandableDocumentCommand NewEnviron RenewEnviron \
-    NewDocumentEnvironment RenewDocumentEnvironment";
-/// Definitions of environments whose contents are not read.
-const VERBATIM: &str =
-    "excludecomment excludeversion lstnewenvironment DefineVerbatimEnvironment newverbatim";
-/// Commands that LaTeX and amsmath define, so that `\providecommand` leaves them as they are.
-const KERNEL: &str = "sin cos tan cot sec csc sinh cosh tanh exp log ln frac dfrac tfrac sqrt dot ddot dddot left right \
-    cdot times lvert rvert vert text mathrm operatorname prime partial alpha beta gamma delta epsilon zeta eta theta \
-    iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi omega";
 const UNREAD_FORM: Refusal = (
     ", a macro of a form that is not read",
     "`\\newcommand` with plain arguments",
@@ -62,7 +45,7 @@ impl Expander<'_> {
                 let changed = ("num".to_owned(), Meaning::Unread(CHANGED_DIGITS, false));
                 changes_digits(&options).then_some(changed)
             }
-            name if has(VERBATIM, name) => {
+            name if is_in("verbatim definitions", name) => {
                 let name = self.argument();
                 name.map(|name| (spelled(&name), Meaning::Verbatim))
             }
@@ -88,7 +71,7 @@ impl Expander<'_> {
         match self.meaning(name) {
             Some(Meaning::Same(Kind::Command(old))) => !has("relax undefined @undefined", old),
             Some(_) => true,
-            None => has(KERNEL, name),
+            None => is_in("kernel", name),
         }
     }
 
@@ -219,7 +202,7 @@ impl Expander<'_> {
     /// Whether mathematics, or the end of the document, may be in what tokens print.
     pub(super) fn matters(&self, tokens: &[Token]) -> bool {
         let is_layout = |name: &str| {
-            let mut lists = [LAYOUTS, CASES, "math document"].into_iter();
+            let mut lists = ["layouts", "cases", "documents"].into_iter();
             self.meaning(name).is_some() || lists.any(|list| is_one_of(list, name))
         };
         let matters =
@@ -234,7 +217,7 @@ impl Expander<'_> {
                     let inside = near.take_while(|token| token.kind != Kind::Close);
                     is_layout(&spelled(inside.skip(1)))
                 }
-                (None, name) => has(BY_COMMAND, name),
+                (None, name) => is_in("by command", name),
             };
         tokens.iter().enumerate().any(matters)
     }

@@ -6,8 +6,7 @@
 use super::super::Read;
 use super::super::equations::Equation;
 use super::reader::{BARE, Last, Reader};
-use super::token::has;
-use super::token::{Kind, Token};
+use super::token::{Kind, Token, has, is_in};
 use super::variables::{Symbol, function};
 use crate::model::LatentVariable;
 
@@ -24,7 +23,6 @@ const DELIMITERS: [(&str, &[&str]); 8] = [
     ("\\vert", BARS),
     ("\\|", BARS),
 ];
-pub(super) const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
 /// `\ddot z_1 =`: its tokens and the latent coordinate, if it is one.
 pub(super) struct LeftSide {
@@ -99,7 +97,7 @@ impl Reader<'_> {
             match self.next_kind() {
                 None => return Ok(()),
                 Some(Kind::Character(',' | '.' | ';')) => self.at += 1,
-                Some(Kind::Command(name)) if has(WORDS, &name) => {
+                Some(Kind::Command(name)) if is_in("text", &name) => {
                     let (at, after) = (self.at, self.after_argument(self.at + 1));
                     let end = std::mem::replace(&mut self.end, after);
                     self.at = at + 1 + usize::from(self.kind(at + 1) == Some(&Kind::Open));
@@ -244,7 +242,7 @@ impl Reader<'_> {
             Kind::Command(name) => {
                 let ends =
                     "right rvert rVert } rbrace rangle leq geq le ge lt gt approx equiv sim in";
-                !has(ends, name) && !has(WORDS, name)
+                !has(ends, name) && !is_in("text", name)
             }
             kind => !kind.ends_term(),
         }

@@ -7,7 +7,7 @@
 //!
 //! Read `token.rs` and `markdown.rs` (text to tokens), `expander.rs` with `commands.rs` and `definitions.rs` (what of
 //! them is printed), `sections.rs` (displays, equations and phases), `derivatives.rs`, `reader.rs`, `expression.rs`,
-//! `variables.rs` and `numbers.rs` (one right side) in this order.
+//! `variables.rs` and `numbers.rs` (one right side) in this order. `words.txt` has the words of LaTeX by their classes.
 
 mod commands;
 mod definitions;

@@ -1,6 +1,7 @@
 //! Tokens of LaTeX with their places, as TeX takes them from a file: one after the other.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, HashSet, VecDeque};
+use std::sync::LazyLock;
 
 const MINUS: char = '\u{2212}';
 const RAISED: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹";
@@ -116,6 +117,25 @@ impl Token {
             _ => "",
         }
     }
+}
+
+/// The classes of words that are known of LaTeX.
+static CLASSES: LazyLock<HashMap<&str, HashSet<&str>>> = LazyLock::new(|| {
+    let lines = include_str!("words.txt").lines();
+    let mut classes: HashMap<&str, HashSet<&str>> = HashMap::new();
+    let mut class = "";
+    for line in lines.filter(|line| !line.starts_with('#')) {
+        let named = line.split_once(": ").filter(|_| !line.starts_with(' '));
+        let (name, words) = named.unwrap_or((class, line));
+        class = name;
+        (classes.entry(class).or_default()).extend(words.split_whitespace());
+    }
+    classes
+});
+
+/// Whether a word is in a class of `words.txt`.
+pub(super) fn is_in(class: &str, word: &str) -> bool {
+    CLASSES[class].contains(word)
 }
 
 /// Whether a word is one of a list.

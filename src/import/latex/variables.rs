@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::super::{ImportError, Read};
-use super::reader::{BARE, FONTS, INVISIBLE, Last, Reader};
-use super::token::Kind;
-use super::token::has;
+use super::reader::{BARE, Last, Reader};
+use super::token::{Kind, has, is_in};
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
 use crate::symbolic::Function;
 
@@ -31,7 +30,7 @@ impl Reader<'_> {
         if let Some(name) = function(command) {
             return Some((name.to_owned(), self.at + 1));
         }
-        if !has(FONTS, command) || self.kind(self.at + 1) != Some(&Kind::Open) {
+        if !is_in("fonts", command) || self.kind(self.at + 1) != Some(&Kind::Open) {
             return None;
         }
         let close = self.closing[self.at + 1];
@@ -255,7 +254,7 @@ impl Reader<'_> {
                 self.at = at + 1;
                 self.unexpected("a variable under the dots")
             }
-            Kind::Command(name) if has(FONTS, name) => {
+            Kind::Command(name) if is_in("fonts", name) => {
                 self.at += 1;
                 let close = self.after_argument(self.at);
                 let word = self.word(self.at, close);
@@ -302,7 +301,7 @@ impl Reader<'_> {
             match &token.kind {
                 Kind::Character(c) if c.is_ascii_alphanumeric() || *c == ',' => word.push(*c),
                 Kind::Command(name) if is_greek(name) => word.push_str(name),
-                Kind::Command(name) if has(FONTS, name) || has(INVISIBLE, name) => {}
+                Kind::Command(name) if is_in("fonts", name) || is_in("invisible", name) => {}
                 Kind::Open | Kind::Close => {}
                 _ => return None,
             }
@@ -318,13 +317,8 @@ pub(super) fn function(command: &str) -> Option<&str> {
     known.map(Function::name).or_else(derived)
 }
 
-/// The Greek letters that a variable can be named by.
-const GREEK: &str = "alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa \
-    lambda mu nu xi pi rho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi \
-    Pi Sigma Upsilon Phi Psi Omega";
-
 pub(super) fn is_greek(command: &str) -> bool {
-    has(GREEK, command)
+    is_in("greek", command)
 }
 
 /// Why a name for a variable was refused.
