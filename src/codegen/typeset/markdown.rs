@@ -6,16 +6,13 @@ use crate::equations::{Equations, Unit};
 use crate::files::{EmittedFile, is_invisible};
 use crate::typeset::latex::{tex, tex_cases, tex_symbol, tex_unit};
 use crate::typeset::words::{Page, Spelling, code_point, ends_line, rendered};
-use crate::typeset::{NumberStyle, PrintOptions, TypesetError};
+use crate::typeset::{Emitted, NumberStyle, PrintOptions};
 
 /// The file `NAME.md`: equations in `math` fences and the table of coefficients.
 ///
 /// # Errors
-/// [`TypesetError::Template`].
-pub fn emit(
-    equations: &Equations<'_>,
-    options: &PrintOptions,
-) -> Result<Vec<EmittedFile>, TypesetError> {
+/// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
+pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &MARKDOWN);
     let path = format!("{}.md", equations.model().identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])

@@ -12,8 +12,8 @@ use crate::typeset::latex::tex_cases;
 use crate::typeset::tree::{function_name, greek_letter};
 use crate::typeset::words::{Page, Spelling, code_point, rendered};
 use crate::typeset::{
-    Decimal, EQUALS, EquationSystem, Glyph, Math, PrintOptions, Signed, Symbol, SymbolTable,
-    TypesetError, break_lines, symbol_width,
+    Decimal, EQUALS, Emitted, EquationSystem, Glyph, Math, PrintOptions, Signed, Symbol,
+    SymbolTable, break_lines, symbol_width,
 };
 
 /// What a continued line is set in by, in em.
@@ -49,11 +49,8 @@ struct Lines<'a> {
 /// The page `NAME.html`: equations and the table of coefficients, without scripts or anything from elsewhere.
 ///
 /// # Errors
-/// [`TypesetError::Template`].
-pub fn emit(
-    equations: &Equations<'_>,
-    options: &PrintOptions,
-) -> Result<Vec<EmittedFile>, TypesetError> {
+/// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
+pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &HTML);
     let path = format!("{}.html", equations.model().identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::decimal::Rounding;
 use super::tree::{Glyph, Symbol, greek, greek_letter};
+use crate::files::EmittedFile;
 use crate::model::LatentVariable;
 
 /// Why a table of new names was refused.
@@ -190,6 +191,9 @@ pub struct PrintOptions {
     pub numbers: NumberStyle,
     pub form: Form,
 }
+
+/// The files of a printed form.
+pub type Emitted = Result<Vec<EmittedFile>, TypesetError>;
 
 /// Why the equations of a model could not be printed.
 #[derive(Debug, thiserror::Error)]

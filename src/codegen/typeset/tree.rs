@@ -211,14 +211,9 @@ fn glyph_width(glyph: &Glyph) -> f64 {
     }
 }
 
-/// Splits terms before signs into lines of `available` em, greedily; `first` em of the first line and `indent` em of
+/// Splits terms before signs into lines of `limit` em, greedily; `first` em of the first line and `indent` em of
 /// others are taken.
-pub(crate) fn break_lines(
-    terms: &[Signed],
-    available: f64,
-    first: f64,
-    indent: f64,
-) -> Vec<&[Signed]> {
+pub(crate) fn break_lines(terms: &[Signed], limit: f64, first: f64, indent: f64) -> Vec<&[Signed]> {
     let mut lines = Vec::new();
     let mut start = 0;
     let mut used = first;
@@ -226,7 +221,7 @@ pub(crate) fn break_lines(
         let is_signed = place > 0 || term.negative;
         let sign = if is_signed { OPERATOR } else { 0.0 };
         let needed = sign + width(&term.math);
-        if place > start && used + needed > available {
+        if place > start && used + needed > limit {
             lines.push(&terms[start..place]);
             start = place;
             used = indent;

@@ -101,15 +101,10 @@ impl Expander<'_> {
         })
     }
 
-    fn plain_macro(
-        &self,
-        parameters: usize,
-        default: Option<Vec<Token>>,
-        body: Vec<Token>,
-    ) -> Meaning {
+    fn plain_macro(&self, count: usize, default: Option<Vec<Token>>, body: Vec<Token>) -> Meaning {
         Meaning::Macro(Rc::new(Macro {
-            parameters,
-            default: default.filter(|_| parameters > 0),
+            parameters: count,
+            default: default.filter(|_| count > 0),
             matters: self.matters(&body),
             body,
         }))

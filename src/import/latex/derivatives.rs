@@ -1,5 +1,6 @@
 //! Derivatives with respect to time, however they are written, as dots.
 
+use super::super::equations::Position;
 use super::token::{Kind, Token, group_length, has, is_in};
 use super::variables::is_greek;
 
@@ -82,7 +83,7 @@ fn differential(tokens: &[Token], at: usize) -> Option<usize> {
 }
 
 /// A whole power at `at`, 1 without, and the place behind it.
-fn power(tokens: &[Token], at: usize) -> (usize, usize) {
+fn power(tokens: &[Token], at: usize) -> Position {
     let found = || {
         (tokens.get(at)?.kind == Kind::Superscript).then_some(())?;
         let (inside, behind) = argument(tokens, at + 1)?;
@@ -148,7 +149,7 @@ fn primed(tokens: &[Token], at: usize) -> Option<Derivative> {
 }
 
 /// How many primes stand at `at`, at most as many as there are dots, and the place behind them.
-fn primes(tokens: &[Token], at: usize) -> Option<(usize, usize)> {
+fn primes(tokens: &[Token], at: usize) -> Option<Position> {
     let is_prime = |token: &Token| token.is_command("prime");
     let is_mark = |token: &&Token| matches!(token.kind, Kind::Character('\'' | '′' | '’'));
     let marks = tokens[at..].iter().take_while(is_mark).count();

@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use super::super::Read;
+use super::super::equations::Position;
 use super::definitions::changes_digits;
 use super::reader::{Digits, Last, Reader};
 use super::token::{Kind, Token, has, is_in};
@@ -83,7 +84,7 @@ impl Reader<'_> {
     }
 
     /// `\num{-1.2e-3}`, with the options and spellings of siunitx that print the number as it is.
-    pub(super) fn macro_number(&mut self, place: (usize, usize)) -> Read<Last> {
+    pub(super) fn macro_number(&mut self, place: Position) -> Read<Last> {
         self.at += 1;
         if self.is_next(&Kind::Character('[')) {
             let options = &self.tokens[self.at..self.end];
@@ -126,7 +127,7 @@ impl Reader<'_> {
     }
 
     /// A root at its command. Even ones have no value below zero; odd ones are `abs(x)^(1/3)*sign(x)`.
-    pub(super) fn root(&mut self, place: (usize, usize)) -> Read<Last> {
+    pub(super) fn root(&mut self, place: Position) -> Read<Last> {
         self.at += 1;
         let index = self.index()?;
         let is_odd = index % 2 == 1;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::equations::Piece;
+use super::super::equations::{Piece, Position};
 use super::super::{ImportError, Read};
 use super::expression::LeftSide;
 use super::numbers::around_digits;
@@ -176,11 +176,11 @@ impl<'a> Reader<'a> {
         Err(ImportError::at(self.file, place, found, expected))
     }
 
-    pub(super) fn here(&mut self) -> (usize, usize) {
+    pub(super) fn here(&mut self) -> Position {
         self.peek().map_or((1, 1), |token| token.place)
     }
 
-    pub(super) fn push(&mut self, place: (usize, usize), text: impl Into<String>) {
+    pub(super) fn push(&mut self, place: Position, text: impl Into<String>) {
         self.pieces.push((place, text.into()));
     }
 

@@ -1,6 +1,6 @@
 //! From a document's displays to sections of equations: one per phase.
 
-use super::super::equations::{Section, Sections, complete, text_of};
+use super::super::equations::{Position, Section, Sections, complete, text_of};
 use super::super::{ImportError, Read};
 use super::derivatives::with_dots;
 use super::expander::Expander;
@@ -199,7 +199,7 @@ struct Document<'d> {
     phase: Option<String>,
     starts_phase: bool,
     /// The first left side of a variable that is not known, and its place.
-    strange: Option<((usize, usize), String)>,
+    strange: Option<(Position, String)>,
     sections: Vec<Section>,
 }
 
@@ -222,7 +222,7 @@ impl Document<'_> {
             return Ok(());
         };
         let file = self.file;
-        let refuse = |place: (usize, usize), found: String, expected: &str| {
+        let refuse = |place: Position, found: String, expected: &str| {
             Err(ImportError::at(file, place, found, expected))
         };
         if let Some((token, expected)) = unread(tokens) {
@@ -300,7 +300,7 @@ impl Document<'_> {
     fn section(
         &mut self,
         output: usize,
-        place: (usize, usize),
+        place: Position,
         label: Option<String>,
     ) -> Read<&mut Section> {
         let starts_phase = std::mem::take(&mut self.starts_phase);

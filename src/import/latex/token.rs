@@ -3,6 +3,8 @@
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::sync::LazyLock;
 
+use super::super::equations::Position;
+
 const MINUS: char = '\u{2212}';
 const RAISED: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 const LOWERED: &str = "₀₁₂₃₄₅₆₇₈₉";
@@ -19,7 +21,7 @@ const DOTTED: [(char, char, &str); 5] = [
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Token {
     pub(super) kind: Kind,
-    pub(super) place: (usize, usize),
+    pub(super) place: Position,
     /// Whether a space or the start of a line is before it.
     pub(super) is_spaced: bool,
 }
@@ -177,7 +179,7 @@ pub(super) fn group_length<'t>(tokens: impl Iterator<Item = &'t Token>) -> Optio
 pub(super) struct Lexer<'t> {
     pub(super) rest: &'t str,
     /// Line and column of the rest.
-    place: (usize, usize),
+    place: Position,
     starts_line: bool,
     is_spaced: bool,
     /// What one character made besides the last token.
@@ -222,7 +224,7 @@ impl<'t> Lexer<'t> {
     }
 
     /// The tokens of a part of a line that starts at `place`.
-    pub(super) fn of_part(text: &'t str, place: (usize, usize)) -> Self {
+    pub(super) fn of_part(text: &'t str, place: Position) -> Self {
         Self {
             rest: text,
             place,
@@ -233,7 +235,7 @@ impl<'t> Lexer<'t> {
         }
     }
 
-    fn queue(&mut self, kinds: Vec<Kind>, place: (usize, usize)) {
+    fn queue(&mut self, kinds: Vec<Kind>, place: Position) {
         for kind in kinds {
             let is_spaced = std::mem::take(&mut self.is_spaced);
             self.queued.push_back(Token {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::super::equations::Position;
 use super::super::{ImportError, Read};
 use super::reader::{BARE, Last, Reader};
 use super::token::{Kind, has, is_in};
@@ -11,7 +12,7 @@ use crate::symbolic::Function;
 pub(super) struct Symbol {
     pub(super) name: String,
     pub(super) dots: usize,
-    pub(super) place: (usize, usize),
+    pub(super) place: Position,
 }
 
 impl Symbol {
@@ -75,7 +76,7 @@ impl Reader<'_> {
         self.names.variable(name, self.alone).is_some()
     }
 
-    pub(super) fn call(&mut self, place: (usize, usize), name: &str) -> Read<Last> {
+    pub(super) fn call(&mut self, place: Position, name: &str) -> Read<Last> {
         if name == "e" {
             return self.enclosed_sum(place, "exp(");
         }
@@ -172,7 +173,7 @@ impl Reader<'_> {
         })
     }
 
-    pub(super) fn variable(&mut self, place: (usize, usize), symbol: &Symbol) -> Read<Last> {
+    pub(super) fn variable(&mut self, place: Position, symbol: &Symbol) -> Read<Last> {
         let variable = self.names.variable(&symbol.name, self.alone);
         let name = match (variable, symbol.dots) {
             (Some(variable @ (LatentVariable::Z(_) | LatentVariable::U(_))), 0) => {
