@@ -47,14 +47,12 @@ pub(super) fn parts(
         return Err(ImportError::option("--library-order", found, expected));
     }
     let assignment = assign(tensors, options)?;
+    let (latent, state) = (options.latent_dim, options.robot.map(|_| STATE_DIM));
     let mut assembly = Assembly {
         tensors,
         options,
         assignment: &assignment,
-        known: Known {
-            latent: options.latent_dim,
-            state: options.robot.map(|_| STATE_DIM),
-        },
+        known: Known { latent, state },
         report: ImportReport::default(),
     };
     let (encoder, decoder) = assembly.maps()?;

@@ -236,10 +236,8 @@ fn dims(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> 
         && (1..=state).contains(&latent)
         && known.latent.is_none_or(|known| known == latent)
         && known.state.is_none_or(|known| known == state);
-    fits.then_some(Known {
-        latent: Some(latent),
-        state: Some(state),
-    })
+    let (latent, state) = (Some(latent), Some(state));
+    fits.then_some(Known { latent, state })
 }
 
 impl<'a> Assembly<'a, '_> {
