@@ -1,17 +1,14 @@
 //! Equations of the latent accelerations as text.
 //!
 //! ```text
-//! # A comment.
 //! [contact]
 //! ddz1 = 0.36 - 0.16*dz1 - 0.91*dz2
-//!        - 0.75*sin(dz1) + 0.11*u1      # continues the line before
+//!        - 0.75*sin(dz1) + 0.11*u1      # a comment; the line continues the one before
 //! ddz2 = 0
-//! [flight]
-//! ...
 //! ```
 //!
-//! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase, which `--phase`
-//! names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
+//! Each section is a phase and has `ddz1` to `ddzd`; a text without sections is one phase, which `--phase` names. Names
+//! may have underscores (`ddz_1`).
 
 use super::library::tokens;
 use super::{ImportError, Read};

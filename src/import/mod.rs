@@ -1,10 +1,9 @@
 //! Models trained elsewhere: safetensors, NumPy's npz, arrays in memory, equations as text.
 //!
-//! What enters: a file, and in [`ImportOptions`] what tensors do not carry (the candidate terms, when each phase holds,
-//! the scale factors). What leaves: a model checked like any other, and an [`ImportReport`] of the tensors used, their
-//! parts and how they were stored, or an [`ImportError`] that names file, place, what was found and what was expected.
-//! Read `run.rs` first; `assign.rs` decides the use of each tensor, `assemble.rs` turns them into parts of a model,
-//! `latent.rs` takes equations apart.
+//! A file enters, with [`ImportOptions`] for what tensors do not carry; a model checked like any other leaves, with an
+//! [`ImportReport`], or an [`ImportError`] that names file, place, what was found and what was expected. Read `run.rs`
+//! first; `assign.rs` decides the use of each tensor, `assemble.rs` turns them into parts of a model, `latent.rs` takes
+//! equations apart.
 //!
 //! ```
 //! use romc::import::{Format, ImportOptions, import_from_bytes};

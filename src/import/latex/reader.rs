@@ -306,18 +306,15 @@ fn without_split_delimiters(tokens: &[Token]) -> Vec<Token> {
     let mut joined = Vec::with_capacity(tokens.len());
     let mut at = 0;
     while at < tokens.len() {
-        let rest = &tokens[tokens.len().min(at + 2)..];
-        let blanks = rest.iter().take_while(|token| is_blank(&token.kind));
-        if is_empty(at, "right") {
-            let left = at + 2 + blanks.count();
-            if left < tokens.len() && is_empty(left, "left") {
-                joined.extend_from_slice(&tokens[at + 2..left]);
-                at = left + 2;
-                continue;
-            }
+        let next = || (at + 2..tokens.len()).find(|at| !is_blank(&tokens[*at].kind));
+        let left = is_empty(at, "right").then(next).flatten();
+        if let Some(left) = left.filter(|left| is_empty(*left, "left")) {
+            joined.extend_from_slice(&tokens[at + 2..left]);
+            at = left + 2;
+        } else {
+            joined.push(tokens[at].clone());
+            at += 1;
         }
-        joined.push(tokens[at].clone());
-        at += 1;
     }
     joined
 }
