@@ -192,10 +192,8 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
             (false, true) => (r"\displaystyle ", ""),
             (false, false) => ("", ""),
         };
-        let relation = match equation.is_approximate {
-            true => r"\approx",
-            false => "=",
-        };
+        let is_close = equation.is_approximate;
+        let relation = if is_close { r"\approx" } else { "=" };
         let label = format!(r" \label{{{label}:{}}}", place + 1);
         for (line, side) in of_equation.iter().enumerate() {
             let start = match line {
