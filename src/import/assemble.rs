@@ -47,14 +47,12 @@ pub(super) fn parts(
         return Err(ImportError::option("--library-order", found, expected));
     }
     let assignment = assign(tensors, options)?;
+    let (latent, state) = (options.latent_dim, options.robot.map(|_| STATE_DIM));
     let mut assembly = Assembly {
         tensors,
         options,
         assignment: &assignment,
-        known: Known {
-            latent: options.latent_dim,
-            state: options.robot.map(|_| STATE_DIM),
-        },
+        known: Known { latent, state },
         report: ImportReport::default(),
     };
     let (encoder, decoder) = assembly.maps()?;
@@ -109,6 +107,10 @@ impl<'a> Assembly<'a, '_> {
 
     fn unusable(&self, source: impl Into<ModelError>) -> ImportError {
         ImportError::unusable(&self.tensors.file, source)
+    }
+
+    fn note(&mut self, note: impl Into<String>) {
+        self.report.notes.push(note.into());
     }
 
     fn wrong_shape(&self, assigned: &Assigned<'_>, expected: String) -> ImportError {
@@ -310,8 +312,9 @@ impl<'a> Assembly<'a, '_> {
         }
         let off = |(value, flag): &(&f64, &f64)| **flag == 0.0 && **value != 0.0;
         let count = xi.iter().zip(&mask).filter(off).count();
-        let note = format!("the mask of phase {phase} switched {count} coefficients off");
-        self.report.notes.push(note);
+        self.note(format!(
+            "the mask of phase {phase} switched {count} coefficients off"
+        ));
         Ok(xi.zip_map(&mask, |value, flag| if flag == 0.0 { 0.0 } else { value }))
     }
 

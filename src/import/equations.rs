@@ -1,17 +1,14 @@
 //! Equations of the latent accelerations as text.
 //!
 //! ```text
-//! # A comment.
 //! [contact]
 //! ddz1 = 0.36 - 0.16*dz1 - 0.91*dz2
-//!        - 0.75*sin(dz1) + 0.11*u1      # continues the line before
+//!        - 0.75*sin(dz1) + 0.11*u1      # a comment; the line continues the one before
 //! ddz2 = 0
-//! [flight]
-//! ...
 //! ```
 //!
-//! Each section is a phase; each phase has `ddz1` to `ddzd`. A text without sections is one phase, which `--phase`
-//! names. A line without `=` continues the equation before it. Names may have underscores (`ddz_1`).
+//! Each section is a phase and has `ddz1` to `ddzd`; a text without sections is one phase, which `--phase` names. Names
+//! may have underscores (`ddz_1`).
 
 use super::library::tokens;
 use super::{ImportError, Read};
@@ -53,7 +50,10 @@ pub struct Equation {
 }
 
 /// A piece of a right side: line and column of its first character, and its text.
-pub(super) type Piece = ((usize, usize), String);
+pub(super) type Piece = (Position, String);
+
+/// Line and column, from 1.
+pub(super) type Position = (usize, usize);
 
 /// The equations of a text or LaTeX file in sections, every one with the same left sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,11 +98,11 @@ struct Reader<'f> {
 }
 
 impl Reader<'_> {
-    fn refused<T>(&self, place: (usize, usize), found: &str, expected: &str) -> Read<T> {
+    fn refused<T>(&self, place: Position, found: &str, expected: &str) -> Read<T> {
         Err(ImportError::at(self.file, place, found, expected))
     }
 
-    fn line(&mut self, place: (usize, usize), content: &str) -> Read<()> {
+    fn line(&mut self, place: Position, content: &str) -> Read<()> {
         if content.is_empty() {
             return Ok(());
         }
@@ -127,7 +127,7 @@ impl Reader<'_> {
         }
     }
 
-    fn header(&mut self, place: (usize, usize), content: &str) -> Read<()> {
+    fn header(&mut self, place: Position, content: &str) -> Read<()> {
         let name = (content.strip_prefix('[')).and_then(|rest| rest.strip_suffix(']'));
         let Some(name) = name.map(str::trim).filter(|name| !name.is_empty()) else {
             let expected = "the name of a phase in brackets, such as `[contact]`";
@@ -148,7 +148,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn equation(&mut self, place: (usize, usize), left: &str, pieces: Vec<Piece>) -> Read<()> {
+    fn equation(&mut self, place: Position, left: &str, pieces: Vec<Piece>) -> Read<()> {
         let name = plain_name(left).unwrap_or_else(|| left.to_owned());
         let variable = (name.strip_prefix('d'))
             .and_then(|name| LatentVariable::from_name(name, MAX_LATENT_DIM));
@@ -187,7 +187,7 @@ pub(super) fn plain_name(name: &str) -> Option<String> {
 }
 
 /// A text that starts at a place, each name with another spelling in a piece of its own.
-fn pieces((line, column): (usize, usize), text: &str) -> Vec<Piece> {
+fn pieces((line, column): Position, text: &str) -> Vec<Piece> {
     let mut pieces = vec![((line, column), String::new())];
     let mut behind = column;
     for word in tokens(text) {
@@ -259,7 +259,7 @@ impl Equation {
     }
 
     /// Line and column of a character of the right side, counted from 1 over all pieces.
-    fn place(&self, position: usize) -> (usize, usize) {
+    fn place(&self, position: usize) -> Position {
         let mut rest = position.saturating_sub(1);
         let mut place = (self.line, 1);
         for ((line, column), text) in &self.pieces {

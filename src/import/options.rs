@@ -1,4 +1,5 @@
 //! Options of an import: everything that tensors do not carry.
+#![allow(missing_docs, reason = "the names say it")]
 
 use std::path::Path;
 use std::str::FromStr;
@@ -144,9 +145,7 @@ pub(super) fn standard_text(standard: StandardLibrary) -> String {
 /// `--phase NAME=FEET`: a phase and the foot patterns that select it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PhaseRule {
-    /// Name of the phase.
     pub name: String,
-    /// When it holds.
     pub feet: FeetRule,
 }
 
@@ -188,9 +187,7 @@ fn parse_pattern(text: &str) -> Option<ContactFlags> {
 /// Options of an import; only the name is always needed.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
-    /// Name of the model.
     pub name: String,
-    /// Free text about it.
     pub description: String,
     /// The kind of file, if its ending is none of the known ones.
     pub format: Option<Format>,
@@ -202,7 +199,6 @@ pub struct ImportOptions {
     pub activation: Option<Activation>,
     /// How coefficients are stored: needed if their shape fits both ways, else checked.
     pub xi_layout: Option<XiLayout>,
-    /// How LaTeX writes the variables.
     pub symbols: SymbolNames,
     /// The candidate terms in the order of Xi's rows; equations bring their own.
     pub library: Option<LibraryChoice>,

@@ -1,4 +1,5 @@
 //! Parts of a model that a tensor can be.
+#![allow(missing_docs, reason = "the names say it")]
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,9 +9,7 @@ use super::{ImportError, Read};
 /// One of the two maps between robot and latent coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
-    /// Robot to latent coordinates.
     Encoder,
-    /// Latent to robot coordinates.
     Decoder,
 }
 
@@ -23,7 +22,6 @@ impl Part {
         modules.any(|module| module.eq_ignore_ascii_case(self.name()))
     }
 
-    /// The key of the model file.
     pub fn name(self) -> &'static str {
         match self {
             Part::Encoder => "encoder",
@@ -223,9 +221,7 @@ pub(super) fn is_of_optimiser(name: &str) -> bool {
 /// `--map ROLE=TENSOR`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mapping {
-    /// What the tensor is used as.
     pub role: Role,
-    /// Its name in the file.
     pub tensor: String,
 }
 

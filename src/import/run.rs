@@ -1,4 +1,5 @@
 //! The way from a foreign file to a checked model, and the record of what was decided on it.
+#![allow(missing_docs, reason = "the names say it")]
 
 use std::fmt;
 use std::fs::File;
@@ -24,9 +25,7 @@ const MAX_FILE_BYTES: u64 = 256 << 20;
 /// An imported model and what was decided on the way.
 #[derive(Clone, Debug)]
 pub struct Imported {
-    /// The model, checked like any other.
     pub model: ReducedModel,
-    /// The use of each tensor or equation.
     pub report: ImportReport,
 }
 
@@ -111,7 +110,7 @@ pub(super) fn too_large(file: &str, place: Place, max: u64, unit: &str) -> Impor
     ImportError::text(file, place, text)
 }
 
-pub(super) fn damaged(file: &str, format: &str, found: &str) -> ImportError {
+pub(super) fn damaged(file: &str, format: &str, found: impl fmt::Display) -> ImportError {
     let text = format!("not a usable {format} file: {found}");
     ImportError::text(file, Place::Whole, text)
 }
@@ -234,27 +233,20 @@ fn build(
 /// Everything that was decided on the way from a foreign file to a model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ImportReport {
-    /// The file.
     pub file: String,
     /// Its kind: the name of a [`Format`](super::Format), or `arrays` for tensors in memory.
     pub format: &'static str,
-    /// Number of latent coordinates.
     pub latent_dim: usize,
     /// Number of robot coordinates, if there is an encoder or decoder.
     pub state_dim: Option<usize>,
-    /// Number of candidate terms.
     pub library_dim: usize,
     /// The order of a standard library's terms in the file, by its name.
     pub library_order: Option<&'static str>,
     /// The candidate terms of a file of tensors in the order of its coefficients.
     pub terms: Vec<String>,
-    /// Tensors that became part of the model.
     pub used: Vec<UsedTensor>,
-    /// Tensors that did not.
     pub unused: Vec<UnusedTensor>,
-    /// Equations that became part of the model.
     pub equations: Vec<ReadEquation>,
-    /// Further decisions, in words.
     pub notes: Vec<String>,
 }
 
@@ -263,15 +255,10 @@ pub struct ImportReport {
 pub struct UsedTensor {
     /// What it is used as, such as `encoder.weight`.
     pub role: String,
-    /// Its name in the file.
     pub tensor: String,
-    /// Dimensions in the file.
     pub shape: Vec<usize>,
-    /// Type of its numbers.
     pub element: String,
-    /// Who decided this.
     pub chosen: Chosen,
-    /// How it was stored.
     pub layout: Layout,
 }
 
@@ -279,9 +266,7 @@ pub struct UsedTensor {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Chosen {
-    /// `--map`.
     Mapped,
-    /// Its name.
     Named,
 }
 
@@ -289,15 +274,10 @@ pub enum Chosen {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layout {
-    /// Weights for column vectors.
     Column,
-    /// Weights for row vectors.
     Row,
-    /// Coefficients, one row per term.
     TermsByLatent,
-    /// Coefficients, one row per latent coordinate.
     LatentByTerms,
-    /// A list of numbers, or a matrix that is the same both ways.
     Plain,
 }
 
@@ -316,21 +296,17 @@ impl fmt::Display for Layout {
 /// A tensor that is no part of the model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct UnusedTensor {
-    /// Its name in the file.
     pub tensor: String,
-    /// Dimensions in the file.
     pub shape: Vec<usize>,
 }
 
 /// An equation that became a column of Xi.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ReadEquation {
-    /// Its phase.
     pub phase: String,
     /// Its left side, such as `ddz1`.
     pub output: String,
     /// Line of its start, from 1.
     pub line: usize,
-    /// Number of its terms.
     pub terms: usize,
 }

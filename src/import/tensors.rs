@@ -177,8 +177,8 @@ impl<'b> TensorFile<'b> {
 
 /// Opens a file; offsets and lengths of its tensors are checked against the file.
 pub(super) fn open_safetensors<'b>(file: &str, bytes: &'b [u8]) -> Read<TensorFile<'b>> {
-    let (header, metadata) = SafeTensors::read_metadata(bytes)
-        .map_err(|error| damaged(file, "safetensors", &error.to_string()))?;
+    let (header, metadata) =
+        SafeTensors::read_metadata(bytes).map_err(|error| damaged(file, "safetensors", error))?;
     let tensors = metadata.tensors().into_iter();
     let infos = tensors.map(|(name, info)| TensorInfo {
         name,
@@ -251,9 +251,9 @@ const MAX_RANK: usize = 32;
 type Archive<'b> = ZipArchive<Cursor<&'b [u8]>>;
 
 pub(super) fn open_npz<'b>(file: &str, bytes: &'b [u8]) -> Read<TensorFile<'b>> {
-    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged_npz(file, e))?;
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, "npz", e))?;
     if archive.has_duplicate_names() {
-        return Err(damaged_npz(file, "two arrays of one name"));
+        return Err(damaged(file, "npz", "two arrays of one name"));
     }
     if archive.len() > MAX_MEMBERS {
         let max = MAX_MEMBERS as u64;
@@ -268,13 +268,14 @@ pub(super) fn open_npz<'b>(file: &str, bytes: &'b [u8]) -> Read<TensorFile<'b>> 
     TensorFile::new(file, infos, Box::new(numbers))
 }
 
-fn damaged_npz(file: &str, error: impl Display) -> ImportError {
-    damaged(file, "npz", &error.to_string())
-}
-
 fn describe(file: &str, archive: &mut Archive<'_>, member: usize) -> Read<Option<TensorInfo>> {
-    let mut entry = archive.by_index(member).map_err(|e| damaged_npz(file, e))?;
-    let name = entry.name().map_err(|e| damaged_npz(file, e))?.into_owned();
+    let mut entry = archive
+        .by_index(member)
+        .map_err(|e| damaged(file, "npz", e))?;
+    let name = entry
+        .name()
+        .map_err(|e| damaged(file, "npz", e))?
+        .into_owned();
     let Some(name) = name.strip_suffix(".npy") else {
         return Ok(None);
     };
@@ -294,7 +295,7 @@ fn numbers(file: &str, bytes: &[u8], info: &TensorInfo, length: usize) -> Read<C
         let expected = "as many bytes as its shape and type need";
         ImportError::at(file, place, found, expected)
     };
-    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged_npz(file, e))?;
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, "npz", e))?;
     let member = (archive.by_index(info.member)).map_err(|error| refused(error.to_string()))?;
     let mut unpacked = Vec::new();
     // One byte more than needed reveals an array that is too long; it also reaches the end of the member, where the

@@ -2,7 +2,7 @@
 
 use romc::typeset::latex::tex_text;
 use romc::typeset::markdown::markdown_text;
-use romc::typeset::mathml::HtmlProse;
+use romc::typeset::mathml::{HtmlProse, HtmlText};
 
 /// Characters that change how TeX reads what follows.
 const ACTIVE: &str = "$&#%_^~";
@@ -57,6 +57,8 @@ fn symbols_become_mathematics_and_names_stay() {
     assert_eq!(html("-"), "–");
     assert_eq!(html("-0.346"), "\u{2212}0.346");
     assert_eq!(html("1-2 <b>"), "1-2 &lt;b&gt;");
+    let escaped = HtmlText("<b a=\"1\">&").to_string();
+    assert_eq!(escaped, "&lt;b a=&quot;1&quot;&gt;&amp;");
 }
 
 #[test]

@@ -1,4 +1,5 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
+#![allow(missing_docs, reason = "the names say it")]
 
 use nalgebra::DMatrix;
 
@@ -12,16 +13,13 @@ use super::tree::{Math, Signed, Symbol};
 /// The equations of one phase, ready for a printer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EquationSystem {
-    /// The phase's name as in the model file.
     pub phase: String,
-    /// One equation a latent coordinate.
     pub equations: Vec<Equation>,
 }
 
 /// `left = terms`, in library order; no terms is zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Equation {
-    /// The acceleration.
     pub left: Symbol,
     /// Coefficient and candidate term, one entry each.
     pub terms: Vec<Signed>,
@@ -53,9 +51,7 @@ pub struct CoefficientRow {
 pub struct Typeset {
     /// One system a phase, in the model's order.
     pub systems: Vec<EquationSystem>,
-    /// The same coefficients as a table.
     pub table: CoefficientTable,
-    /// What rounding changed.
     pub rounding: RoundingReport,
 }
 

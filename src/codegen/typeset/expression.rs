@@ -203,21 +203,17 @@ impl Layout<'_> {
 
     /// `sin(x)^2` with the power on the name; on the whole for functions that do not allow it.
     fn powered_function(&self, function: Function, argument: ExprId, power: Math) -> Math {
-        use Function::{Abs, Cos, Exp, Log, Sign, Sin, Sqrt, Tan, Tanh};
-        match function {
-            Sin | Cos | Tan | Tanh | Log => {
-                Math::Function(function, Some(Box::new(power)), self.boxed(argument))
-            }
-            // The power of exp(x) without parentheses could be read as one of x.
-            Exp | Sqrt | Abs | Sign => {
-                let base = match self.apply(function, argument) {
-                    math @ Math::Function(..) => Math::Group(Box::new(math)),
-                    // bars and roots show themselves where they end
-                    math => math,
-                };
-                Math::Power(Box::new(base), Box::new(power))
-            }
+        use Function::{Abs, Exp, Sign, Sqrt};
+        if !matches!(function, Exp | Sqrt | Abs | Sign) {
+            return Math::Function(function, Some(Box::new(power)), self.boxed(argument));
         }
+        // The power of exp(x) without parentheses could be read as one of x.
+        let base = match self.apply(function, argument) {
+            math @ Math::Function(..) => Math::Group(Box::new(math)),
+            // bars and roots show themselves where they end
+            math => math,
+        };
+        Math::Power(Box::new(base), Box::new(power))
     }
 
     /// `expr` as the base of a power, in parentheses where it needs them.

@@ -5,18 +5,14 @@ use askama::Template;
 use crate::equations::{Equations, Unit};
 use crate::files::{EmittedFile, is_invisible};
 use crate::typeset::latex::{tex, tex_cases, tex_symbol, tex_unit};
-use crate::typeset::page::{Page, rendered};
-use crate::typeset::words::{Spelling, code_point, ends_line};
-use crate::typeset::{NumberStyle, PrintOptions, TypesetError};
+use crate::typeset::words::{Page, Spelling, code_point, ends_line, rendered};
+use crate::typeset::{Emitted, NumberStyle, PrintOptions};
 
 /// The file `NAME.md`: equations in `math` fences and the table of coefficients.
 ///
 /// # Errors
-/// [`TypesetError::Template`].
-pub fn emit(
-    equations: &Equations<'_>,
-    options: &PrintOptions,
-) -> Result<Vec<EmittedFile>, TypesetError> {
+/// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
+pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &MARKDOWN);
     let path = format!("{}.md", equations.model().identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
@@ -38,11 +34,6 @@ fn after_comma(unit: &Option<Unit>) -> String {
 }
 
 /// Text from outside that Markdown shows as it is, in one line.
-///
-/// ```
-/// use romc::typeset::markdown::markdown_text;
-/// assert_eq!(markdown_text("*a* <b>"), r"\*a\* \<b\>");
-/// ```
 pub fn markdown_text(text: &str) -> String {
     let mut markdown = String::new();
     for (place, character) in text.replace(ends_line, " ").chars().enumerate() {

@@ -9,12 +9,11 @@ use crate::equations::{Equations, Unit};
 use crate::files::{EmittedFile, is_invisible};
 use crate::model::LatentVariable;
 use crate::typeset::latex::tex_cases;
-use crate::typeset::page::{Page, rendered};
 use crate::typeset::tree::{function_name, greek_letter};
-use crate::typeset::words::{Spelling, code_point};
+use crate::typeset::words::{Page, Spelling, code_point, rendered};
 use crate::typeset::{
-    Decimal, EQUALS, EquationSystem, Glyph, Math, PrintOptions, Signed, Symbol, SymbolTable,
-    TypesetError, break_lines, symbol_width,
+    Decimal, EQUALS, Emitted, EquationSystem, Glyph, Math, PrintOptions, Signed, Symbol,
+    SymbolTable, break_lines, symbol_width,
 };
 
 /// What a continued line is set in by, in em.
@@ -50,11 +49,8 @@ struct Lines<'a> {
 /// The page `NAME.html`: equations and the table of coefficients, without scripts or anything from elsewhere.
 ///
 /// # Errors
-/// [`TypesetError::Template`].
-pub fn emit(
-    equations: &Equations<'_>,
-    options: &PrintOptions,
-) -> Result<Vec<EmittedFile>, TypesetError> {
+/// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
+pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &HTML);
     let path = format!("{}.html", equations.model().identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
@@ -77,11 +73,6 @@ fn after_comma(unit: &Option<Unit>) -> String {
 }
 
 /// Text from outside for the content or an attribute of an element.
-///
-/// ```
-/// use romc::typeset::mathml::HtmlText;
-/// assert_eq!(HtmlText("<b a=\"1\">&").to_string(), "&lt;b a=&quot;1&quot;&gt;&amp;");
-/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct HtmlText<'a>(pub &'a str);
 
@@ -122,12 +113,6 @@ const SYMBOLS: [(&str, &str); 14] = [
 ];
 
 /// Text in which known symbols become `math` elements, hyphens before digits minus signs, and units their signs.
-///
-/// ```
-/// use romc::typeset::mathml::HtmlProse;
-/// let html = HtmlProse("R^2 below -0.5, m/s^2").to_string();
-/// assert!(html.starts_with("<math><msup>") && html.ends_with("below \u{2212}0.5, m/s²"));
-/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct HtmlProse<'a>(pub &'a str);
 

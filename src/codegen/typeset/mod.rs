@@ -10,7 +10,6 @@ mod expression;
 pub mod latex;
 pub mod markdown;
 pub mod mathml;
-mod page;
 mod robot;
 mod symbols;
 mod table;
@@ -21,9 +20,11 @@ pub use decimal::{Decimal, Rounding};
 pub(crate) use equations::{CoefficientRow, CoefficientTable};
 pub use equations::{Equation, EquationSystem, Typeset};
 pub use expression::expression;
-pub use page::rendered;
 pub use robot::RobotTypeset;
-pub use symbols::{Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError};
+pub use symbols::{
+    Emitted, Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError,
+};
 pub use table::{Cell, Table, rounded, rounded_up, significant};
 pub(crate) use tree::{EQUALS, Glyph, break_lines, symbol_width, width};
 pub use tree::{Math, Signed, Symbol};
+pub use words::rendered;

@@ -1,9 +1,11 @@
 //! How the model's variables are written, and what else a user can choose about printed equations.
+#![allow(missing_docs, reason = "the names say it")]
 
 use std::collections::BTreeMap;
 
 use super::decimal::Rounding;
 use super::tree::{Glyph, Symbol, greek, greek_letter};
+use crate::files::EmittedFile;
 use crate::model::LatentVariable;
 
 /// Why a table of new names was refused.
@@ -12,12 +14,6 @@ use crate::model::LatentVariable;
 pub struct RenameError(String);
 
 /// New names for latent coordinates and inputs, such as `z1=x`, `u2=F_z`.
-///
-/// ```
-/// use romc::typeset::SymbolTable;
-/// assert!(SymbolTable::parse(&["z1=x", "z2=z", "u1=u_x"], 2).is_ok());
-/// assert!(SymbolTable::parse(&[r"z1=\input{x}"], 2).is_err());
-/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SymbolTable {
     names: BTreeMap<LatentVariable, Symbol>,
@@ -55,7 +51,6 @@ impl SymbolTable {
         }
     }
 
-    /// How a variable is written.
     pub fn symbol(&self, variable: LatentVariable) -> Symbol {
         let (letter, index) = match variable {
             LatentVariable::Z(index) => ('z', index),
@@ -186,24 +181,22 @@ pub enum NumberStyle {
 /// How equations are printed; the default reproduces the form of the paper's equations (25) and (26).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PrintOptions {
-    /// How coefficients are rounded.
     pub rounding: Rounding,
     /// Longest line in em of the text around (1 em is 10 pt in a 10 pt document): 32 suits one column, 22 a column of a
     /// two-column paper. `None` is 32 for LaTeX and 44 for other pages.
     pub width_em: Option<f64>,
-    /// New names for variables.
     pub symbols: SymbolTable,
     /// Digest of the model file, for the first line of each file.
     pub digest: Option<String>,
-    /// How numbers are spelled in LaTeX.
     pub numbers: NumberStyle,
-    /// How equations are arranged in LaTeX.
     pub form: Form,
 }
 
+/// The files of a printed form.
+pub type Emitted = Result<Vec<EmittedFile>, TypesetError>;
+
 /// Why the equations of a model could not be printed.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum TypesetError {
     /// A coefficient in robot coordinates is too large once folded with weights and scale factors.
     #[error("robot coordinates, {output}: the coefficient of {term:?} is {value} in SI units")]
@@ -212,7 +205,6 @@ pub enum TypesetError {
         term: String,
         value: f64,
     },
-    /// A template failed to render.
     #[error("a template failed")]
     Template(#[from] askama::Error),
 }

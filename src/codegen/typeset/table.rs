@@ -1,4 +1,5 @@
 //! Tables of results: one set of cells, rendered as text, Markdown, HTML or CSV.
+#![allow(missing_docs, reason = "the names say it")]
 
 use std::fmt;
 
@@ -133,17 +134,14 @@ impl Table {
         }
     }
 
-    /// The caption.
     pub fn caption(&self) -> &str {
         &self.caption
     }
 
-    /// Whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
-    /// Number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
@@ -222,7 +220,6 @@ impl<T> Rows<T> {
         self
     }
 
-    /// The table.
     pub fn table(self) -> Table {
         self.table
     }

@@ -1,5 +1,6 @@
 //! The typeset tree: mathematics as it is laid out, before it has a spelling, with its estimated width in em (metrics
 //! of Computer Modern, good to a few percent) and where a long equation is broken.
+#![allow(missing_docs, reason = "the names say it")]
 
 use super::decimal::Decimal;
 use crate::symbolic::Function;
@@ -13,7 +14,6 @@ pub enum Math {
     Symbol(Symbol),
     /// Terms with signs; a single negative term is a negated expression.
     Sum(Vec<Signed>),
-    /// Factors side by side.
     Product(Vec<Math>),
     /// A visible multiplication sign between two factors of a product.
     Dot,
@@ -21,24 +21,19 @@ pub enum Math {
     Fraction(Box<Math>, Box<Math>),
     /// `numerator / denominator` on the line, for exponents.
     Slash(Box<Math>, Box<Math>),
-    /// `base ^ exponent`.
     Power(Box<Math>, Box<Math>),
     /// A root; no index means the square root.
     Root(Box<Math>, Option<u32>),
     /// A function by its name, with an optional power on that; roots and magnitudes have forms of their own.
     Function(Function, Option<Box<Math>>, Box<Math>),
-    /// The absolute value.
     Absolute(Box<Math>),
-    /// Parentheses.
     Group(Box<Math>),
 }
 
 /// A piece of mathematics with the sign in front of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signed {
-    /// Whether a minus stands in front.
     pub negative: bool,
-    /// What follows the sign.
     pub math: Math,
 }
 
@@ -63,7 +58,6 @@ impl Signed {
 /// A variable: a glyph, dots above it for time derivatives, and a subscript.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Symbol {
-    /// The letter or word.
     pub glyph: Glyph,
     /// How many dots stand above it: 0, 1 or 2.
     pub dots: u8,
@@ -217,14 +211,9 @@ fn glyph_width(glyph: &Glyph) -> f64 {
     }
 }
 
-/// Splits terms before signs into lines of `available` em, greedily; `first` em of the first line and `indent` em of
+/// Splits terms before signs into lines of `limit` em, greedily; `first` em of the first line and `indent` em of
 /// others are taken.
-pub(crate) fn break_lines(
-    terms: &[Signed],
-    available: f64,
-    first: f64,
-    indent: f64,
-) -> Vec<&[Signed]> {
+pub(crate) fn break_lines(terms: &[Signed], limit: f64, first: f64, indent: f64) -> Vec<&[Signed]> {
     let mut lines = Vec::new();
     let mut start = 0;
     let mut used = first;
@@ -232,7 +221,7 @@ pub(crate) fn break_lines(
         let is_signed = place > 0 || term.negative;
         let sign = if is_signed { OPERATOR } else { 0.0 };
         let needed = sign + width(&term.math);
-        if place > start && used + needed > available {
+        if place > start && used + needed > limit {
             lines.push(&terms[start..place]);
             start = place;
             used = indent;

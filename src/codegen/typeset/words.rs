@@ -1,11 +1,17 @@
-//! Sentences that every printed form of a model carries, in a spelling that the form chooses.
+//! Sentences that every printed form of a model carries, in a spelling that the form chooses, and what pages of Markdown
+//! and HTML are made of.
 
+use askama::Template;
+
+use crate::equations::Equations;
 use crate::model::FeetRule;
 use crate::robot::{ContactFlags, Leg};
 
 use super::decimal::{
     Decimal, LEAST_DECIMALS, Occurrence, RELATIVE_ERROR, Rounding, RoundingReport,
 };
+use super::equations::{EquationSystem, Typeset};
+use super::symbols::PrintOptions;
 use super::table::{rounded, rounded_up};
 use super::tree::{Math, Signed};
 
@@ -160,4 +166,57 @@ fn summand(spelling: &Spelling, place: &Occurrence) -> String {
 fn at_most(error: f64) -> Decimal {
     let error = rounded_up(error * (1.0 - 1e-9), 2);
     Decimal::rounded(error, Rounding::Significant(2))
+}
+
+/// Longest line of an equation unless chosen, in em.
+const WIDTH_EM: f64 = 44.0;
+
+pub(super) struct Page<'a> {
+    pub equations: &'a Equations<'a>,
+    pub spelling: &'a Spelling,
+    pub typeset: Typeset,
+    pub rounding: String,
+    width_em: f64,
+    pub digest: Option<&'a str>,
+    pub version: &'static str,
+}
+
+impl<'a> Page<'a> {
+    pub(super) fn new(
+        equations: &'a Equations<'a>,
+        options: &'a PrintOptions,
+        spelling: &'a Spelling,
+    ) -> Self {
+        let typeset = Typeset::new(equations, &options.symbols, options.rounding);
+        Self {
+            equations,
+            spelling,
+            rounding: rounding(spelling, options.rounding, &typeset.rounding),
+            typeset,
+            width_em: options.width_em.unwrap_or(WIDTH_EM),
+            digest: options.digest.as_deref(),
+            version: env!("CARGO_PKG_VERSION"),
+        }
+    }
+
+    /// Name, feet and equations of each phase.
+    pub(super) fn phases(
+        &self,
+        math: impl Fn(&EquationSystem, f64) -> String,
+    ) -> Vec<(&str, String, String)> {
+        let phases = self.typeset.systems.iter().zip(self.equations.phases());
+        let phases = phases.map(|(system, phase)| {
+            let feet = feet(&phase.feet);
+            (phase.name.as_str(), feet, math(system, self.width_em))
+        });
+        phases.collect()
+    }
+}
+
+/// The text of a template, with one line end at its end.
+pub fn rendered(template: &impl Template) -> askama::Result<String> {
+    let mut text = template.render()?;
+    text.truncate(text.trim_end().len());
+    text.push('\n');
+    Ok(text)
 }

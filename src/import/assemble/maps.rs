@@ -33,13 +33,12 @@ impl<'a> Assembly<'a, '_> {
             used.any(|used| used.layout == layout && used.role.ends_with(".weight"))
         };
         if has(Layout::Row) && has(Layout::Column) {
-            let note = "encoder and decoder are stored in different ways, one for row and one for column vectors";
-            self.report.notes.push(note.to_owned());
+            self.note("encoder and decoder are stored in different ways, one for row and one for column vectors");
         }
         if let (Some(encoder), Some(decoder)) = &maps {
             let change = self.change(encoder, decoder)?;
             if change > LARGEST_CHANGE {
-                self.report.notes.push(format!(
+                self.note(format!(
                     "encode(decode(z)) differs from z by {change:.2} of its size: are encoder and decoder those of one \
                      training?"
                 ));
@@ -104,8 +103,9 @@ impl<'a> Assembly<'a, '_> {
                 Part::Decoder => "latent states cannot be mapped back",
             };
             let weights = format!("{part_name}.weight");
-            let note = format!("no tensor {weights}, and no --map {weights}=TENSOR: {lost}");
-            self.report.notes.push(note);
+            self.note(format!(
+                "no tensor {weights}, and no --map {weights}=TENSOR: {lost}"
+            ));
             return Ok(None);
         };
         let is_deep = last > 0;
@@ -117,8 +117,7 @@ impl<'a> Assembly<'a, '_> {
             let bias = match bias {
                 Some(bias) => self.list(bias, matrix.nrows())?,
                 None => {
-                    let note = format!("the {part_name} has no bias: zero");
-                    self.report.notes.push(note);
+                    self.note(format!("the {part_name} has no bias: zero"));
                     DVector::zeros(matrix.nrows())
                 }
             };
@@ -136,8 +135,7 @@ impl<'a> Assembly<'a, '_> {
         }
         let map = StateMap::new(part_name, layers).map_err(|source| self.unusable(source))?;
         if is_deep {
-            let note = format!("the {part_name} has layers {}", map.summary());
-            self.report.notes.push(note);
+            self.note(format!("the {part_name} has layers {}", map.summary()));
         }
         Ok(Some(map))
     }
@@ -238,10 +236,8 @@ fn dims(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> 
         && (1..=state).contains(&latent)
         && known.latent.is_none_or(|known| known == latent)
         && known.state.is_none_or(|known| known == state);
-    fits.then_some(Known {
-        latent: Some(latent),
-        state: Some(state),
-    })
+    let (latent, state) = (Some(latent), Some(state));
+    fits.then_some(Known { latent, state })
 }
 
 impl<'a> Assembly<'a, '_> {
@@ -332,8 +328,7 @@ impl<'a> Assembly<'a, '_> {
             },
             |last| (last.weights().clone(), last.bias() + &offset),
         )?;
-        let note = "the mean of the training's states went into the biases";
-        self.report.notes.push(note.to_owned());
+        self.note("the mean of the training's states went into the biases");
         Ok(())
     }
 
@@ -397,8 +392,9 @@ impl<'a> Assembly<'a, '_> {
             statistics.mean = order.sorted(&statistics.mean);
             statistics.covariance = order.sorted(&rows.transpose()).transpose();
         }
-        let note = format!("coordinates were in the order {order}; the model has romc's");
-        self.report.notes.push(note);
+        self.note(format!(
+            "coordinates were in the order {order}; the model has romc's"
+        ));
         Ok(())
     }
 }

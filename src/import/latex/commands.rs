@@ -3,32 +3,11 @@
 use std::collections::BTreeSet;
 
 use super::super::Read;
-use super::definitions::DEFINITIONS;
 use super::expander::{Expander, Meaning, Refusal};
 use super::sections::is_one_of;
-use super::token::{Kind, Token, has, spelled};
+use super::token::{Kind, Token, is_in, spelled};
 
 type Printed = Read<Option<Token>>;
-
-/// Environments whose contents are not read.
-const VERBATIM: &str =
-    "verbatim Verbatim BVerbatim LVerbatim lstlisting minted comment filecontents";
-/// Environments that commands begin and end as well.
-pub(super) const BY_COMMAND: &str = "equation eqnarray displaymath";
-/// Commands whose argument does not print.
-const NOT_PRINTED: &str = "index typeout message hypersetup pdfbookmark nocite @gobble";
-/// Commands after which the text reads in another way than is followed here.
-const NOT_FOLLOWED: &str =
-    "globaldefs aftergroup afterassignment scantokens mathcode everymath everydisplay";
-const OTHER_FILES: &str = "input include subfile subfileinclude subinputfrom import subimport inputfrom includefrom \
-    InputIfFileExists @input";
-const CONDITIONALS: &str = "if ifcat ifnum ifdim ifodd ifvmode ifhmode ifmmode ifinner ifvoid ifhbox ifvbox ifx ifeof \
-    iftrue iffalse ifcase ifdefined ifcsname iffontchar ifincsname ifpdf ifxetex ifluatex ifPDFTeX ifXeTeX ifLuaTeX";
-/// Commands that begin as conditionals do and take arguments, or none.
-const WITH_ARGUMENTS: &str =
-    "ifdef ifundef ifdefempty ifdefvoid ifdefstring ifdefmacro ifdefequal ifdefcounter";
-/// Commands that keep their arguments, for elsewhere or for a condition of their own.
-const KEEPING: &str = "AtBeginDocument AtEndDocument AtEndPreamble sbox savebox setbox";
 
 const FOLLOWED: &str =
     "`\\iftrue`, `\\iffalse` or a switch of `\\newif`, or the printed branch alone";
@@ -50,8 +29,8 @@ impl Expander<'_> {
             "bgroup" => Kind::Open,
             "egroup" => Kind::Close,
             // Old documents begin environments by their commands: `\let\be\equation`.
-            name if has(BY_COMMAND, name) => Kind::Begin(name.to_owned()),
-            name if has(BY_COMMAND, name.strip_prefix("end").unwrap_or("")) => {
+            name if is_in("by command", name) => Kind::Begin(name.to_owned()),
+            name if is_in("by command", name.strip_prefix("end").unwrap_or("")) => {
                 Kind::End(name["end".len()..].to_owned())
             }
             // These take room and print nothing.
@@ -90,17 +69,17 @@ impl Expander<'_> {
             }
             "endinput" => self.lexer.rest = self.lexer.line(),
             "stop" | "bye" => self.stop(),
-            name if has(NOT_PRINTED, name) => drop(self.argument()),
-            name if has(NOT_FOLLOWED, name) => {
+            name if is_in("not printed", name) => drop(self.argument()),
+            name if is_in("not followed", name) => {
                 return self.refuse(&token, "", "definitions where they hold");
             }
-            name if has(OTHER_FILES, name) => {
+            name if is_in("other files", name) => {
                 let whole = format!("latexpand {} > whole.tex", self.file);
                 let expected = format!("the document in one file: {whole}");
                 return self.refuse(&token, ", which prints a file that is not read", &expected);
             }
             name => {
-                let is_definition = has(DEFINITIONS, name);
+                let is_definition = is_in("definitions", name);
                 if is_definition {
                     self.definition(&token);
                 }
@@ -164,7 +143,7 @@ impl Expander<'_> {
         };
         let end = Kind::End(name.clone());
         let is_verbatim = match self.meaning(name) {
-            None => is_one_of(VERBATIM, name),
+            None => is_one_of("verbatim environments", name),
             Some(meaning) => matches!(meaning, Meaning::Verbatim),
         };
         if is_verbatim {
@@ -225,15 +204,17 @@ impl Expander<'_> {
             "iftrue" => true,
             "iffalse" => false,
             "ifmmode" if self.in_mathematics().is_some() => self.in_mathematics() == Some(true),
-            name if has(KEEPING, name) => return self.undecided_arguments(&token, KEPT),
+            name if is_in("keeping arguments", name) => {
+                return self.undecided_arguments(&token, KEPT);
+            }
             name if name.starts_with("If")
                 || name.starts_with("@if")
-                || has(WITH_ARGUMENTS, name) =>
+                || is_in("conditionals with arguments", name) =>
             {
                 return self.undecided_arguments(&token, CONDITION);
             }
             name if !name.starts_with("if") || name == "iff" => return Ok(Some(token)),
-            name if !has(CONDITIONALS, name) && self.is_brace_next() => {
+            name if !is_in("conditionals", name) && self.is_brace_next() => {
                 return self.undecided_arguments(&token, CONDITION);
             }
             _ => {
@@ -258,9 +239,11 @@ impl Expander<'_> {
                 Some(Meaning::Same(Kind::Command(same))) => same,
                 Some(_) => "",
             };
-            let is_known = has(CONDITIONALS, name);
-            let is_unknown =
-                name.starts_with("if") && !is_known && name != "iff" && !has(WITH_ARGUMENTS, name);
+            let is_known = is_in("conditionals", name);
+            let is_unknown = name.starts_with("if")
+                && !is_known
+                && name != "iff"
+                && !is_in("conditionals with arguments", name);
             match name {
                 "fi" if depth == 0 => return Ok(passed),
                 "else" if depth == 0 && stops_at_else => {
@@ -295,7 +278,7 @@ impl Expander<'_> {
                     self.is_global = true;
                     self.define(name.clone(), Meaning::Unread(UNDECIDED, matters));
                 }
-                defines = !defines && has(DEFINITIONS, name);
+                defines = !defines && is_in("definitions", name);
                 if let Some(Meaning::Macro(found)) = self.meaning(name)
                     && seen.insert(name.clone())
                 {

@@ -2,27 +2,10 @@
 
 use std::rc::Rc;
 
-use super::commands::BY_COMMAND;
 use super::expander::{Expander, Macro, Meaning, Refusal};
-use super::sections::{CASES, LAYOUTS, is_one_of};
-use super::token::{Kind, Token, has, spelled};
+use super::sections::is_one_of;
+use super::token::{Kind, Token, has, is_in, spelled};
 
-/// Commands that define: those whose form is read, then those behind which the macro that comes next is unknown.
-pub(super) const DEFINITIONS: &str = "newcommand renewcommand providecommand DeclareRobustCommand def gdef edef xdef \
-    let DeclareMathOperator newif newenvironment renewenvironment sisetup excludecomment excludeversion \
-    lstnewenvironment DefineVerbatimEnvironment newverbatim \
-    chardef mathchardef font DeclarePairedDelimiter DeclarePairedDelimiterX DeclareMathSymbol DeclareMathAccent \
-    newcommandx renewcommandx LetLtxMacro letcs patchcmd xpatchcmd appto gappto eappto xappto preto gpreto apptocmd \
-    pretocmd robustify csdef csgdef csedef csxdef @namedef g@addto@macro NewDocumentCommand RenewDocumentCommand \
-    ProvideDocumentCommand DeclareDocumentCommand NewExpandableDocumentCommand NewEnviron RenewEnviron \
-    NewDocumentEnvironment RenewDocumentEnvironment";
-/// Definitions of environments whose contents are not read.
-const VERBATIM: &str =
-    "excludecomment excludeversion lstnewenvironment DefineVerbatimEnvironment newverbatim";
-/// Commands that LaTeX and amsmath define, so that `\providecommand` leaves them as they are.
-const KERNEL: &str = "sin cos tan cot sec csc sinh cosh tanh exp log ln frac dfrac tfrac sqrt dot ddot dddot left right \
-    cdot times lvert rvert vert text mathrm operatorname prime partial alpha beta gamma delta epsilon zeta eta theta \
-    iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi omega";
 const UNREAD_FORM: Refusal = (
     ", a macro of a form that is not read",
     "`\\newcommand` with plain arguments",
@@ -43,10 +26,12 @@ const EXPANDED: Refusal = (
     ", a macro whose body is expanded where it is defined",
     "`\\def` or `\\newcommand`",
 );
-/// Definitions; each ends early where the text does.
+/// A name and what it means from there on; none where the text ends early.
+type Definition = (String, Meaning);
+
 impl Expander<'_> {
-    pub(super) fn definition(&mut self, token: &Token) -> Option<()> {
-        match token.name() {
+    pub(super) fn definition(&mut self, token: &Token) {
+        let found = match token.name() {
             "newcommand" | "renewcommand" | "providecommand" | "DeclareRobustCommand" => {
                 self.new_command(token.name())
             }
@@ -56,15 +41,18 @@ impl Expander<'_> {
             "newif" => self.switch(token),
             "newenvironment" | "renewenvironment" => self.environment(token.name()),
             "sisetup" => {
-                let is_changed = changes_digits(&self.argument()?);
-                let changed = Meaning::Unread(CHANGED_DIGITS, false);
-                is_changed.then(|| self.define("num".to_owned(), changed))
+                let options = self.argument().unwrap_or_default();
+                let changed = ("num".to_owned(), Meaning::Unread(CHANGED_DIGITS, false));
+                changes_digits(&options).then_some(changed)
             }
-            name if has(VERBATIM, name) => {
-                let name = spelled(&self.argument()?);
-                Some(self.define(name, Meaning::Verbatim))
+            name if is_in("verbatim definitions", name) => {
+                let name = self.argument();
+                name.map(|name| (spelled(&name), Meaning::Verbatim))
             }
             _ => self.unread_definition(token),
+        };
+        if let Some((name, meaning)) = found {
+            self.define(name, meaning);
         }
     }
 
@@ -83,24 +71,23 @@ impl Expander<'_> {
         match self.meaning(name) {
             Some(Meaning::Same(Kind::Command(old))) => !has("relax undefined @undefined", old),
             Some(_) => true,
-            None => has(KERNEL, name),
+            None => is_in("kernel", name),
         }
     }
 
     /// `\newcommand{\k}[2][default]{...}` and its kin.
-    fn new_command(&mut self, command: &str) -> Option<()> {
+    fn new_command(&mut self, command: &str) -> Option<Definition> {
         let name = self.target()?;
         let meaning = self.bracketed_definition()?;
         self.is_global = false;
         match (command, self.is_defined(&name)) {
-            ("providecommand", true) => {}
+            ("providecommand", true) => None,
             ("newcommand", true) => {
                 let matters = matches!(&meaning, Meaning::Macro(found) if found.matters);
-                self.define(name, Meaning::Unread(DEFINED_TWICE, matters));
+                Some((name, Meaning::Unread(DEFINED_TWICE, matters)))
             }
-            _ => self.define(name, meaning),
+            _ => Some((name, meaning)),
         }
-        Some(())
     }
 
     /// `[2][default]{...}`.
@@ -114,22 +101,17 @@ impl Expander<'_> {
         })
     }
 
-    fn plain_macro(
-        &self,
-        parameters: usize,
-        default: Option<Vec<Token>>,
-        body: Vec<Token>,
-    ) -> Meaning {
+    fn plain_macro(&self, count: usize, default: Option<Vec<Token>>, body: Vec<Token>) -> Meaning {
         Meaning::Macro(Rc::new(Macro {
-            parameters,
-            default: default.filter(|_| parameters > 0),
+            parameters: count,
+            default: default.filter(|_| count > 0),
             matters: self.matters(&body),
             body,
         }))
     }
 
     /// `\def\k#1#2{...}`.
-    fn plain_definition(&mut self, command: &str) -> Option<()> {
+    fn plain_definition(&mut self, command: &str) -> Option<Definition> {
         let name = self.target()?;
         let mut count = Some(0);
         while !self.is_brace_next() {
@@ -151,20 +133,20 @@ impl Expander<'_> {
             Some(parameters) => self.plain_macro(parameters, None, body),
         };
         self.is_global |= command.starts_with(['g', 'x']);
-        Some(self.define(name, meaning))
+        Some((name, meaning))
     }
 
     /// `\let\k=\dot`.
-    fn same_meaning(&mut self) -> Option<()> {
+    fn same_meaning(&mut self) -> Option<Definition> {
         let name = self.target()?;
         self.takes(&Kind::Character('='));
         let token = self.code()?;
         let earlier = self.meaning(token.name()).cloned();
-        Some(self.define(name, earlier.unwrap_or(Meaning::Same(token.kind))))
+        Some((name, earlier.unwrap_or(Meaning::Same(token.kind))))
     }
 
     /// `\DeclareMathOperator{\sgn}{sgn}`.
-    fn operator(&mut self, token: &Token) -> Option<()> {
+    fn operator(&mut self, token: &Token) -> Option<Definition> {
         let (name, text) = (self.target()?, self.argument()?);
         let operator = [Kind::command("operatorname"), Kind::Open].map(|kind| token.with(kind));
         let body = operator
@@ -175,11 +157,11 @@ impl Expander<'_> {
             true => Meaning::Unread(DEFINED_TWICE, false),
             false => self.plain_macro(0, None, body.collect()),
         };
-        Some(self.define(name, meaning))
+        Some((name, meaning))
     }
 
     /// `\newif\ifdraft`, with `\drafttrue` and `\draftfalse`.
-    fn switch(&mut self, token: &Token) -> Option<()> {
+    fn switch(&mut self, token: &Token) -> Option<Definition> {
         let name = self.target()?;
         let stem = name.strip_prefix("if").unwrap_or(&name).to_owned();
         for value in ["true", "false"] {
@@ -188,11 +170,11 @@ impl Expander<'_> {
             let meaning = self.plain_macro(0, None, body.to_vec());
             self.define(format!("{stem}{value}"), meaning);
         }
-        Some(self.define(name, Meaning::Same(Kind::command("iffalse"))))
+        Some((name, Meaning::Same(Kind::command("iffalse"))))
     }
 
     /// `\newenvironment{name}[2][default]{begin}{end}`.
-    fn environment(&mut self, command: &str) -> Option<()> {
+    fn environment(&mut self, command: &str) -> Option<Definition> {
         self.takes(&Kind::Character('*'));
         let name = spelled(&self.argument()?);
         let (mut begin, end) = (self.bracketed_definition()?, self.argument()?);
@@ -201,21 +183,21 @@ impl Expander<'_> {
         }
         let end = self.plain_macro(0, None, end);
         self.define(format!("end{name}"), end);
-        Some(self.define(name, begin))
+        Some((name, begin))
     }
 
-    fn unread_definition(&mut self, token: &Token) -> Option<()> {
+    fn unread_definition(&mut self, token: &Token) -> Option<Definition> {
         let name = self.target()?;
         let mut body = self.following_groups(1).unwrap_or_default();
         body.push(token.with(Kind::command(&name)));
         let matters = token.name().contains("Environ") || self.matters(&body);
-        Some(self.define(name, Meaning::Unread(UNREAD_FORM, matters)))
+        Some((name, Meaning::Unread(UNREAD_FORM, matters)))
     }
 
     /// Whether mathematics, or the end of the document, may be in what tokens print.
     pub(super) fn matters(&self, tokens: &[Token]) -> bool {
         let is_layout = |name: &str| {
-            let mut lists = [LAYOUTS, CASES, "math document"].into_iter();
+            let mut lists = ["layouts", "cases", "documents"].into_iter();
             self.meaning(name).is_some() || lists.any(|list| is_one_of(list, name))
         };
         let matters =
@@ -230,7 +212,7 @@ impl Expander<'_> {
                     let inside = near.take_while(|token| token.kind != Kind::Close);
                     is_layout(&spelled(inside.skip(1)))
                 }
-                (None, name) => has(BY_COMMAND, name),
+                (None, name) => is_in("by command", name),
             };
         tokens.iter().enumerate().any(matters)
     }

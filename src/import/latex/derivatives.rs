@@ -1,8 +1,7 @@
 //! Derivatives with respect to time, however they are written, as dots.
 
-use super::reader::{FONTS, INVISIBLE};
-use super::token::has;
-use super::token::{Kind, Token, group_length};
+use super::super::equations::Position;
+use super::token::{Kind, Token, group_length, has, is_in};
 use super::variables::is_greek;
 
 const MAX_DOTS: usize = 3;
@@ -57,11 +56,9 @@ fn fraction(tokens: &[Token], at: usize) -> Option<Derivative> {
 
 /// Whether what follows is no power and no further factor, which a derivative in front might mean as well.
 fn ends_product(tokens: &[Token]) -> bool {
-    const BEHIND: &str = "cdot times ast right coloneqq coloneq triangleq equiv approx simeq rvert vert } text textrm \
-        mbox tag label";
     let mut rest = tokens
         .iter()
-        .skip_while(|token| has(INVISIBLE, token.name()));
+        .skip_while(|token| is_in("invisible", token.name()));
     match rest.next().map(|token| &token.kind) {
         None => true,
         // The time of `z_1(t)`.
@@ -69,7 +66,7 @@ fn ends_product(tokens: &[Token]) -> bool {
             .next()
             .is_some_and(|token| token.kind == Kind::Character('t')),
         Some(Kind::Character(mark)) => "+-=,.;)]/:*&|".contains(*mark),
-        Some(Kind::Command(name)) => has(BEHIND, name),
+        Some(Kind::Command(name)) => is_in("behind derivatives", name),
         Some(kind) => kind.ends_term() || matches!(kind, Kind::End(_)),
     }
 }
@@ -78,7 +75,7 @@ fn ends_product(tokens: &[Token]) -> bool {
 fn differential(tokens: &[Token], at: usize) -> Option<usize> {
     let is_d = |token: &Token| token.kind == Kind::Character('d') || token.is_command("partial");
     let first = tokens.get(at)?;
-    if has(FONTS, first.name()) {
+    if is_in("fonts", first.name()) {
         let (inside, behind) = argument(tokens, at + 1)?;
         return matches!(inside, [sign] if is_d(sign)).then_some(behind);
     }
@@ -86,7 +83,7 @@ fn differential(tokens: &[Token], at: usize) -> Option<usize> {
 }
 
 /// A whole power at `at`, 1 without, and the place behind it.
-fn power(tokens: &[Token], at: usize) -> (usize, usize) {
+fn power(tokens: &[Token], at: usize) -> Position {
     let found = || {
         (tokens.get(at)?.kind == Kind::Superscript).then_some(())?;
         let (inside, behind) = argument(tokens, at + 1)?;
@@ -120,7 +117,7 @@ fn letter_end(tokens: &[Token], at: usize) -> Option<usize> {
     match &tokens.get(at)?.kind {
         Kind::Character(letter) if letter.is_ascii_alphabetic() => Some(at + 1),
         Kind::Command(name) if is_greek(name) => Some(at + 1),
-        Kind::Command(name) if has(FONTS, name) || has("dot ddot", name) => {
+        Kind::Command(name) if is_in("fonts", name) || has("dot ddot", name) => {
             Some(argument(tokens, at + 1)?.1)
         }
         Kind::Open => {
@@ -152,7 +149,7 @@ fn primed(tokens: &[Token], at: usize) -> Option<Derivative> {
 }
 
 /// How many primes stand at `at`, at most as many as there are dots, and the place behind them.
-fn primes(tokens: &[Token], at: usize) -> Option<(usize, usize)> {
+fn primes(tokens: &[Token], at: usize) -> Option<Position> {
     let is_prime = |token: &Token| token.is_command("prime");
     let is_mark = |token: &&Token| matches!(token.kind, Kind::Character('\'' | '′' | '’'));
     let marks = tokens[at..].iter().take_while(is_mark).count();

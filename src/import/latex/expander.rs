@@ -4,15 +4,10 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::super::{ImportError, Read};
-use super::sections::{CASES, LAYOUTS, is_one_of};
+use super::sections::is_one_of;
 use super::token::{Kind, Lexer, Token};
 
 const MAX_EXPANDED: usize = 500_000;
-/// Environments whose rows are not divided into cells.
-const WITHOUT_CELLS: &str = "equation displaymath dmath dgroup";
-/// Environments with cells besides those that arrange equations.
-const WITH_CELLS: &str = "array tabular tabularx longtable matrix pmatrix bmatrix Bmatrix vmatrix Vmatrix smallmatrix \
-    subarray substack align";
 
 #[derive(Debug)]
 pub(super) struct Macro {
@@ -381,6 +376,6 @@ impl Expander<'_> {
 }
 
 fn has_cells(name: &str) -> bool {
-    let mut lists = [LAYOUTS, CASES, WITH_CELLS].into_iter();
-    lists.any(|list| is_one_of(list, name)) && !is_one_of(WITHOUT_CELLS, name)
+    let mut lists = ["layouts", "cases", "with cells"].into_iter();
+    lists.any(|list| is_one_of(list, name)) && !is_one_of("without cells", name)
 }

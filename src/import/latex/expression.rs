@@ -4,10 +4,9 @@
 //! (`2/3z_1`, `z_1/2u_1`), a number after a variable. Nesting is limited, so the machine's stack is safe.
 
 use super::super::Read;
-use super::super::equations::Equation;
+use super::super::equations::{Equation, Position};
 use super::reader::{BARE, Last, Reader};
-use super::token::has;
-use super::token::{Kind, Token};
+use super::token::{Kind, Token, has, is_in};
 use super::variables::{Symbol, function};
 use crate::model::LatentVariable;
 
@@ -24,7 +23,6 @@ const DELIMITERS: [(&str, &[&str]); 8] = [
     ("\\vert", BARS),
     ("\\|", BARS),
 ];
-pub(super) const WORDS: &str = "text textrm textit mbox intertext shortintertext";
 
 /// `\ddot z_1 =`: its tokens and the latent coordinate, if it is one.
 pub(super) struct LeftSide {
@@ -99,7 +97,7 @@ impl Reader<'_> {
             match self.next_kind() {
                 None => return Ok(()),
                 Some(Kind::Character(',' | '.' | ';')) => self.at += 1,
-                Some(Kind::Command(name)) if has(WORDS, &name) => {
+                Some(Kind::Command(name)) if is_in("text", &name) => {
                     let (at, after) = (self.at, self.after_argument(self.at + 1));
                     let end = std::mem::replace(&mut self.end, after);
                     self.at = at + 1 + usize::from(self.kind(at + 1) == Some(&Kind::Open));
@@ -244,7 +242,7 @@ impl Reader<'_> {
             Kind::Command(name) => {
                 let ends =
                     "right rvert rVert } rbrace rangle leq geq le ge lt gt approx equiv sim in";
-                !has(ends, name) && !has(WORDS, name)
+                !has(ends, name) && !is_in("text", name)
             }
             kind => !kind.ends_term(),
         }
@@ -296,7 +294,7 @@ impl Reader<'_> {
     }
 
     /// A variable, or a group in braces, which stands for what is in it; sums need parentheses that are printed.
-    fn variable_or_braces(&mut self, place: (usize, usize), kind: &Kind) -> Read<Last> {
+    fn variable_or_braces(&mut self, place: Position, kind: &Kind) -> Read<Last> {
         let start = self.at;
         if let Some(symbol) = self.symbol()? {
             return self.variable(place, &symbol);
@@ -330,7 +328,7 @@ impl Reader<'_> {
     /// What `read` makes of the argument that comes next, between an opening text and a parenthesis.
     fn enclosed<T>(
         &mut self,
-        place: (usize, usize),
+        place: Position,
         open: &str,
         read: impl FnOnce(&mut Self) -> Read<T>,
     ) -> Read<T> {
@@ -348,7 +346,7 @@ impl Reader<'_> {
         Ok(if is_number { Last::Number } else { Last::Other })
     }
 
-    pub(super) fn delimited(&mut self, place: (usize, usize)) -> Read<Last> {
+    pub(super) fn delimited(&mut self, place: Position) -> Read<Last> {
         let has_left = self.command("left");
         let mut openers = DELIMITERS.iter();
         let Some((_, closers)) = openers.find(|(opener, _)| self.delimiter(opener)) else {
@@ -382,12 +380,12 @@ impl Reader<'_> {
     }
 
     /// The sum in the argument that comes next, between an opening text and a parenthesis.
-    pub(super) fn enclosed_sum(&mut self, place: (usize, usize), open: &str) -> Read<Last> {
+    pub(super) fn enclosed_sum(&mut self, place: Position, open: &str) -> Read<Last> {
         let read = |reader: &mut Self| reader.sum(false);
         self.enclosed(place, open, read).map(|()| Last::Other)
     }
 
-    pub(super) fn powers(&mut self, place: (usize, usize)) -> Read<()> {
+    pub(super) fn powers(&mut self, place: Position) -> Read<()> {
         if !self.takes(&Kind::Superscript) {
             return Ok(());
         }

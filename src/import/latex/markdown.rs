@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::super::equations::Position;
 use super::token::{Kind, Lexer, Token};
 
 /// What stretches over lines, with its ends: displays, and what is not printed as mathematics.
@@ -40,7 +41,7 @@ struct Markdown {
 }
 
 impl Markdown {
-    fn push(&mut self, kind: Kind, place: (usize, usize)) {
+    fn push(&mut self, kind: Kind, place: Position) {
         self.tokens.push(Token {
             kind,
             place,
@@ -48,11 +49,11 @@ impl Markdown {
         });
     }
 
-    fn mathematics(&mut self, text: &str, place: (usize, usize)) {
+    fn mathematics(&mut self, text: &str, place: Position) {
         self.tokens.extend(Lexer::of_part(text, place));
     }
 
-    fn text(&mut self, text: &str, place: (usize, usize)) {
+    fn text(&mut self, text: &str, place: Position) {
         if !text.trim().is_empty() {
             self.push(Kind::Comment(text.to_owned()), place);
         }

@@ -6,11 +6,10 @@
 use std::ops::Range;
 
 use super::super::Read;
+use super::super::equations::Position;
 use super::definitions::changes_digits;
-use super::expression::WORDS;
-use super::reader::{Digits, FONTS, INVISIBLE_WITH_ARGUMENT, Last, Reader};
-use super::token::has;
-use super::token::{Kind, Token};
+use super::reader::{Digits, Last, Reader};
+use super::token::{Kind, Token, has, is_in};
 use super::variables::function;
 
 /// Most pieces under an odd root, which are written twice, and so again in each root around it.
@@ -66,7 +65,7 @@ impl Reader<'_> {
     pub(super) fn characters(&self, places: Range<usize>) -> String {
         let characters = places.filter_map(|at| match &self.tokens[at].kind {
             Kind::Open | Kind::Close | Kind::Comment(_) => None,
-            Kind::Command(name) if has(FONTS, name) => None,
+            Kind::Command(name) if is_in("fonts", name) => None,
             Kind::Character(character) => Some(*character),
             _ => Some('?'),
         });
@@ -85,7 +84,7 @@ impl Reader<'_> {
     }
 
     /// `\num{-1.2e-3}`, with the options and spellings of siunitx that print the number as it is.
-    pub(super) fn macro_number(&mut self, place: (usize, usize)) -> Read<Last> {
+    pub(super) fn macro_number(&mut self, place: Position) -> Read<Last> {
         self.at += 1;
         if self.is_next(&Kind::Character('[')) {
             let options = &self.tokens[self.at..self.end];
@@ -128,7 +127,7 @@ impl Reader<'_> {
     }
 
     /// A root at its command. Even ones have no value below zero; odd ones are `abs(x)^(1/3)*sign(x)`.
-    pub(super) fn root(&mut self, place: (usize, usize)) -> Read<Last> {
+    pub(super) fn root(&mut self, place: Position) -> Read<Last> {
         self.at += 1;
         let index = self.index()?;
         let is_odd = index % 2 == 1;
@@ -166,9 +165,6 @@ impl Reader<'_> {
     }
 }
 
-/// Entries of [`FONTS`] that put space around what they hold.
-const SPACED: &str = "operatorname mathop mathbin mathopen mathclose mathinner";
-
 /// Digits with at most one point, or comma in braces, and an exponent as in `1.2e-3`.
 pub(super) struct Number {
     pub(super) text: String,
@@ -189,7 +185,7 @@ pub(super) fn around_digits(tokens: &[Token]) -> Vec<bool> {
                 font = font_before;
                 true
             }
-            Kind::Command(name) if has(FONTS, name) && !has(SPACED, name) => {
+            Kind::Command(name) if is_in("fonts", name) && !is_in("spaced fonts", name) => {
                 font = Some(at);
                 font_before.is_none()
             }
@@ -233,12 +229,13 @@ pub(super) fn without_operator_braces(tokens: Vec<Token>) -> Vec<Token> {
 }
 
 fn takes_argument(kind: &Kind) -> bool {
-    const ONES: &str = "sqrt dot ddot dddot abs num";
     match kind {
         Kind::Superscript | Kind::Subscript => true,
         Kind::Command(name) => {
-            let mut lists = [FONTS, WORDS, INVISIBLE_WITH_ARGUMENT, ONES].iter();
-            lists.any(|list| has(list, name)) || name.ends_with("frac") || function(name).is_some()
+            let mut lists = ["fonts", "text", "invisible with argument", "one argument"].iter();
+            lists.any(|list| is_in(list, name))
+                || name.ends_with("frac")
+                || function(name).is_some()
         }
         _ => false,
     }

@@ -2,24 +2,14 @@
 
 use std::ops::Range;
 
-use super::super::equations::Piece;
+use super::super::equations::{Piece, Position};
 use super::super::{ImportError, Read};
-use super::expression::{LeftSide, WORDS};
+use super::expression::LeftSide;
 use super::numbers::around_digits;
-use super::token::{Kind, Token, has};
+use super::token::{Kind, Token, is_in};
 use super::variables::SymbolNames;
 
 const MAX_DEPTH: usize = 60;
-/// Commands that change only how the page looks; those of the second list take an argument.
-pub(super) const INVISIBLE: &str = ", ; : ! > quad qquad enspace thinspace medspace thickspace negthinspace \
-    displaystyle textstyle scriptstyle limits nolimits nonumber notag allowbreak nobreak \
-    allowdisplaybreaks hfill hfil mathstrut strut relax big Big bigg Bigg centering noindent par \
-    smallskip medskip bigskip IEEEyesnumber IEEEnonumber IEEEeqnarraynumspace";
-pub(super) const INVISIBLE_WITH_ARGUMENT: &str = "tag hspace vspace mspace hskip color cline";
-/// Commands that only choose a font.
-pub(super) const FONTS: &str = "mathrm mathit mathbf mathsf mathtt bm boldsymbol pmb text textrm textit textup \
-    mathnormal operatorname mathop mathord mathbin mathopen mathclose mathinner mbox";
-pub(super) const SIZES: &str = "bigl Bigl biggl Biggl bigr Bigr biggr Biggr bigm";
 
 /// How integers of a document's coefficients were rounded, where it says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +56,7 @@ pub(super) fn is_blank(kind: &Kind) -> bool {
     match kind {
         Kind::Align | Kind::Break | Kind::Label(_) | Kind::Comment(_) | Kind::Paragraph => true,
         Kind::Character(character) => *character == '~',
-        Kind::Command(name) => name == " " || has(INVISIBLE, name) || has(SIZES, name),
+        Kind::Command(name) => name == " " || is_in("invisible", name) || is_in("sizes", name),
         _ => false,
     }
 }
@@ -120,7 +110,7 @@ impl<'a> Reader<'a> {
             let after = match &self.tokens[self.at].kind {
                 kind if is_blank(kind) => self.at + 1,
                 Kind::Open if self.closing[self.at] == self.at + 1 => self.at + 2,
-                Kind::Command(name) if has(INVISIBLE_WITH_ARGUMENT, name) => {
+                Kind::Command(name) if is_in("invisible with argument", name) => {
                     let star = usize::from(self.kind(self.at + 1) == Some(&Kind::Character('*')));
                     self.after_argument(self.at + 1 + star)
                 }
@@ -186,11 +176,11 @@ impl<'a> Reader<'a> {
         Err(ImportError::at(self.file, place, found, expected))
     }
 
-    pub(super) fn here(&mut self) -> (usize, usize) {
+    pub(super) fn here(&mut self) -> Position {
         self.peek().map_or((1, 1), |token| token.place)
     }
 
-    pub(super) fn push(&mut self, place: (usize, usize), text: impl Into<String>) {
+    pub(super) fn push(&mut self, place: Position, text: impl Into<String>) {
         self.pieces.push((place, text.into()));
     }
 
@@ -265,10 +255,9 @@ impl Reader<'_> {
 
     /// The command for text in whose argument one of the left sides is, which are in their order.
     pub(super) fn in_text(&self, left_sides: &[LeftSide]) -> Option<&Token> {
-        const NOTES: &str = "tag footnote footnotetext";
         let mut commands = self.tokens.iter().enumerate();
         let found = commands.find(|(at, token)| {
-            let is_text = has(WORDS, token.name()) || has(NOTES, token.name());
+            let is_text = is_in("text", token.name()) || is_in("notes", token.name());
             let star = usize::from(self.kind(at + 1) == Some(&Kind::Character('*')));
             let open = at + 1 + star;
             let inside = left_sides.partition_point(|side| side.at < open);
@@ -279,7 +268,6 @@ impl Reader<'_> {
     }
 
     pub(super) fn is_fraction_of_integers(&self) -> bool {
-        const FRACTIONS: &str = "frac dfrac tfrac cfrac";
         let behind_integer = |at: usize| {
             let behind = self.after_argument(at);
             let inside = match self.kind(at)? {
@@ -290,7 +278,7 @@ impl Reader<'_> {
             let is_digit = |at: usize| self.tokens[at].kind.digit().is_some();
             (seen.peek().is_some() && seen.all(is_digit)).then_some(behind)
         };
-        matches!(self.kind(self.at), Some(Kind::Command(name)) if has(FRACTIONS, name))
+        matches!(self.kind(self.at), Some(Kind::Command(name)) if is_in("fractions", name))
             && (behind_integer(self.at + 1).and_then(behind_integer)).is_some()
     }
 
@@ -318,18 +306,15 @@ fn without_split_delimiters(tokens: &[Token]) -> Vec<Token> {
     let mut joined = Vec::with_capacity(tokens.len());
     let mut at = 0;
     while at < tokens.len() {
-        let rest = &tokens[tokens.len().min(at + 2)..];
-        let blanks = rest.iter().take_while(|token| is_blank(&token.kind));
-        if is_empty(at, "right") {
-            let left = at + 2 + blanks.count();
-            if left < tokens.len() && is_empty(left, "left") {
-                joined.extend_from_slice(&tokens[at + 2..left]);
-                at = left + 2;
-                continue;
-            }
+        let next = || (at + 2..tokens.len()).find(|at| !is_blank(&tokens[*at].kind));
+        let left = is_empty(at, "right").then(next).flatten();
+        if let Some(left) = left.filter(|left| is_empty(*left, "left")) {
+            joined.extend_from_slice(&tokens[at + 2..left]);
+            at = left + 2;
+        } else {
+            joined.push(tokens[at].clone());
+            at += 1;
         }
-        joined.push(tokens[at].clone());
-        at += 1;
     }
     joined
 }

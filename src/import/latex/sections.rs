@@ -1,6 +1,6 @@
 //! From a document's displays to sections of equations: one per phase.
 
-use super::super::equations::{Section, Sections, complete, text_of};
+use super::super::equations::{Position, Section, Sections, complete, text_of};
 use super::super::{ImportError, Read};
 use super::derivatives::with_dots;
 use super::expander::Expander;
@@ -8,12 +8,8 @@ use super::expression::LeftSide;
 use super::markdown;
 use super::numbers::without_operator_braces;
 use super::reader::{Digits, Reader};
-use super::token::has;
-use super::token::{Kind, Token, group_length};
+use super::token::{Kind, Token, group_length, is_in};
 use super::variables::SymbolNames;
-
-/// Environments that arrange lines only if whole equations are in them.
-const DISTINCTIONS: &str = "cases dcases array";
 
 /// Reads the equations of a document. Labels may end in `known` names of phases; comments `Phase NAME` and headings go
 /// before them.
@@ -119,7 +115,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
         let found = format!("{}{why}", token.quoted());
         Err(ImportError::at(file, token.place, found, expected))
     };
-    let is_distinction = |token: &Token| matches!(&token.kind, Kind::Begin(name) | Kind::End(name) if is_one_of(DISTINCTIONS, name));
+    let is_distinction = |token: &Token| matches!(&token.kind, Kind::Begin(name) | Kind::End(name) if is_one_of("distinctions", name));
     let mut rest = tokens;
     while let Some((token, behind)) = rest.split_first() {
         rest = behind;
@@ -139,7 +135,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
                     rest = &rest[rest.len().min(3)..];
                 }
                 let is_group = rest.first().is_some_and(|next| next.kind == Kind::Open);
-                if is_group && is_one_of(WITH_COLUMNS, name) {
+                if is_group && is_one_of("with columns", name) {
                     rest = &rest[group_length(rest.iter()).unwrap_or(rest.len())..];
                 }
             }
@@ -173,7 +169,7 @@ fn flattened(file: &str, tokens: &[Token]) -> Read<Vec<Token>> {
 
 /// Whether an environment only arranges lines; `subequations` holds displays and text between them.
 fn is_layout(name: &str) -> bool {
-    is_one_of(LAYOUTS, name) || is_one_of("subequations", name)
+    is_one_of("layouts", name) || is_one_of("around displays", name)
 }
 
 /// Whether the environment whose contents begin here holds equations: it is then no matrix and no right side.
@@ -203,7 +199,7 @@ struct Document<'d> {
     phase: Option<String>,
     starts_phase: bool,
     /// The first left side of a variable that is not known, and its place.
-    strange: Option<((usize, usize), String)>,
+    strange: Option<(Position, String)>,
     sections: Vec<Section>,
 }
 
@@ -226,7 +222,7 @@ impl Document<'_> {
             return Ok(());
         };
         let file = self.file;
-        let refuse = |place: (usize, usize), found: String, expected: &str| {
+        let refuse = |place: Position, found: String, expected: &str| {
             Err(ImportError::at(file, place, found, expected))
         };
         if let Some((token, expected)) = unread(tokens) {
@@ -304,7 +300,7 @@ impl Document<'_> {
     fn section(
         &mut self,
         output: usize,
-        place: (usize, usize),
+        place: Position,
         label: Option<String>,
     ) -> Read<&mut Section> {
         let starts_phase = std::mem::take(&mut self.starts_phase);
@@ -336,12 +332,6 @@ impl Document<'_> {
     }
 }
 
-/// Environments that arrange lines of mathematics, in a display of their own or inside one.
-pub(super) const LAYOUTS: &str = "equation align gather multline eqnarray flalign alignat displaymath dmath \
-    dgroup aligned alignedat split gathered IEEEeqnarray";
-pub(super) const CASES: &str = "cases dcases";
-/// Environments that begin with an argument: a number of columns, or what each column is.
-pub(super) const WITH_COLUMNS: &str = "alignat alignedat array IEEEeqnarray";
 /// What of a document matters, in its order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Item {
@@ -362,9 +352,9 @@ impl Item {
     }
 }
 
-/// Whether `list` has the word `name`, its star aside.
-pub(super) fn is_one_of(list: &str, name: &str) -> bool {
-    has(list, name.trim_end_matches('*'))
+/// Whether a word is in a class, its star aside.
+pub(super) fn is_one_of(class: &str, name: &str) -> bool {
+    is_in(class, name.trim_end_matches('*'))
 }
 
 /// Finds the displays of the tokens, and of the text behind them.
@@ -375,8 +365,8 @@ pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Read<Vec<Item
         match (&token.kind, token.name()) {
             (Kind::Comment(text), _) => items.push(Item::Comment(text.clone())),
             (Kind::Begin(name), _) if name == "document" => begin_document(file, &mut items)?,
-            (Kind::Begin(name), _) if is_one_of(LAYOUTS, name) || is_one_of(CASES, name) => {
-                if is_one_of(WITH_COLUMNS, name) {
+            (Kind::Begin(name), _) if is_one_of("layouts", name) || is_one_of("cases", name) => {
+                if is_one_of("with columns", name) {
                     let _ = expander.is_brace_next() && expander.argument().is_some();
                 }
                 items.push(display(&mut expander, &token)?);

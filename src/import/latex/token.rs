@@ -1,6 +1,9 @@
 //! Tokens of LaTeX with their places, as TeX takes them from a file: one after the other.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, HashSet, VecDeque};
+use std::sync::LazyLock;
+
+use super::super::equations::Position;
 
 const MINUS: char = '\u{2212}';
 const RAISED: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹";
@@ -18,7 +21,7 @@ const DOTTED: [(char, char, &str); 5] = [
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Token {
     pub(super) kind: Kind,
-    pub(super) place: (usize, usize),
+    pub(super) place: Position,
     /// Whether a space or the start of a line is before it.
     pub(super) is_spaced: bool,
 }
@@ -118,6 +121,25 @@ impl Token {
     }
 }
 
+/// The classes of words that are known of LaTeX.
+static CLASSES: LazyLock<HashMap<&str, HashSet<&str>>> = LazyLock::new(|| {
+    let lines = include_str!("words.txt").lines();
+    let mut classes: HashMap<&str, HashSet<&str>> = HashMap::new();
+    let mut class = "";
+    for line in lines.filter(|line| !line.starts_with('#')) {
+        let named = line.split_once(": ").filter(|_| !line.starts_with(' '));
+        let (name, words) = named.unwrap_or((class, line));
+        class = name;
+        (classes.entry(class).or_default()).extend(words.split_whitespace());
+    }
+    classes
+});
+
+/// Whether a word is in a class of `words.txt`.
+pub(super) fn is_in(class: &str, word: &str) -> bool {
+    CLASSES[class].contains(word)
+}
+
 /// Whether a word is one of a list.
 pub(super) fn has(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|known| known == word)
@@ -157,7 +179,7 @@ pub(super) fn group_length<'t>(tokens: impl Iterator<Item = &'t Token>) -> Optio
 pub(super) struct Lexer<'t> {
     pub(super) rest: &'t str,
     /// Line and column of the rest.
-    place: (usize, usize),
+    place: Position,
     starts_line: bool,
     is_spaced: bool,
     /// What one character made besides the last token.
@@ -202,7 +224,7 @@ impl<'t> Lexer<'t> {
     }
 
     /// The tokens of a part of a line that starts at `place`.
-    pub(super) fn of_part(text: &'t str, place: (usize, usize)) -> Self {
+    pub(super) fn of_part(text: &'t str, place: Position) -> Self {
         Self {
             rest: text,
             place,
@@ -213,7 +235,7 @@ impl<'t> Lexer<'t> {
         }
     }
 
-    fn queue(&mut self, kinds: Vec<Kind>, place: (usize, usize)) {
+    fn queue(&mut self, kinds: Vec<Kind>, place: Position) {
         for kind in kinds {
             let is_spaced = std::mem::take(&mut self.is_spaced);
             self.queued.push_back(Token {

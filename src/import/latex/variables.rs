@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use super::super::equations::Position;
 use super::super::{ImportError, Read};
-use super::reader::{BARE, FONTS, INVISIBLE, Last, Reader};
-use super::token::Kind;
-use super::token::has;
+use super::reader::{BARE, Last, Reader};
+use super::token::{Kind, has, is_in};
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
+use crate::symbolic::Function;
 
 pub(super) struct Symbol {
     pub(super) name: String,
     pub(super) dots: usize,
-    pub(super) place: (usize, usize),
+    pub(super) place: Position,
 }
 
 impl Symbol {
@@ -30,7 +31,7 @@ impl Reader<'_> {
         if let Some(name) = function(command) {
             return Some((name.to_owned(), self.at + 1));
         }
-        if !has(FONTS, command) || self.kind(self.at + 1) != Some(&Kind::Open) {
+        if !is_in("fonts", command) || self.kind(self.at + 1) != Some(&Kind::Open) {
             return None;
         }
         let close = self.closing[self.at + 1];
@@ -75,7 +76,7 @@ impl Reader<'_> {
         self.names.variable(name, self.alone).is_some()
     }
 
-    pub(super) fn call(&mut self, place: (usize, usize), name: &str) -> Read<Last> {
+    pub(super) fn call(&mut self, place: Position, name: &str) -> Read<Last> {
         if name == "e" {
             return self.enclosed_sum(place, "exp(");
         }
@@ -172,7 +173,7 @@ impl Reader<'_> {
         })
     }
 
-    pub(super) fn variable(&mut self, place: (usize, usize), symbol: &Symbol) -> Read<Last> {
+    pub(super) fn variable(&mut self, place: Position, symbol: &Symbol) -> Read<Last> {
         let variable = self.names.variable(&symbol.name, self.alone);
         let name = match (variable, symbol.dots) {
             (Some(variable @ (LatentVariable::Z(_) | LatentVariable::U(_))), 0) => {
@@ -254,7 +255,7 @@ impl Reader<'_> {
                 self.at = at + 1;
                 self.unexpected("a variable under the dots")
             }
-            Kind::Command(name) if has(FONTS, name) => {
+            Kind::Command(name) if is_in("fonts", name) => {
                 self.at += 1;
                 let close = self.after_argument(self.at);
                 let word = self.word(self.at, close);
@@ -301,7 +302,7 @@ impl Reader<'_> {
             match &token.kind {
                 Kind::Character(c) if c.is_ascii_alphanumeric() || *c == ',' => word.push(*c),
                 Kind::Command(name) if is_greek(name) => word.push_str(name),
-                Kind::Command(name) if has(FONTS, name) || has(INVISIBLE, name) => {}
+                Kind::Command(name) if is_in("fonts", name) || is_in("invisible", name) => {}
                 Kind::Open | Kind::Close => {}
                 _ => return None,
             }
@@ -311,20 +312,14 @@ impl Reader<'_> {
 }
 
 pub(super) fn function(command: &str) -> Option<&str> {
-    match command {
-        "ln" => Some("log"),
-        "sgn" => Some("sign"),
-        known => has("sin cos tan tanh exp sec csc cot sinh cosh log sign", known).then_some(known),
-    }
+    let is_called = |known: &Function| !matches!(known, Function::Abs | Function::Sqrt);
+    let known = Function::by_name(command).filter(is_called);
+    let derived = || has("sec csc cot sinh cosh", command).then_some(command);
+    known.map(Function::name).or_else(derived)
 }
 
-/// The Greek letters that a variable can be named by.
-const GREEK: &str = "alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa \
-    lambda mu nu xi pi rho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi \
-    Pi Sigma Upsilon Phi Psi Omega";
-
 pub(super) fn is_greek(command: &str) -> bool {
-    has(GREEK, command)
+    is_in("greek", command)
 }
 
 /// Why a name for a variable was refused.

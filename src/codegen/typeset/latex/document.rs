@@ -14,8 +14,8 @@ use crate::model::{Activation, Identifier, LatentVariable, ReducedModel, ScaleFa
 use crate::typeset::decimal::RoundingReport;
 use crate::typeset::words::{self, Spelling};
 use crate::typeset::{
-    Decimal, EquationSystem, Form, NumberStyle, PrintOptions, RobotTypeset, Rounding, Typeset,
-    TypesetError, rendered,
+    Decimal, Emitted, EquationSystem, Form, NumberStyle, PrintOptions, RobotTypeset, Rounding,
+    Typeset, TypesetError, rendered,
 };
 
 /// The LaTeX files of a model; NAME is its identifier:
@@ -27,10 +27,7 @@ use crate::typeset::{
 ///
 /// # Errors
 /// [`TypesetError`] if a coefficient is too large for a float in robot coordinates.
-pub fn emit(
-    system: &Equations<'_>,
-    options: &PrintOptions,
-) -> Result<Vec<EmittedFile>, TypesetError> {
+pub fn emit(system: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let model = system.model();
     let typeset = Typeset::new(system, &options.symbols, options.rounding);
     let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
@@ -58,14 +55,14 @@ pub fn emit(
     };
     files.push(file(format!("{stem}-table.tex"), &coefficients)?);
     let of_symbols = header.short("A table as wide as the line; needs amsmath.");
-    let nomenclature = nomenclature(system, of_symbols, options);
-    files.push(file(format!("{stem}-nomenclature.tex"), &nomenclature)?);
+    let symbols = symbol_list(system, of_symbols, options);
+    files.push(file(format!("{stem}-nomenclature.tex"), &symbols)?);
     let is_physical = system.latent_units().is_some();
     if let Some(robot) = &robot {
-        let of_robot = header.robot(robot, is_physical);
-        let systems = robot_systems(model, robot, options);
+        let comments = header.robot(robot, is_physical);
+        let systems = of_robot(model, robot, options);
         let path = format!("{stem}-robot.tex");
-        files.push(equations(path, of_robot, &systems, true)?);
+        files.push(equations(path, comments, &systems, true)?);
     }
     let preview = Document::Preview {
         header: header.short("A document of its own; the files beside it are for \\input."),
@@ -198,11 +195,7 @@ fn phases(
 }
 
 /// The encoder's rows, then the robot's accelerations a phase.
-fn robot_systems(
-    model: &ReducedModel,
-    robot: &RobotTypeset,
-    options: &PrintOptions,
-) -> Vec<System> {
+fn of_robot(model: &ReducedModel, robot: &RobotTypeset, options: &PrintOptions) -> Vec<System> {
     let label = format!("eq:{}-robot:encoder", label(model.name()));
     let count = robot.negligible_weights;
     let without = match count {
@@ -272,11 +265,7 @@ const STRONGEST: usize = 3;
 const NEGLIGIBLE: f64 = 0.1;
 
 /// The list of symbols with what each means.
-fn nomenclature<'a>(
-    system: &Equations<'_>,
-    header: String,
-    options: &PrintOptions,
-) -> Document<'a> {
+fn symbol_list<'a>(system: &Equations<'_>, header: String, options: &PrintOptions) -> Document<'a> {
     let (model, units) = (system.model(), system.latent_units());
     let (dim, numbers) = (model.latent_dim(), options.numbers);
     let symbol = |variable| format!("${}$", tex_symbol(&options.symbols.symbol(variable)));

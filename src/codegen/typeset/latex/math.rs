@@ -192,10 +192,8 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
             (false, true) => (r"\displaystyle ", ""),
             (false, false) => ("", ""),
         };
-        let relation = match equation.is_approximate {
-            true => r"\approx",
-            false => "=",
-        };
+        let is_close = equation.is_approximate;
+        let relation = if is_close { r"\approx" } else { "=" };
         let label = format!(r" \label{{{label}:{}}}", place + 1);
         for (line, side) in of_equation.iter().enumerate() {
             let start = match line {
@@ -253,11 +251,6 @@ fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions
 
 /// Text from outside, printed so that TeX shows its characters and runs none of them: in one line, with commands for
 /// special characters and code points for those that pdfTeX does not know.
-///
-/// ```
-/// use romc::typeset::latex::tex_text;
-/// assert_eq!(tex_text(r"50% \input{x}"), r"50\% \textbackslash{}input\{x\}");
-/// ```
 pub fn tex_text(text: &str) -> String {
     let mut tex = String::new();
     let mut previous = ' ';

@@ -9,21 +9,13 @@
 //! use romc::typeset::{PrintOptions, latex};
 //! use romc::model::{FeetRule, Library, Phase, ReducedModel};
 //!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let library = Library::from_terms(1, &["1".into(), "dz1".into(), "sin(dz1)".into()])?;
-//! let model = ReducedModel::builder("flight-only", library)
-//!     .phase(Phase {
-//!         name: "flight".into(),
-//!         feet: FeetRule::None,
-//!         xi: DMatrix::from_column_slice(3, 1, &[0.29, -1.22, -1.0]),
-//!     })
-//!     .build()?;
+//! let xi = DMatrix::from_column_slice(3, 1, &[0.29, -1.22, -1.0]);
+//! let phase = Phase { name: "flight".into(), feet: FeetRule::None, xi };
+//! let model = ReducedModel::builder("flight-only", library).phase(phase).build()?;
 //! let files = latex::emit(&Equations::of(&model), &PrintOptions::default())?;
-//! assert_eq!(files[0].path, "flight_only.tex");
-//! let equation = r"\ddot{z}_1 = 0.29 - 1.22\dot{z}_1 - 1.00\sin(\dot{z}_1)";
-//! assert!(files[0].contents.contains(equation));
-//! # Ok(())
-//! # }
+//! assert!(files[0].contents.contains(r"\ddot{z}_1 = 0.29 - 1.22\dot{z}_1 - 1.00\sin(\dot{z}_1)"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! In a paper: `\usepackage{amsmath}` in the preamble, then `\input{flight_only}` for all phases, or
