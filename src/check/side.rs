@@ -9,7 +9,7 @@ use crate::equations::Equations;
 use crate::files::size;
 use crate::import::{Format, ImportError, read_equations};
 use crate::model::{LatentVariable, ReducedModel};
-use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, ParseLimits, Reading};
+use crate::symbolic::{Coefficient, ExprId, ExprPool, Number, ParseError, Reading};
 
 /// Digits that a rounded float has at least; decimals with more digits are nearer to one float than to any other.
 const FLOAT_DIGITS: usize = 16;
@@ -185,7 +185,7 @@ impl Side {
     fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<Reading, ParseError> {
         let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
         let literal = |pool: &mut ExprPool, number: &str| self.decimal(pool, number);
-        pool.parse_defined(text, &known, &literal, ParseLimits::default())
+        pool.parse_defined(text, &known, &literal)
     }
 
     /// A decimal as it is written. Integers are numbers of the pool, and multiples of 1/2 of exact files, which floats

@@ -17,7 +17,7 @@ use super::ImportError;
 use super::library::tokens;
 use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};
+use crate::symbolic::{ExprId, ExprPool, ParseErrorKind};
 
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 
@@ -253,7 +253,7 @@ impl Equation {
         pool: &mut ExprPool,
     ) -> Result<ExprId, ImportError> {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-        let read = pool.parse_defined(&self.text(), &known, &|_, _| None, ParseLimits::default());
+        let read = pool.parse_defined(&self.text(), &known, &|_, _| None);
         read.map(|reading| reading.expr).map_err(|error| {
             let place = self.place(error.position);
             match error.kind {

@@ -10,9 +10,7 @@ use serde::{Serialize, Serializer};
 
 use super::error::{ModelError, check, check_count, check_shape};
 use super::standard_library::StandardLibrary;
-use crate::symbolic::{
-    ExprId, ExprPool, Function, Node, Number, ParseLimits, SymbolId, integer_power,
-};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId, integer_power};
 
 pub const MAX_LATENT_DIM: usize = 64;
 pub(crate) const MAX_LIBRARY_DIM: usize = 20_000;
@@ -310,7 +308,7 @@ fn parse_term(
         return Err(ModelError::invalid(place(index), found, expected));
     }
     let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-    let read = pool.parse_defined(text, &known, &|_, _| None, ParseLimits::default());
+    let read = pool.parse_defined(text, &known, &|_, _| None);
     let reading = read.map_err(|source| ModelError::Term {
         index,
         text: text.to_owned(),
