@@ -102,14 +102,13 @@ impl ExprPool {
             terms = flat;
         }
         terms.sort_by(|a, b| self.compare(a.1, b.1).then(a.0.cmp(&b.0)));
-        let terms: Vec<ExprId> = terms
+        let terms = terms
             .into_iter()
-            .map(|(coefficient, rest)| self.scale(coefficient, rest))
-            .collect();
-        match terms.as_slice() {
+            .map(|(number, rest)| self.scale(number, rest));
+        match terms.collect::<Vec<_>>().as_slice() {
             [] => ExprId::ZERO,
             [only] => *only,
-            _ => self.intern(Node::Sum(terms.into())),
+            terms => self.intern(Node::Sum(terms.into())),
         }
     }
 
@@ -287,14 +286,11 @@ impl ExprPool {
                 Exponent::Number(number) => self.pow_number(base, number),
                 Exponent::Expr(exponent) => self.pow(base, exponent),
             };
-            if power == ExprId::ONE {
-                continue;
-            }
-            if self.as_number(power).is_none() && self.base_and_exponent(power) == (base, exponent)
-            {
-                factors.push(power);
-            } else {
-                again.push(power);
+            let is_number = self.as_number(power).is_some();
+            match !is_number && self.base_and_exponent(power) == (base, exponent) {
+                _ if power == ExprId::ONE => {}
+                true => factors.push(power),
+                false => again.push(power),
             }
         }
     }
@@ -334,16 +330,14 @@ impl ExprPool {
             ([], [only]) => return *only,
             ([only], []) => return self.constant(*only),
             ([Number::MINUS_ONE], [only]) => return self.scale(Number::MINUS_ONE, *only),
-            _ => factors.sort_by(|a, b| self.compare_bases(*a, *b)),
+            // By base alone: bases are distinct, and `x` keeps its place whatever its exponent.
+            _ => factors.sort_by(|a, b| {
+                let [a, b] = [a, b].map(|factor| self.base_and_exponent(*factor).0);
+                self.compare(a, b)
+            }),
         }
         let numbers: Vec<ExprId> = numbers.into_iter().map(|n| self.constant(n)).collect();
         self.intern(Node::Product(numbers.into_iter().chain(factors).collect()))
-    }
-
-    /// Factors of a product are sorted by base alone: bases are distinct, and `x` keeps its place whatever its
-    /// exponent.
-    fn compare_bases(&self, a: ExprId, b: ExprId) -> std::cmp::Ordering {
-        self.compare(self.base_and_exponent(a).0, self.base_and_exponent(b).0)
     }
 }
 

@@ -29,11 +29,8 @@ pub(super) struct Costs {
 
 impl Costs {
     pub(super) fn of(&mut self, pool: &ExprPool, expr: ExprId) -> u64 {
-        let terms = pool.terms_of(expr);
-        let terms = terms
-            .into_iter()
-            .map(|(number, rest)| (number.to_f64(), rest));
-        self.of_terms(pool, terms)
+        let terms = pool.terms_of(expr).into_iter();
+        self.of_terms(pool, terms.map(|(number, rest)| (number.to_f64(), rest)))
     }
 
     /// The length of `sum coefficient * expr`, each term written after its coefficient.
@@ -43,12 +40,13 @@ impl Costs {
         terms: impl IntoIterator<Item = (f64, ExprId)>,
     ) -> u64 {
         let lengths = terms.into_iter().map(|(coefficient, expr)| {
-            let body = match expr {
-                ExprId::ONE => 0,
-                _ => self.of_factor(pool, expr),
+            let is_number = expr == ExprId::ONE;
+            let body = if is_number {
+                0
+            } else {
+                self.of_factor(pool, expr)
             };
-            TERM.saturating_add(digits(coefficient))
-                .saturating_add(body)
+            body.saturating_add(TERM + digits(coefficient))
         });
         lengths.fold(0, u64::saturating_add)
     }

@@ -1,6 +1,6 @@
 //! Derivatives, memoised per expression and symbol.
 
-use crate::{ExprId, ExprPool, Function, IdSet, Node, Number, SymbolId};
+use crate::{Exponent, ExprId, ExprPool, Function, IdSet, Node, SymbolId};
 
 impl ExprPool {
     /// The derivative of `expr` by `symbol`.
@@ -55,15 +55,11 @@ impl ExprPool {
             return self.scale(coefficient, derivative);
         }
         match self.node(expr).clone() {
-            Node::Number(_) => ExprId::ZERO,
             Node::Symbol(other) if other == symbol => ExprId::ONE,
-            Node::Symbol(_) => ExprId::ZERO,
+            Node::Number(_) | Node::Symbol(_) => ExprId::ZERO,
             Node::Sum(terms) => {
-                let derivatives: Vec<ExprId> = terms
-                    .iter()
-                    .map(|term| inner(self, *term))
-                    .filter(|derivative| *derivative != ExprId::ZERO)
-                    .collect();
+                let derivatives: Vec<ExprId> =
+                    terms.iter().map(|term| inner(self, *term)).collect();
                 self.sum(&derivatives)
             }
             Node::Product(factors) => {
@@ -78,13 +74,12 @@ impl ExprPool {
                 }
                 self.sum(&terms)
             }
-            Node::Power(base, exponent) => {
-                if let (&Node::Apply(Function::Sqrt, radicand), Some(halves)) =
-                    (self.node(base), self.as_number(exponent))
-                {
-                    let d_radicand = inner(self, radicand);
-                    return self.derivative_of_half_power(base, halves, d_radicand);
-                }
+            Node::Power(..) => {
+                // sqrt(w)^k as w^(k/2): a product with the derivative of the root has no value where w is 0.
+                let (base, exponent) = match self.base_and_exponent(expr) {
+                    (base, Exponent::Number(number)) => (base, self.constant(number)),
+                    (base, Exponent::Expr(exponent)) => (base, exponent),
+                };
                 let (d_base, d_exponent) = (inner(self, base), inner(self, exponent));
                 self.derivative_of_power(expr, (base, d_base), (exponent, d_exponent))
             }
@@ -105,8 +100,7 @@ impl ExprPool {
     ) -> ExprId {
         let mut terms = Vec::new();
         if d_base != ExprId::ZERO {
-            let minus_one = self.constant(Number::MINUS_ONE);
-            let lower = self.add(exponent, minus_one);
+            let lower = self.sub(exponent, ExprId::ONE);
             let lowered = self.pow(base, lower);
             terms.push(self.product(&[exponent, lowered, d_base]));
         }
@@ -115,20 +109,5 @@ impl ExprPool {
             terms.push(self.product(&[power, log, d_exponent]));
         }
         self.sum(&terms)
-    }
-
-    /// `d(sqrt(w)^k) = k/2 sqrt(w)^(k-2) dw`, which has a value where `w` is 0 and `k` above 2; a product with the
-    /// derivative of the root has none.
-    fn derivative_of_half_power(
-        &mut self,
-        root: ExprId,
-        halves: Number,
-        d_radicand: ExprId,
-    ) -> ExprId {
-        let (halves, two) = (self.constant(halves), self.integer(2));
-        let lower = self.sub(halves, two);
-        let lowered = self.pow(root, lower);
-        let product = self.product(&[halves, lowered, d_radicand]);
-        self.scale(Number::HALF, product)
     }
 }

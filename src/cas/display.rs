@@ -131,11 +131,12 @@ impl<'p> Display<'p> {
             }
             Exponent::Number(number) => number,
         };
+        let exact_root = || self.pool.as_number(base)?.checked_root(2);
         pieces.extend(match number.as_rational() {
             Some((1, 1)) => return vec![Piece::Operand(base)],
             // `sqrt(36)` would read as 6, though the power itself is beyond every float; `sqrt(0)` as zero, though its
             // negative powers are not.
-            Some((halves, 2)) if !self.has_exact_root(base) => {
+            Some((halves, 2)) if exact_root().is_none() => {
                 let mut root = vec![Piece::Text("sqrt("), Piece::Expr(base), Piece::Text(")")];
                 if halves != 1 {
                     root.extend([Piece::Text("^"), Piece::Number(Number::integer(halves))]);
@@ -147,11 +148,6 @@ impl<'p> Display<'p> {
             Some(_) | None => vec![Piece::Text("("), Piece::Number(number), Piece::Text(")")],
         });
         pieces
-    }
-
-    fn has_exact_root(&self, expr: ExprId) -> bool {
-        let number = self.pool.as_number(expr);
-        number.is_some_and(|number| number.checked_root(2).is_some())
     }
 
     fn of_operand(&self, expr: ExprId) -> Vec<Piece<'p>> {

@@ -60,14 +60,10 @@ impl Germs<'_> {
         match node {
             Node::Number(_) | Node::Symbol(_) => Ok(None),
             Node::Sum(_) | Node::Product(_) if is_smooth => Ok(None),
-            Node::Sum(terms) => {
-                let mut sum = Series::default();
-                for &term in terms.iter() {
-                    let series = self.series(term);
-                    sum = self.plus(sum, series);
-                }
-                Ok(Some(sum))
-            }
+            Node::Sum(terms) => Ok(Some(terms.iter().fold(Series::default(), |sum, term| {
+                let series = self.series(*term);
+                self.plus(sum, series)
+            }))),
             Node::Product(factors) => self.product(&factors).map(Some),
             Node::Power(base, exponent) if self.pool.may_contain(exponent, self.symbol) => {
                 self.varying_power(base, exponent, is_smooth)
@@ -98,8 +94,7 @@ impl Germs<'_> {
     }
 
     fn product(&mut self, factors: &[ExprId]) -> Result<Series, Stop> {
-        let factors = factors.iter().map(|factor| self.series(*factor));
-        let factors: Vec<Series> = factors.collect();
+        let factors: Vec<Series> = factors.iter().map(|factor| self.series(*factor)).collect();
         // A pole beside a zero has no value: 0*inf.
         let vanishes = |series: &Series| {
             let mut exponents = series.terms.iter().map(|term| term.0);
@@ -131,15 +126,20 @@ impl Germs<'_> {
 
     fn taylor(&mut self, expr: ExprId) -> Series {
         let mut series = Series::default();
-        let (mut derivative, mut factor) = (expr, Some(Number::ONE));
+        let (mut derivative, mut factor) = (expr, Number::ONE);
         for order in 0..self.order {
             if order > 0 {
-                factor = factor
-                    .and_then(|f| f.checked_mul(self.side))
-                    .and_then(|f| f.checked_div(Number::integer(order)));
+                factor = over(
+                    if self.side.is_negative() {
+                        -factor
+                    } else {
+                        factor
+                    },
+                    order,
+                );
             }
             let coefficient = self.facts.at(self.pool, derivative);
-            let coefficient = self.pool.scale(factor.unwrap_or(Number::ZERO), coefficient);
+            let coefficient = self.pool.scale(factor, coefficient);
             if self.facts.known(self.pool, coefficient) != Some(true) {
                 let exponent = self.pool.integer(order);
                 series.terms.push((exponent, coefficient));
@@ -176,9 +176,7 @@ impl Germs<'_> {
         Ok(self.composed(&inner, |germs, k| {
             if k > 0 {
                 derivative = germs.pool.derivative(derivative, symbol);
-                factor = factor
-                    .checked_div(Number::integer(k))
-                    .unwrap_or(Number::ZERO);
+                factor = over(factor, k);
             }
             let at_value = germs.pool.substitute(derivative, &[(symbol, value)]);
             germs.pool.scale(factor, at_value)
@@ -287,4 +285,9 @@ impl Germs<'_> {
             }
         }
     }
+}
+
+/// A factor of a term of a Taylor series; 0 where it is too small for a number.
+fn over(factor: Number, divisor: i64) -> Number {
+    (factor.checked_div(Number::integer(divisor))).unwrap_or(Number::ZERO)
 }

@@ -139,19 +139,23 @@ impl Interval {
             return self.powi(positive).recip();
         }
         let exponent = exponent.unsigned_abs();
-        let down = |x: f64| match x < 0.0 {
-            true => -power_up(-x, exponent),
-            false => power_down(x, exponent),
-        };
-        let up = |x: f64| match x < 0.0 {
-            true => -power_down(-x, exponent),
-            false => power_up(x, exponent),
-        };
-        let base = match exponent.is_multiple_of(2) {
-            true => self.abs(),
-            false => self,
-        };
-        Interval::between(down(base.lo), up(base.hi))
+        // Of an x that is not negative, rounded up or down.
+        let above = |x: f64| power_by(x, exponent, mul_up);
+        let below = |x: f64| power_by(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0));
+        let is_even = exponent.is_multiple_of(2);
+        let base = if is_even { self.abs() } else { self };
+        Interval::between(
+            if base.lo < 0.0 {
+                -above(-base.lo)
+            } else {
+                below(base.lo)
+            },
+            if base.hi < 0.0 {
+                -below(-base.hi)
+            } else {
+                above(base.hi)
+            },
+        )
     }
 
     /// `x^exponent`, for all pairs of points for which that is real: exponents of a negative base are integers.
@@ -183,14 +187,16 @@ impl Interval {
         if inside.is_empty() {
             return inside;
         }
-        let (mut lo, mut hi) = (inside.lo.sqrt(), inside.hi.sqrt());
-        if !is_exact_root(lo, inside.lo) {
-            lo = lo.next_down().max(0.0);
-        }
-        if !is_exact_root(hi, inside.hi) {
-            hi = hi.next_up();
-        }
-        Interval::between(lo, hi)
+        let (lo, hi) = (inside.lo.sqrt(), inside.hi.sqrt());
+        let is_exact = [is_exact_root(lo, inside.lo), is_exact_root(hi, inside.hi)];
+        Interval::between(
+            if is_exact[0] {
+                lo
+            } else {
+                lo.next_down().max(0.0)
+            },
+            if is_exact[1] { hi } else { hi.next_up() },
+        )
     }
 
     pub(crate) fn exp(self) -> Interval {
@@ -374,15 +380,6 @@ fn recip_down(x: f64) -> f64 {
     } else {
         quotient.next_down().max(0.0)
     }
-}
-
-/// `x^exponent` of an `x` that is not negative.
-fn power_up(x: f64, exponent: u64) -> f64 {
-    power_by(x, exponent, mul_up)
-}
-
-fn power_down(x: f64, exponent: u64) -> f64 {
-    power_by(x, exponent, |a, b| (-mul_up(-a, b)).max(0.0))
 }
 
 /// A power by squaring; a bound if `product` is monotone and all factors are non-negative.

@@ -71,7 +71,7 @@ pub use function::Function;
 pub use interval::Interval;
 pub use node::{ExprId, Node, SymbolId};
 pub use number::{Number, sum_of_floats};
-pub use parse::{ParseError, ParseErrorKind, ParseLimits};
+pub use parse::{ParseError, ParseErrorKind};
 pub use pool::ExprPool;
 pub use shorten::{Shortened, Shortener};
 pub use values::integer_power;

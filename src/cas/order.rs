@@ -73,7 +73,8 @@ impl ExprPool {
         if rest_a != a || rest_b != b {
             return Step::Continue((rest_a, rest_b));
         }
-        let is_atom = |expr| !matches!(self.node(expr), Node::Product(_)) && self.is_base(expr);
+        let is_base = |expr| self.base_and_exponent(expr).0 == expr;
+        let is_atom = |expr| !matches!(self.node(expr), Node::Product(_)) && is_base(expr);
         if is_atom(a) && is_atom(b) {
             return self.compare_atoms(a, b);
         }
@@ -123,10 +124,6 @@ impl ExprPool {
         }
     }
 
-    fn is_base(&self, expr: ExprId) -> bool {
-        self.base_and_exponent(expr).0 == expr
-    }
-
     /// A factor as `base ^ exponent`, with square roots read as powers of a half.
     pub(super) fn base_and_exponent(&self, factor: ExprId) -> (ExprId, Exponent) {
         match *self.node(factor) {
@@ -153,20 +150,15 @@ impl ExprPool {
             Node::Number(_) => 0,
             Node::Symbol(_) => 1,
             Node::Sum(_) | Node::Apply(..) => NOT_POLYNOMIAL + 1,
-            Node::Product(factors) => factors
-                .iter()
-                .map(|factor| self.grade(*factor))
-                .fold(0, combine_grades),
+            Node::Product(factors) => {
+                (factors.iter()).fold(0, |all, factor| combine_grades(all, self.grade(*factor)))
+            }
             Node::Power(base, exponent) => {
                 let degree = self.as_integer(*exponent).map(u32::try_from);
-                let degree = degree.and_then(Result::ok);
-                match (
-                    degree.map(|n| n.min(NOT_POLYNOMIAL - 1)),
-                    self.as_symbol(*base),
-                ) {
-                    (Some(degree), Some(_)) => degree,
-                    (Some(degree), None) => NOT_POLYNOMIAL | degree,
-                    (None, _) => NOT_POLYNOMIAL + 1,
+                match degree.map(|n| n.map(|n| n.min(NOT_POLYNOMIAL - 1))) {
+                    Some(Ok(degree)) if self.as_symbol(*base).is_some() => degree,
+                    Some(Ok(degree)) => NOT_POLYNOMIAL | degree,
+                    Some(Err(_)) | None => NOT_POLYNOMIAL + 1,
                 }
             }
         }

@@ -8,33 +8,20 @@
 //! atom       = number | name | function "(" expression ")" | "(" expression ")"
 //! ```
 //!
-//! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. Each rule is a function; nesting is limited by
-//! [`ParseLimits`]. Chains of sums and products are handed over whole, so time is near linear in the length of the
-//! text.
+//! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. Each rule is a function; nesting is limited.
+//! Chains of sums and products are handed over whole, so time is near linear in the length of the text.
 
 use super::defined::{Guards, Reading};
 use crate::{Exponent, ExprId, ExprPool, Function, Number};
 
-/// How large a text may be and become.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ParseLimits {
-    /// Longest text, in bytes.
-    pub length: usize,
-    /// Most open parentheses and pending exponents.
-    pub depth: usize,
-    /// Largest magnitude of a constant exponent.
-    pub exponent: u32,
-}
+/// Longest text, in bytes.
+const MAX_LENGTH: usize = 65_536;
+/// Most open parentheses and pending exponents.
+const MAX_DEPTH: usize = 200;
+/// Largest magnitude of a constant exponent.
+const MAX_EXPONENT: u32 = 1_000;
 
-impl Default for ParseLimits {
-    fn default() -> ParseLimits {
-        ParseLimits {
-            length: 65_536,
-            depth: 200,
-            exponent: 1_000,
-        }
-    }
-}
+type Literal<'p> = &'p dyn Fn(&mut ExprPool, &str) -> Option<ExprId>;
 
 /// Why a text is not a term, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -103,7 +90,7 @@ fn short(token: &str) -> String {
 }
 
 impl ExprPool {
-    /// Reads an expression over the names that `allowed` accepts, within the default limits.
+    /// Reads an expression over the names that `allowed` accepts.
     ///
     /// Function names are never variables. What [`display`](ExprPool::display) prints reads back to the same id.
     ///
@@ -114,27 +101,12 @@ impl ExprPool {
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
     ) -> Result<ExprId, ParseError> {
-        self.parse_within(text, allowed, &|_, _| None, ParseLimits::default())
+        Parser::of(self, text, allowed, &|_, _| None)?.expression(TokenKind::End)
     }
 
-    /// As [`parse`](ExprPool::parse), within given limits and with the expressions that `literal` gives for the texts
-    /// of numbers, such as their [`decimal`](ExprPool::decimal).
-    ///
-    /// # Errors
-    /// As [`parse`](ExprPool::parse).
-    pub fn parse_within(
-        &mut self,
-        text: &str,
-        allowed: &dyn Fn(&str) -> bool,
-        literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
-        limits: ParseLimits,
-    ) -> Result<ExprId, ParseError> {
-        let mut parser = Parser::of(self, text, allowed, literal, limits)?;
-        parser.expression(TokenKind::End)
-    }
-
-    /// As [`parse_within`](ExprPool::parse_within), for texts that users write: constant parts that have no value, such
-    /// as `0/0` or `0*log(0)`, are refused.
+    /// As [`parse`](ExprPool::parse), for texts that users write: constant parts that have no value, such as `0/0` or
+    /// `0*log(0)`, are refused. `literal` gives expressions for the texts of numbers, such as their
+    /// [`decimal`](ExprPool::decimal).
     ///
     /// # Errors
     /// As [`parse`](ExprPool::parse), and [`ParseErrorKind::NoValue`].
@@ -143,9 +115,8 @@ impl ExprPool {
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
         literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
-        limits: ParseLimits,
     ) -> Result<Reading, ParseError> {
-        let mut parser = Parser::of(self, text, allowed, literal, limits)?;
+        let mut parser = Parser::of(self, text, allowed, literal)?;
         parser.needs_values = true;
         Ok(Reading {
             expr: parser.expression(TokenKind::End)?,
@@ -158,8 +129,7 @@ struct Parser<'p> {
     pool: &'p mut ExprPool,
     allowed: &'p dyn Fn(&str) -> bool,
     /// What stands for the text of a number, if that is not its value.
-    literal: &'p dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
-    limits: ParseLimits,
+    literal: Literal<'p>,
     text: &'p str,
     tokens: Vec<Token<'p>>,
     next: usize,
@@ -174,11 +144,10 @@ impl<'p> Parser<'p> {
         pool: &'p mut ExprPool,
         text: &'p str,
         allowed: &'p dyn Fn(&str) -> bool,
-        literal: &'p dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
-        limits: ParseLimits,
+        literal: Literal<'p>,
     ) -> Result<Self, ParseError> {
-        if text.len() > limits.length {
-            let (found, limit) = (text.len(), limits.length);
+        if text.len() > MAX_LENGTH {
+            let (found, limit) = (text.len(), MAX_LENGTH);
             return Err(ParseErrorKind::TooLong { found, limit }.at(text, 0));
         }
         Ok(Parser {
@@ -186,7 +155,6 @@ impl<'p> Parser<'p> {
             pool,
             allowed,
             literal,
-            limits,
             text,
             next: 0,
             depth: 0,
@@ -305,8 +273,8 @@ impl<'p> Parser<'p> {
 
     fn deepen(&mut self, token: Token) -> Result<(), ParseError> {
         self.depth += 1;
-        if self.depth > self.limits.depth {
-            return Err(ParseErrorKind::TooDeep(self.limits.depth).at(self.text, token.start));
+        if self.depth > MAX_DEPTH {
+            return Err(ParseErrorKind::TooDeep(MAX_DEPTH).at(self.text, token.start));
         }
         Ok(())
     }
@@ -331,7 +299,7 @@ impl<'p> Parser<'p> {
         exponent: ExprId,
         start: usize,
     ) -> Result<ExprId, ParseError> {
-        let (text, limit, after) = (self.text, self.limits.exponent, self.peek().start);
+        let (text, limit, after) = (self.text, MAX_EXPONENT, self.peek().start);
         let too_large = |found: Number| {
             if found.to_f64().abs() > f64::from(limit) {
                 let found = found.to_string();

@@ -63,10 +63,10 @@ impl ExprPool {
         if !is_manageable || !denominators.iter().any(is_needed) {
             return expr;
         }
-        let powers: Vec<ExprId> = denominators
+        let powers = denominators
             .iter()
-            .map(|(base, exponent)| self.pow_number(*base, *exponent))
-            .collect();
+            .map(|(base, power)| self.pow_number(*base, *power));
+        let powers: Vec<ExprId> = powers.collect();
         let mut numerators = Vec::with_capacity(terms.len());
         for (coefficient, rest) in terms {
             let mut factors = powers.clone();
@@ -164,13 +164,12 @@ impl ExprPool {
         if !remainder.is_empty() {
             return None;
         }
-        let place = |step: Vec<i64>| {
-            let exponents = step.iter().zip(&least).zip(&least_of_divisor);
-            exponents.map(|((step, a), b)| step + a - b).collect()
-        };
-        let quotient = quotient
-            .into_iter()
-            .map(|(step, factor)| (place(step), factor));
+        let quotient = quotient.into_iter().map(|(mut exponents, factor)| {
+            for (place, exponent) in exponents.iter_mut().enumerate() {
+                *exponent += least[place] - least_of_divisor[place];
+            }
+            (exponents, factor)
+        });
         self.sum_of_monomials(&quotient.collect(), &bases)
     }
 
@@ -295,9 +294,8 @@ impl ExprPool {
             exponent.as_integer().filter(|exponent| *exponent > 0)?;
             factors.push((exponent, base));
         }
-        let powers: Vec<ExprId> = (factors.into_iter())
-            .map(|(exponent, base)| self.pow_number(base, exponent))
-            .collect();
+        let powers = (factors.into_iter()).map(|(power, base)| self.pow_number(base, power));
+        let powers: Vec<ExprId> = powers.collect();
         Some(self.product(&powers))
     }
 }

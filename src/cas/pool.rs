@@ -161,14 +161,6 @@ impl ExprPool {
         self.symbol_id(&format!(" {kind} {number}"))
     }
 
-    /// The symbol of a selection: no variable, but `[test, zero, other]`, the value of `zero` where `test` is zero and
-    /// that of `other` elsewhere.
-    pub(super) fn selection_symbol(&mut self, parts: [ExprId; 3]) -> ExprId {
-        let name = format!("selection {:?}", parts.map(ExprId::index));
-        let id = self.symbol_for(&name, Some(parts), None);
-        self.symbol_expr(id)
-    }
-
     /// A number as it is written, which is never rounded or folded; see [`Coefficient::parse`]. It prints as its text
     /// behind `~` if it is rounded, else `#`.
     pub fn decimal(&mut self, text: &str, is_rounded: bool) -> Option<ExprId> {
@@ -191,7 +183,8 @@ impl ExprPool {
         self.symbols[symbol.index()].selection
     }
 
-    fn symbol_for(
+    /// The symbol of a name; one of a selection is no variable, but what [`ExprPool::selection`] says.
+    pub(super) fn symbol_for(
         &mut self,
         name: &str,
         selection: Option<[ExprId; 3]>,
@@ -343,10 +336,8 @@ impl ExprPool {
 
     /// The variables that occur in an expression.
     pub fn symbols_of(&self, expr: ExprId) -> BTreeSet<SymbolId> {
-        self.walk(&[expr], |node| !self.is_constant(node), |_| true)
-            .into_iter()
-            .filter_map(|node| self.as_symbol(node))
-            .collect()
+        let varying = self.walk(&[expr], |node| !self.is_constant(node), |_| true);
+        (varying.into_iter().filter_map(|node| self.as_symbol(node))).collect()
     }
 
     /// Whether no variable occurs.
@@ -396,17 +387,14 @@ impl ExprPool {
     }
 
     fn rest_of(&mut self, node: &Node) -> Option<ExprId> {
-        let Node::Product(factors) = node else {
-            return None;
-        };
-        self.as_number(factors[0])?;
-        if self.as_number(factors[1]).is_some() {
-            return None;
+        match node {
+            Node::Product(factors) if self.as_number(factors[0]).is_some() => match &factors[1..] {
+                [number, ..] if self.as_number(*number).is_some() => None,
+                [only] => Some(*only),
+                several => Some(self.intern(Node::Product(several.into()))),
+            },
+            _ => None,
         }
-        Some(match &factors[1..] {
-            [only] => *only,
-            several => self.intern(Node::Product(several.into())),
-        })
     }
 
     fn sign_of(&self, node: &Node) -> Sign {

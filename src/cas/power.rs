@@ -86,9 +86,7 @@ impl ExprPool {
     /// Integer powers go to every factor; of others only a number with an exact root leaves.
     fn pow_of_product(&mut self, factors: &[ExprId], exponent: Number) -> ExprId {
         if exponent.as_integer().is_some() {
-            let powers = factors
-                .iter()
-                .map(|factor| self.pow_number(*factor, exponent));
+            let powers = factors.iter().map(|of| self.pow_number(*of, exponent));
             let powers: Vec<ExprId> = powers.collect();
             return self.product(&powers);
         }
@@ -134,9 +132,8 @@ impl ExprPool {
             let (base, Exponent::Number(exponent)) = self.base_and_exponent(*factor) else {
                 return None;
             };
-            let exponent = exponent
-                .as_integer()
-                .filter(|_| self.as_number(base).is_none())?;
+            let is_number = self.as_number(base).is_some();
+            let exponent = exponent.as_integer().filter(|_| !is_number)?;
             common = exponent.unsigned_abs().gcd(&common);
             powers.push((base, exponent));
         }
@@ -171,8 +168,8 @@ impl ExprPool {
         if base.is_exact()
             && !base.is_negative()
             && !base.is_zero()
-            && let Some((numerator, denominator)) = exponent.as_rational()
-            && let Some(power) = self.pow_of_rational(base, numerator, denominator)
+            && let Some(exponent) = exponent.as_rational()
+            && let Some(power) = self.pow_of_rational(base, exponent)
         {
             return power;
         }
@@ -184,15 +181,13 @@ impl ExprPool {
     fn pow_of_rational(
         &mut self,
         base: Number,
-        numerator: i64,
-        denominator: i64,
+        (numerator, denominator): (i64, i64),
     ) -> Option<ExprId> {
         let outside = self.folded(base.checked_powi(numerator.div_euclid(denominator)))?;
         let fraction = Number::rational(numerator.rem_euclid(denominator), denominator)?;
-        let (factor, radicand) = if denominator == 2 {
-            square_free(base)?
-        } else {
-            (Number::ONE, base)
+        let (factor, radicand) = match denominator {
+            2 => square_free(base)?,
+            _ => (Number::ONE, base),
         };
         let outside = self.folded(outside.checked_mul(factor))?;
         let radicand = self.constant(radicand);

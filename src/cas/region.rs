@@ -33,14 +33,14 @@ impl ExprPool {
     ) -> ExprId {
         let mut rewritten = IdMap::default();
         for node in self.region(expr) {
-            let rebuilt = if self.is_atom(node) {
-                node
-            } else {
-                self.rebuild(node, |child| *rewritten.get(&child).unwrap_or(&child))
+            let rebuilt = match self.is_atom(node) {
+                true => node,
+                false => self.rebuild(node, |child| *rewritten.get(&child).unwrap_or(&child)),
             };
-            let result = match self.affords(1) {
-                true => rule(self, rebuilt),
-                false => rebuilt,
+            let result = if self.affords(1) {
+                rule(self, rebuilt)
+            } else {
+                rebuilt
             };
             rewritten.insert(node, result);
         }
@@ -155,9 +155,10 @@ impl ExprPool {
         let order = self.walk(exprs, affected, |_| true);
         // The first entry of a symbol is inserted last.
         let new = replacements.iter().rev();
-        let new = new.map(|&(symbol, new)| (self.symbol_expr(symbol), new));
-        let replaced = new.collect();
-        self.replace(exprs, order, replaced)
+        let new = new
+            .map(|&(symbol, new)| (self.symbol_expr(symbol), new))
+            .collect();
+        self.replace(exprs, order, new)
     }
 
     /// The expressions with every part that has no variable but a finite value as a number: `exp(3)*x` is
@@ -166,11 +167,10 @@ impl ExprPool {
         let order = self.reachable(exprs);
         let mut folded: IdMap<ExprId> = IdMap::default();
         for &expr in &order {
-            if self.is_constant(expr) && self.as_number(expr).is_none() {
-                let value = self.evaluate(expr, &|_| f64::NAN);
-                if value.is_finite() {
-                    folded.insert(expr, self.number(value));
-                }
+            let is_folded = self.is_constant(expr) && self.as_number(expr).is_none();
+            let value = is_folded.then(|| self.evaluate(expr, &|_| f64::NAN));
+            if let Some(value) = value.filter(|value| value.is_finite()) {
+                folded.insert(expr, self.number(value));
             }
         }
         self.replace(exprs, order, folded)
@@ -184,39 +184,26 @@ impl ExprPool {
         order: Vec<ExprId>,
         mut replaced: IdMap<ExprId>,
     ) -> Vec<ExprId> {
-        let of = |replaced: &IdMap<ExprId>, expr| replaced.get(&expr).copied().unwrap_or(expr);
         for expr in order {
             if !replaced.contains_key(&expr) {
-                let new = self.rebuild(expr, |operand| of(&replaced, operand));
+                let new = self.rebuild(expr, |operand| *replaced.get(&operand).unwrap_or(&operand));
                 replaced.insert(expr, new);
             }
         }
-        exprs.iter().map(|expr| of(&replaced, *expr)).collect()
+        (exprs.iter())
+            .map(|expr| *replaced.get(expr).unwrap_or(expr))
+            .collect()
     }
 
-    pub(super) fn rebuild(
-        &mut self,
-        expr: ExprId,
-        mut operand: impl FnMut(ExprId) -> ExprId,
-    ) -> ExprId {
+    /// The node of `expr` with other operands.
+    pub(super) fn rebuild(&mut self, expr: ExprId, operand: impl Fn(ExprId) -> ExprId) -> ExprId {
+        let all = |operands: &[ExprId]| operands.iter().map(|of| operand(*of)).collect::<Vec<_>>();
         match self.node(expr).clone() {
             Node::Number(_) | Node::Symbol(_) => expr,
-            Node::Sum(terms) => {
-                let terms: Vec<ExprId> = terms.iter().map(|term| operand(*term)).collect();
-                self.sum(&terms)
-            }
-            Node::Product(factors) => {
-                let factors: Vec<ExprId> = factors.iter().map(|factor| operand(*factor)).collect();
-                self.product(&factors)
-            }
-            Node::Power(base, exponent) => {
-                let (base, exponent) = (operand(base), operand(exponent));
-                self.pow(base, exponent)
-            }
-            Node::Apply(function, argument) => {
-                let argument = operand(argument);
-                self.apply(function, argument)
-            }
+            Node::Sum(terms) => self.sum(&all(&terms)),
+            Node::Product(factors) => self.product(&all(&factors)),
+            Node::Power(base, exponent) => self.pow(operand(base), operand(exponent)),
+            Node::Apply(function, argument) => self.apply(function, operand(argument)),
         }
     }
 
@@ -228,15 +215,10 @@ impl ExprPool {
         if !matches!(self.node(expr), Node::Product(_) | Node::Power(..)) {
             return expr;
         }
-        let factors = self.factors_of(expr).to_vec();
-        let mut plain = Vec::new();
-        let mut sums: Vec<(ExprId, i64)> = Vec::new();
-        for factor in factors {
-            match self.sum_power(factor) {
-                Some((sum, exponent @ 0..)) => sums.push((sum, exponent)),
-                _ => plain.push(factor),
-            }
-        }
+        let (sums, plain) = self.partition_factors(expr, |pool, factor| {
+            pool.sum_power(factor)
+                .filter(|(_, exponent)| *exponent >= 0)
+        });
         if sums.is_empty() {
             return expr;
         }
@@ -265,18 +247,15 @@ impl ExprPool {
             for &(coefficient_b, rest_b) in b {
                 let rest = self.product(&[rest_a, rest_b]);
                 let (extra, rest) = self.split(rest);
-                let folded = coefficient_a
-                    .checked_mul(coefficient_b)
-                    .and_then(|coefficient| coefficient.checked_mul(extra));
-                match folded {
-                    Some(coefficient) => products.push((coefficient, rest)),
+                let both = coefficient_a.checked_mul(coefficient_b);
+                products.push(match both.and_then(|both| both.checked_mul(extra)) {
+                    Some(coefficient) => (coefficient, rest),
                     None => {
-                        let numbers = [coefficient_a, coefficient_b, extra];
-                        let numbers = numbers.map(|number| self.constant(number));
-                        let whole = self.product(&[numbers[0], numbers[1], numbers[2], rest]);
-                        products.push((Number::ONE, whole));
+                        let [a, b, c] =
+                            [coefficient_a, coefficient_b, extra].map(|n| self.constant(n));
+                        (Number::ONE, self.product(&[a, b, c, rest]))
                     }
-                }
+                });
             }
         }
         let sum = self.sum_of_terms(products);

@@ -63,13 +63,12 @@ impl ExprPool {
         let mut powers = Vec::new();
         let mut left = Vec::new();
         for (number, rest) in self.terms_of(argument) {
-            match self.as_log_term(rest) {
-                Some((cofactor, base)) => {
-                    let exponent = self.scale(number, cofactor);
-                    powers.push(self.pow(base, exponent));
-                }
-                None => left.push((number, rest)),
-            }
+            let Some((cofactor, base)) = self.as_log_term(rest) else {
+                left.push((number, rest));
+                continue;
+            };
+            let exponent = self.scale(number, cofactor);
+            powers.push(self.pow(base, exponent));
         }
         if powers.is_empty() {
             return None;
@@ -93,10 +92,9 @@ impl ExprPool {
             && !exponent.is_one()
             && self.as_number(base).is_none()
         {
-            let base = if exponent.is_even() {
-                self.apply(Function::Abs, base)
-            } else {
-                base
+            let base = match exponent.is_even() {
+                true => self.apply(Function::Abs, base),
+                false => base,
             };
             let log = self.apply(Function::Log, base);
             return Some(self.scale(exponent, log));
@@ -117,9 +115,10 @@ impl ExprPool {
         };
         let exponent = Number::integer(power);
         let terms = self.summands_of(base).to_vec();
-        let powers: Vec<Vec<(ExprId, Number)>> = (terms.iter())
-            .map(|term| self.powers_with_exponentials(*term))
-            .collect();
+        let powers = terms
+            .iter()
+            .map(|term| self.powers_with_exponentials(*term));
+        let powers: Vec<Vec<(ExprId, Number)>> = powers.collect();
         let mut shared: Vec<(ExprId, Number)> = Vec::new();
         for &(factor, _) in powers.iter().flatten() {
             let exponents = powers.iter().map(|powers| {
@@ -135,10 +134,9 @@ impl ExprPool {
         if shared.is_empty() {
             return expr;
         }
-        let divisor: Vec<ExprId> = (shared.into_iter())
-            .map(|(factor, least)| self.pow_number(factor, -least))
-            .collect();
-        let divisor = self.product(&divisor);
+        let divisors = (shared.into_iter()).map(|(base, least)| self.pow_number(base, -least));
+        let divisors: Vec<ExprId> = divisors.collect();
+        let divisor = self.product(&divisors);
         let rest: Vec<ExprId> = (terms.into_iter())
             .map(|term| {
                 let term = self.mul(term, divisor);
@@ -162,12 +160,10 @@ impl ExprPool {
                 continue;
             };
             for (coefficient, rest) in self.terms_of(argument) {
-                let whole = if coefficient.as_integer().is_some() && rest != ExprId::ONE {
-                    coefficient
-                } else if coefficient.is_negative() {
-                    Number::MINUS_ONE
-                } else {
-                    Number::ONE
+                let whole = match coefficient.is_negative() {
+                    _ if coefficient.as_integer().is_some() && rest != ExprId::ONE => coefficient,
+                    true => Number::MINUS_ONE,
+                    false => Number::ONE,
                 };
                 let unit = coefficient.checked_div(whole).unwrap_or(Number::ONE);
                 let unit = self.scale(unit, rest);
@@ -274,10 +270,9 @@ impl ExprPool {
 
     /// Adds logarithms that have the same cofactor and coefficients in small integer ratios.
     fn merge_logs(&mut self, expr: ExprId) -> ExprId {
-        let terms = self.terms_of(expr);
         let mut logs: Vec<(ExprId, Number, ExprId)> = Vec::new();
         let mut others = Vec::new();
-        for (coefficient, rest) in terms {
+        for (coefficient, rest) in self.terms_of(expr) {
             match self.as_log_term(rest) {
                 Some((cofactor, argument)) => logs.push((cofactor, coefficient, argument)),
                 None => others.push((coefficient, rest)),

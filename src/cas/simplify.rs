@@ -25,20 +25,17 @@ const MAX_ROUNDS: usize = 6;
 impl ExprPool {
     /// An equal expression that is shorter, or `expr` itself.
     pub fn simplify(&mut self, expr: ExprId) -> ExprId {
-        self.limited(MAX_WORK, |pool| pool.simplify_within_limit(expr))
-    }
-
-    fn simplify_within_limit(&mut self, expr: ExprId) -> ExprId {
-        let mut costs = Costs::default();
-        let mut best = expr;
-        loop {
-            let next =
-                self.map_regions(best, |pool, region| pool.cheapest_form(region, &mut costs));
-            if costs.of(self, next) >= costs.of(self, best) {
-                return best;
+        let (mut costs, mut best) = (Costs::default(), expr);
+        self.limited(MAX_WORK, |pool| {
+            loop {
+                let next =
+                    pool.map_regions(best, |pool, region| pool.cheapest_form(region, &mut costs));
+                if costs.of(pool, next) >= costs.of(pool, best) {
+                    return best;
+                }
+                best = next;
             }
-            best = next;
-        }
+        })
     }
 
     fn cheapest_form(&mut self, region: ExprId, costs: &mut Costs) -> ExprId {

@@ -215,7 +215,13 @@ impl ExprPool {
         }
         let wanted = |node| self.may_contain(node, symbol);
         let nodes = self.walk(&[expr], wanted, |_| true);
-        let slope = match nodes.into_iter().any(|node| self.has_kink(node)) {
+        // Whether a node is not smooth where an operand is zero.
+        let has_kink = |node: ExprId| match self.node(node) {
+            Node::Power(_, exponent) => !matches!(self.as_integer(*exponent), Some(0..)),
+            Node::Apply(Function::Abs | Function::Sign | Function::Sqrt, _) => true,
+            _ => false,
+        };
+        let slope = match nodes.into_iter().any(has_kink) {
             true => self.limited(MOST_WORK, |pool| pool.selected(expr, symbol)),
             false => Slope {
                 expr: self.derivative(expr, symbol),
@@ -224,15 +230,6 @@ impl ExprPool {
         };
         self.slopes.insert((expr, symbol), slope);
         slope
-    }
-
-    /// Whether a node is not smooth where an operand is zero.
-    fn has_kink(&self, node: ExprId) -> bool {
-        match self.node(node) {
-            Node::Power(_, exponent) => !matches!(self.as_integer(*exponent), Some(0..)),
-            Node::Apply(Function::Abs | Function::Sign | Function::Sqrt, _) => true,
-            _ => false,
-        }
     }
 
     /// The slope at all points: cases are divided by what is undecided, the first ones first.
@@ -307,10 +304,8 @@ impl ExprPool {
 
     /// Whether a constant part has no value, or an infinite one: neither has the whole, and not all targets run it.
     fn has_pole(&self, expr: ExprId) -> bool {
-        let parts = self.reachable(&[expr]).into_iter();
-        parts
-            .filter(|part| self.is_constant(*part))
-            .any(|part| !self.evaluate(part, &|_| f64::NAN).is_finite())
+        (self.reachable(&[expr]).into_iter())
+            .any(|part| self.is_constant(part) && !self.evaluate(part, &|_| f64::NAN).is_finite())
     }
 
     /// Whether the derivative by the rules has the slope's value in the numbers of a computer, without `0*inf`.
@@ -380,7 +375,10 @@ impl ExprPool {
         if zero == other {
             return zero;
         }
-        self.selection_symbol([test, zero, other])
+        let parts = [test, zero, other];
+        let name = format!("selection {:?}", parts.map(ExprId::index));
+        let id = self.symbol_for(&name, Some(parts), None);
+        self.symbol_expr(id)
     }
 }
 

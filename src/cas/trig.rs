@@ -38,13 +38,12 @@ impl ExprPool {
         self.note_units(expr, &mut units);
         self.note_units(other, &mut units);
         self.rewrite_region(expr, |pool, node| match *pool.node(node) {
-            Node::Apply(function @ (Function::Sin | Function::Cos), argument) => {
-                match (pool.sine_and_cosine(argument, &units), function) {
-                    (Some((sine, _)), Function::Sin) => sine,
-                    (Some((_, cosine)), _) => cosine,
-                    (None, _) => node,
-                }
-            }
+            Node::Apply(Function::Sin, angle) => pool
+                .sine_and_cosine(angle, &units)
+                .map_or(node, |(sine, _)| sine),
+            Node::Apply(Function::Cos, angle) => pool
+                .sine_and_cosine(angle, &units)
+                .map_or(node, |(_, cosine)| cosine),
             _ => node,
         })
     }
@@ -61,22 +60,19 @@ impl ExprPool {
 
     /// Sine and cosine of a sum of multiples of units; `None` if there are too many.
     fn sine_and_cosine(&mut self, argument: ExprId, units: &Units) -> Option<(ExprId, ExprId)> {
-        let terms = self.terms_of(argument);
-        let multiples: Option<Vec<(Number, ExprId, i64)>> = terms
-            .into_iter()
-            .map(|(coefficient, rest)| match units.get(&rest) {
+        let mut multiples: Vec<(Number, ExprId, i64)> = Vec::new();
+        let mut total = 0_i64;
+        for (coefficient, rest) in self.terms_of(argument) {
+            let (unit, multiple) = match units.get(&rest) {
                 Some(unit) if coefficient.is_exact() => {
-                    let multiple = coefficient.checked_div(*unit)?.as_integer()?;
-                    Some((*unit, rest, multiple))
+                    (*unit, coefficient.checked_div(*unit)?.as_integer()?)
                 }
-                _ if coefficient.is_negative() => Some((-coefficient, rest, -1)),
-                _ => Some((coefficient, rest, 1)),
-            })
-            .collect();
-        let multiples = multiples?;
-        let total: i64 = multiples.iter().try_fold(0_i64, |sum, (_, _, multiple)| {
-            sum.checked_add(multiple.checked_abs()?)
-        })?;
+                _ if coefficient.is_negative() => (-coefficient, -1),
+                _ => (coefficient, 1),
+            };
+            multiples.push((unit, rest, multiple));
+            total = total.checked_add(multiple.checked_abs()?)?;
+        }
         if total > MAX_MULTIPLE || !self.affords(1) {
             return None;
         }
@@ -101,7 +97,7 @@ impl ExprPool {
         Some((sine, cosine))
     }
 
-    fn expanded_product(&mut self, a: ExprId, b: ExprId) -> ExprId {
+    pub(super) fn expanded_product(&mut self, a: ExprId, b: ExprId) -> ExprId {
         let product = self.mul(a, b);
         self.expand_node(product, NARROW)
     }
@@ -121,12 +117,13 @@ impl ExprPool {
         let mut angles = Vec::new();
         for (_, rest) in self.terms_of(expr) {
             for factor in self.factors_of(rest) {
-                if let Some((Function::Sin | Function::Cos, angle, power)) =
-                    self.function_power(*factor)
-                    && power != 1
-                    && !angles.contains(&angle)
-                {
-                    angles.push(angle);
+                match self.function_power(*factor) {
+                    Some((Function::Sin | Function::Cos, angle, power))
+                        if power != 1 && !angles.contains(&angle) =>
+                    {
+                        angles.push(angle);
+                    }
+                    _ => {}
                 }
             }
         }
@@ -166,13 +163,13 @@ impl ExprPool {
         let mut combined = Vec::with_capacity(terms.len());
         for (coefficient, rest) in terms {
             let term = self.combine_angles_of_term(rest);
-            let term = if matches!(self.node(term), Node::Sum(_)) {
-                let factor = self.constant(coefficient);
-                self.expanded_product(factor, term)
-            } else {
-                self.scale(coefficient, term)
-            };
-            combined.push(term);
+            combined.push(match self.node(term) {
+                Node::Sum(_) => {
+                    let factor = self.constant(coefficient);
+                    self.expanded_product(factor, term)
+                }
+                _ => self.scale(coefficient, term),
+            });
         }
         self.sum(&combined)
     }

@@ -43,19 +43,13 @@ impl ExprPool {
     ) -> Vec<T> {
         let order = self.reachable(roots);
         let mut results: Vec<T> = Vec::with_capacity(order.len());
-        let place = |expr: ExprId| {
-            order
-                .binary_search(&expr)
-                .expect("operands come before what uses them")
-        };
+        let place = |expr: ExprId| order.binary_search(&expr).expect("operands come first");
         for &expr in &order {
             let result = step(self, expr, &|child| results[place(child)].clone());
             results.push(result);
         }
-        roots
-            .iter()
-            .map(|root| results[place(*root)].clone())
-            .collect()
+        let of_root = |root: &ExprId| results[place(*root)].clone();
+        roots.iter().map(of_root).collect()
     }
 
     /// For each expression an interval that contains every value which it takes where symbols lie in the intervals that
@@ -88,14 +82,12 @@ impl ExprPool {
         match self.node(expr) {
             Node::Number(number) => enclose(*number),
             Node::Symbol(symbol) => range_of(*symbol),
-            Node::Sum(terms) => terms
-                .iter()
-                .map(|term| child(*term))
-                .fold(Interval::point(0.0), |a, b| a + b),
-            Node::Product(factors) => factors
-                .iter()
-                .map(|factor| child(*factor))
-                .fold(Interval::point(1.0), |a, b| a * b),
+            Node::Sum(terms) => {
+                (terms.iter()).fold(Interval::point(0.0), |sum, term| sum + child(*term))
+            }
+            Node::Product(factors) => {
+                (factors.iter()).fold(Interval::point(1.0), |all, factor| all * child(*factor))
+            }
             Node::Power(base, exponent) => match self.as_integer(*exponent) {
                 Some(integer) => child(*base).powi(integer),
                 None => child(*base).pow(child(*exponent)),
@@ -121,10 +113,10 @@ impl ExprPool {
         if !self.is_lipschitz_on(expr, domain) {
             return natural;
         }
-        let slopes: Vec<Interval> = slopes
+        let slopes = slopes
             .iter()
-            .map(|slope| self.bound_naturally(*slope, domain))
-            .collect();
+            .map(|slope| self.bound_naturally(*slope, domain));
+        let slopes: Vec<Interval> = slopes.collect();
         let lowest = self.bound_from_side(expr, domain, &slopes, |slope| slope);
         let highest = self.bound_from_side(expr, domain, &slopes, Neg::neg);
         natural.intersection(Interval::new(lowest.lo(), highest.hi()))
@@ -192,10 +184,8 @@ pub fn integer_power(base: f64, exponent: i64) -> f64 {
 }
 
 fn range_of(domain: &[(SymbolId, Interval)], symbol: SymbolId) -> Interval {
-    domain
-        .iter()
-        .find(|(known, _)| *known == symbol)
-        .map_or(Interval::ENTIRE, |(_, range)| *range)
+    let found = domain.iter().find(|(known, _)| *known == symbol);
+    found.map_or(Interval::ENTIRE, |(_, range)| *range)
 }
 
 /// The floats around a number; one if it is a float or a short integer.

@@ -6,7 +6,7 @@ use crate::equations::Equations;
 use crate::files::size;
 use crate::import::{Format, read_equations};
 use crate::model::ReducedModel;
-use crate::symbolic::{ParseError, ParseLimits, Reading};
+use crate::symbolic::{ParseError, Reading};
 
 /// Digits that a rounded float has at least; decimals with more digits are nearer to one float than to any other.
 const FLOAT_DIGITS: usize = 16;
@@ -160,7 +160,7 @@ impl Side {
     fn parse(&self, text: &str, pool: &mut ExprPool) -> Result<Reading, ParseError> {
         let known = |name: &str| LatentVariable::from_name(name, self.latent_dim).is_some();
         let literal = |pool: &mut ExprPool, number: &str| self.decimal(pool, number);
-        pool.parse_defined(text, &known, &literal, ParseLimits::default())
+        pool.parse_defined(text, &known, &literal)
     }
 
     /// Integers, and halves of exact files, are numbers of the pool; of 17 digits or more the shortest of the float

@@ -14,7 +14,7 @@ use super::library::tokens;
 use super::{ImportError, Read};
 use crate::files::Place;
 use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::{ExprId, ExprPool, ParseErrorKind, ParseLimits};
+use crate::symbolic::{ExprId, ExprPool, ParseErrorKind};
 
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 
@@ -236,7 +236,7 @@ pub(super) fn complete(
 impl Equation {
     pub(super) fn parse(&self, file: &str, latent_dim: usize, pool: &mut ExprPool) -> Read<ExprId> {
         let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-        let read = pool.parse_defined(&self.text(), &known, &|_, _| None, ParseLimits::default());
+        let read = pool.parse_defined(&self.text(), &known, &|_, _| None);
         read.map(|reading| reading.expr).map_err(|error| {
             let place = self.place(error.position);
             match error.kind {

@@ -252,18 +252,11 @@ pub struct ToleranceError {
 impl Tolerance {
     /// The tolerance with its unit, in words.
     pub fn words(self) -> String {
-        match self {
-            Self::ShareOfRms(_) => {
-                format!("{self} of the root mean square of each ddz over the recordings")
-            }
-            Self::Absolute(_) => format!("{self} scaled units per s^2"),
-        }
-    }
-
-    pub(crate) fn is_zero(self) -> bool {
-        match self {
-            Tolerance::ShareOfRms(value) | Tolerance::Absolute(value) => value == 0.0,
-        }
+        let unit = match self {
+            Self::ShareOfRms(_) => "of the root mean square of each ddz over the recordings",
+            Self::Absolute(_) => "scaled units per s^2",
+        };
+        format!("{self} {unit}")
     }
 }
 
@@ -289,9 +282,7 @@ impl fmt::Display for Tolerance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             // two roundings, of the division and of this product, may leave 0.30000000000000004
-            Tolerance::ShareOfRms(share) => {
-                write!(f, "{}%", rounded(share * 100.0, 13))
-            }
+            Tolerance::ShareOfRms(share) => write!(f, "{}%", rounded(share * 100.0, 13)),
             Tolerance::Absolute(value) => write!(f, "{value}"),
         }
     }

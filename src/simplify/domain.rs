@@ -126,7 +126,9 @@ impl Domain {
         let boxes = samples.phases.iter().map(|samples| {
             let ranges = samples.row_iter().map(|row| {
                 let points = row.iter().copied().map(Interval::point);
-                points.reduce(Interval::hull).map(|r| widened(r, margin))
+                let range = points.reduce(Interval::hull)?;
+                let by = margin * range.width();
+                Some(Interval::new(range.lo() - by, range.hi() + by))
             });
             ranges.collect()
         });
@@ -224,9 +226,4 @@ pub(super) fn check_count(found: usize, expected: usize) -> Result<(), SimplifyE
             "has {found} boxes, expected one for each of {expected} phases"
         ))),
     }
-}
-
-fn widened(range: Interval, margin: f64) -> Interval {
-    let by = margin * range.width();
-    Interval::new(range.lo() - by, range.hi() + by)
 }

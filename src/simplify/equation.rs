@@ -4,8 +4,7 @@
 //! errors add, as intervals, to what all changes together may cost.
 
 use super::certificate::{Change, ChangeKind, Effect};
-use super::ranges::Ranges;
-use super::workspace::has_function;
+use super::ranges::{Ranges, has_function};
 use crate::symbolic::Interval;
 use crate::typeset::rounded;
 

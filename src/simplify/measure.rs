@@ -8,8 +8,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::domain::{Domain, Samples, SimplifyError};
-use super::ranges::Ranges;
-use super::workspace::Workspace;
+use super::ranges::{Ranges, Workspace};
 use crate::equations::Equations;
 use crate::evaluate::{CoordinateSums, EvaluateError};
 use crate::lower::CompiledModel;

@@ -11,8 +11,7 @@ use super::certificate::{
 use super::domain::{Domain, Samples, SimplifyError, check_count};
 use super::equation::{Equation, is_same_decimal};
 use super::measure::Differences;
-use super::ranges::Ranges;
-use super::workspace::Workspace;
+use super::ranges::{Ranges, Workspace};
 use crate::artifact;
 use crate::equations::Equations;
 use crate::ir::{Program, Statement};
@@ -37,11 +36,8 @@ pub struct Simplified {
     pub certificate: Certificate,
 }
 
-/// Simplifies each equation of each phase as far as `tolerance` allows over `domain`. What exact simplification did to
-/// the equations before is part of the result.
-///
-/// `samples` are needed for a tolerance that is a share, and give the measured errors. A zero tolerance changes
-/// nothing.
+/// Simplifies each equation of each phase as far as `tolerance` allows over `domain`. `samples` are needed for a
+/// tolerance that is a share, and give the measured errors. A zero tolerance changes nothing.
 ///
 /// # Errors
 /// [`SimplifyError::NoSamples`], [`SimplifyError::Domain`] for samples of another model, and the internal error
@@ -52,7 +48,7 @@ pub fn simplify(
     samples: Option<&Samples>,
     tolerance: Tolerance,
 ) -> Result<Simplified, SimplifyError> {
-    if samples.is_none() && !tolerance.is_zero() && matches!(tolerance, Tolerance::ShareOfRms(_)) {
+    if samples.is_none() && matches!(tolerance, Tolerance::ShareOfRms(share) if share != 0.0) {
         return Err(SimplifyError::NoSamples);
     }
     let original = equations.model();

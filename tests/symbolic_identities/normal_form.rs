@@ -1,6 +1,6 @@
 //! Equal expressions get equal normal forms, different ones do not.
 
-use romc::symbolic::{CanonicalForm, CanonicalForms, ExprPool, ParseLimits};
+use romc::symbolic::{CanonicalForm, CanonicalForms, ExprPool};
 
 /// The form of `a - b` without fractions; decimals are rounded where their text starts with `~`.
 fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
@@ -11,9 +11,11 @@ fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
             true => pool.decimal(number, is_rounded),
             false => None,
         };
-        let (text, limits) = (text.trim_start_matches('~'), ParseLimits::default());
-        let parsed = pool.parse_within(text, &|_| true, &decimal, limits);
-        parsed.unwrap_or_else(|error| panic!("{text}: {error}"))
+        let text = text.trim_start_matches('~');
+        let parsed = pool.parse_defined(text, &|_| true, &decimal);
+        parsed
+            .unwrap_or_else(|error| panic!("{text}: {error}"))
+            .expr
     };
     let (left, right) = (parse(&mut pool, a), parse(&mut pool, b));
     let mut forms = CanonicalForms::new(&pool, &[left, right]);

@@ -12,19 +12,6 @@
 //! Two expressions with the same form have the same value wherever both are defined. Different forms prove a difference
 //! only where no atoms depend on each other (`sqrt(1 + x)`, `sqrt(2 + x)` and `sqrt(2 + 3*x + x^2)` do), so a
 //! difference should be confirmed at a point.
-//!
-//! ```
-//! use romc::symbolic::{CanonicalForms, ExprPool};
-//!
-//! let mut pool = ExprPool::new();
-//! let a = pool.parse("2*sin(z1)*cos(z1) + 1/(z1 - 1)", &|_| true)?;
-//! let b = pool.parse("sin(2*z1) + (z1 + 1)/(z1^2 - 1)", &|_| true)?;
-//! let mut forms = CanonicalForms::new(&pool, &[a, b]);
-//! let difference = forms.of(a).minus(&forms.of(b));
-//! let difference = forms.without_fractions(&difference).expect("it is small");
-//! assert!(difference.is_zero());
-//! # Ok::<(), romc::symbolic::ParseError>(())
-//! ```
 
 mod forms;
 mod polynomial;

@@ -79,46 +79,41 @@ impl CanonicalForms<'_> {
                     if rest != power {
                         return Some((with_power(rest), self.power(&base, power - rest)));
                     }
-                    let sum = self.numbers.get(&Atom::Sum(base.clone())).copied();
+                    let beside = [
+                        Atom::Sum(base.clone()),
+                        Atom::Call(Function::Sign, base.clone()),
+                    ];
+                    let [sum, sign] = beside.map(|atom| self.numbers.get(&atom).copied());
                     let shared = base.as_atom().or(sum);
-                    let shared = shared.filter(|shared| monomial.power_of(*shared) < 0);
-                    if let Some(shared) = shared {
+                    if let Some(shared) = shared.filter(|shared| monomial.power_of(*shared) < 0) {
                         // |x| / x = sign(x).
                         let rest = monomial.without(atom).times(&Monomial::atom(shared, 1));
                         return Some((rest, Some(self.call(Function::Sign, base))));
                     }
-                    let sign = self
-                        .numbers
-                        .get(&Atom::Call(Function::Sign, base.clone()))
-                        .copied();
-                    let sign = sign.map_or((0, 0), |sign| (sign, monomial.power_of(sign)));
-                    if sign.1 > 0 {
+                    if let Some(sign) = sign.filter(|sign| monomial.power_of(*sign) > 0) {
                         // |x| sign(x) = x, |x| sign(x)^2 = |x|.
-                        let rest = monomial.without(sign.0);
-                        return Some(match sign.1 % 2 {
+                        let rest = monomial.without(sign);
+                        return Some(match monomial.power_of(sign) % 2 {
                             0 => (rest, Some(CanonicalForm::one())),
                             _ => (rest.without(atom), Some(base)),
                         });
                     }
                 }
-                Atom::Call(Function::Sign, _) if !(0..=2).contains(&power) => {
-                    let rest = 2 - power.rem_euclid(2);
-                    return Some((with_power(rest), Some(CanonicalForm::one())));
-                }
                 Atom::Call(Function::Sign, base) => {
-                    let shared = base.as_atom().filter(|base| monomial.power_of(*base) != 0);
-                    if let Some(shared) = shared {
-                        // x sign(x) = |x|, x sign(x)^2 = x, sign(x)/x as it is.
-                        let rest = monomial.without(atom);
-                        let is_over = monomial.power_of(shared) > 0;
-                        return Some(match power {
-                            2 => (rest, Some(CanonicalForm::one())),
-                            _ if !is_over => continue,
-                            _ => {
-                                let rest = rest.times(&Monomial::atom(shared, -1));
-                                (rest, Some(self.call(Function::Abs, base)))
-                            }
-                        });
+                    if !(0..=2).contains(&power) {
+                        let rest = 2 - power.rem_euclid(2);
+                        return Some((with_power(rest), Some(CanonicalForm::one())));
+                    }
+                    // x sign(x) = |x|, x sign(x)^2 = x, sign(x)/x as it is.
+                    let rest = monomial.without(atom);
+                    match base.as_atom().map(|x| (x, monomial.power_of(x))) {
+                        None | Some((_, 0)) => {}
+                        Some(_) if power == 2 => return Some((rest, Some(CanonicalForm::one()))),
+                        Some((_, ..0)) => {}
+                        Some((x, _)) => {
+                            let rest = rest.times(&Monomial::atom(x, -1));
+                            return Some((rest, Some(self.call(Function::Abs, base))));
+                        }
                     }
                 }
                 _ => {}

@@ -1,7 +1,6 @@
 //! Roots, logarithms, exponentials and magnitudes of normal forms.
 
 use num_bigint::{BigInt, BigUint};
-use num_integer::Integer;
 use num_traits::{ToPrimitive, Zero};
 
 use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
@@ -342,20 +341,13 @@ fn prime_powers(value: &Rational) -> Vec<(CanonicalForm, i32)> {
     for (part, sign) in [(value.numer(), 1), (value.denom(), -1)] {
         let mut rest = part.magnitude().clone();
         for divisor in (2..=LARGEST_DIVISOR).filter(|d| *d == 2 || d % 2 == 1) {
-            if rest == BigUint::from(1_u8) {
-                break;
-            }
             if rest.to_u64().is_some_and(|rest| divisor * divisor > rest) {
                 break;
             }
             let divisor = BigUint::from(divisor);
             let mut count = 0;
-            loop {
-                let (quotient, remainder) = rest.div_rem(&divisor);
-                if remainder != BigUint::ZERO {
-                    break;
-                }
-                rest = quotient;
+            while (&rest % &divisor).is_zero() {
+                rest /= &divisor;
                 count += sign;
             }
             if count != 0 {

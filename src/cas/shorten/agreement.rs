@@ -25,7 +25,11 @@ const EVALUATION: f64 = 1e-11;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 type Column = Rc<[f64]>;
-type Points = BTreeMap<SymbolId, Column>;
+
+struct Points {
+    count: usize,
+    columns: BTreeMap<SymbolId, Column>,
+}
 
 struct Precision {
     round: fn(f64) -> f64,
@@ -129,7 +133,10 @@ impl Agreement {
                 .collect();
             (symbol, values)
         };
-        let points = self.symbols.iter().map(column).collect();
+        let points = Points {
+            count: NEAR.len(),
+            columns: self.symbols.iter().map(column).collect(),
+        };
         let [(sums, sizes), (forms, other_sizes)] =
             [&self.sum, form].map(|summands| sum_by_code(pool, summands, &points, |value| value));
         let mut values = sums.iter().zip(&forms).zip(sizes.iter().zip(&other_sizes));
@@ -232,12 +239,13 @@ fn points(symbols: &[SymbolId], scales: &[f64], precision: &Precision) -> Points
         let size = scales[scale] * (1.0 + 0.1 * (share * 8.0).fract());
         (precision.round)(if is_negative { -size } else { size })
     };
-    let column = |(place, &symbol): (usize, &SymbolId)| {
-        let points = 0..n_grid * pairs.len();
-        let values: Column = points.map(|point| value(place, point)).collect();
+    let count = n_grid * pairs.len();
+    let columns = symbols.iter().enumerate().map(|(place, &symbol)| {
+        let values: Column = (0..count).map(|point| value(place, point)).collect();
         (symbol, values)
-    };
-    symbols.iter().enumerate().map(column).collect()
+    });
+    let columns = columns.collect();
+    Points { count, columns }
 }
 
 /// The values of a sum by generated code, and the sums of the sizes of its summands.
@@ -247,12 +255,11 @@ fn sum_by_code(
     points: &Points,
     round: fn(f64) -> f64,
 ) -> (Vec<f64>, Vec<f64>) {
-    let n_points = points.values().next().map_or(1, |column| column.len());
     let exprs: Vec<ExprId> = sum.iter().map(|&(_, expr)| expr).collect();
     let columns = pool.fold_up(&exprs, |pool, expr, child| {
-        by_code(pool, expr, points, round, n_points, child)
+        by_code(pool, expr, points, round, child)
     });
-    let (mut values, mut sizes) = (vec![0.0; n_points], vec![0.0; n_points]);
+    let (mut values, mut sizes) = (vec![0.0; points.count], vec![0.0; points.count]);
     for (column, &(coefficient, _)) in columns.iter().zip(sum) {
         for (point, value) in column.iter().enumerate() {
             let summand = round(round(coefficient) * value);
@@ -270,68 +277,58 @@ fn by_code(
     expr: ExprId,
     points: &Points,
     round: fn(f64) -> f64,
-    n_points: usize,
     child: &dyn Fn(ExprId) -> Column,
 ) -> Column {
-    let constant = |value: f64| -> Column { vec![round(value); n_points].into() };
-    let map = |column: Column, function: &dyn Fn(f64) -> f64| -> Column {
-        column.iter().map(|&value| round(function(value))).collect()
-    };
-    let both = |a: Column, b: Column, function: fn(f64, f64) -> f64| -> Column {
-        let pairs = a.iter().zip(&b[..]);
-        pairs.map(|(&a, &b)| round(function(a, b))).collect()
-    };
-    let chain = |base: Column, exponent: u64| {
-        map(base, &|value| {
-            power_by(value, exponent, |a, b| round(a * b))
-        })
-    };
-    let product = |a: Column, b: Column| both(a, b, |a, b| a * b);
-    // A base and its exponent without the minus.
-    let divisor = |expr: ExprId| match *pool.node(expr) {
-        Node::Power(base, exponent) => match pool.as_integer(exponent)? {
-            exponent @ ..0 => Some((base, exponent.unsigned_abs())),
-            _ => None,
-        },
-        _ => None,
-    };
+    let each = |value: &dyn Fn(usize) -> f64| -> Column { (0..points.count).map(value).collect() };
+    let chain =
+        |base: f64, exponent: i64| power_by(base, exponent.unsigned_abs(), |a, b| round(a * b));
     match *pool.node(expr) {
-        Node::Number(number) => constant(number.to_f64()),
-        Node::Symbol(symbol) => points[&symbol].clone(),
+        Node::Number(number) => each(&|_| round(number.to_f64())),
+        Node::Symbol(symbol) => points.columns[&symbol].clone(),
         Node::Sum(ref terms) => {
-            let terms = terms.iter().map(|term| child(*term));
-            let sum = terms.reduce(|sum, term| both(sum, term, |a, b| a + b));
-            sum.unwrap_or_else(|| constant(0.0))
+            let terms: Vec<Column> = terms.iter().map(|term| child(*term)).collect();
+            each(&|at| (terms[1..].iter()).fold(terms[0][at], |sum, term| round(sum + term[at])))
         }
         Node::Product(ref factors) => {
-            let above = factors.iter().filter(|factor| divisor(**factor).is_none());
-            let over = above
-                .map(|factor| child(*factor))
-                .fold(constant(1.0), product);
-            let below = factors.iter().filter_map(|factor| divisor(*factor));
-            let under = below
-                .map(|(base, exponent)| chain(child(base), exponent))
-                .reduce(product);
-            match under {
-                Some(under) => both(over, under, |a, b| a / b),
-                None => over,
-            }
+            // Bases and exponents of the divisor's factors; the others as they are.
+            let factors = factors.iter().map(|&factor| match *pool.node(factor) {
+                Node::Power(base, exponent) => match pool.as_integer(exponent) {
+                    Some(exponent @ ..0) => (child(base), Some(exponent)),
+                    _ => (child(factor), None),
+                },
+                _ => (child(factor), None),
+            });
+            let factors: Vec<(Column, Option<i64>)> = factors.collect();
+            each(&|at| {
+                let (mut over, mut under) = (1.0, None);
+                for (column, exponent) in &factors {
+                    let Some(exponent) = exponent else {
+                        over = round(over * column[at]);
+                        continue;
+                    };
+                    let power = chain(column[at], *exponent);
+                    under = Some(under.map_or(power, |under| round(under * power)));
+                }
+                under.map_or(over, |under| round(over / under))
+            })
         }
-        Node::Power(base, exponent) => match (divisor(expr), pool.as_integer(exponent)) {
-            (Some((base, exponent)), _) => map(chain(child(base), exponent), &|value| 1.0 / value),
-            (None, Some(integer)) => chain(child(base), integer.unsigned_abs()),
-            (None, None) => {
-                let logarithm = map(child(base), &f64::ln);
-                map(both(child(exponent), logarithm, |a, b| a * b), &f64::exp)
+        Node::Power(base, exponent) => match (child(base), pool.as_integer(exponent)) {
+            (base, Some(integer @ ..0)) => each(&|at| round(1.0 / chain(base[at], integer))),
+            (base, Some(integer)) => each(&|at| chain(base[at], integer)),
+            (base, None) => {
+                let exponent = child(exponent);
+                each(&|at| round(round(exponent[at] * round(base[at].ln())).exp()))
             }
         },
-        Node::Apply(function, argument) => map(child(argument), &|value| function.evaluate(value)),
+        Node::Apply(function, argument) => {
+            let argument = child(argument);
+            each(&|at| round(function.evaluate(argument[at])))
+        }
     }
 }
 
 /// Bounds of a sum over inputs within a relative distance of the points.
 fn sum_in_bounds(pool: &ExprPool, sum: &Summands, points: &Points, distance: f64) -> Vec<Interval> {
-    let n_points = points.values().next().map_or(1, |column| column.len());
     let exprs: Vec<ExprId> = sum.iter().map(|&(_, expr)| expr).collect();
     let columns = pool.fold_up(&exprs, |pool, expr, child| -> Rc<[Interval]> {
         let operands: Vec<(ExprId, Rc<[Interval]>)> = (pool.children(expr))
@@ -339,7 +336,7 @@ fn sum_in_bounds(pool: &ExprPool, sum: &Summands, points: &Points, distance: f64
             .collect();
         let at = |point: usize| {
             let range_of = |symbol: SymbolId| {
-                let value = points[&symbol][point];
+                let value = points.columns[&symbol][point];
                 let reach = distance * value.abs();
                 Interval::new(value - reach, value + reach)
             };
@@ -349,12 +346,12 @@ fn sum_in_bounds(pool: &ExprPool, sum: &Summands, points: &Points, distance: f64
             };
             pool.bounds_of_node(expr, &range_of, &operand)
         };
-        (0..n_points).map(at).collect()
+        (0..points.count).map(at).collect()
     });
     let at = |point: usize| {
         let summands = columns.iter().zip(sum);
         let summands = summands.map(|(column, &(c, _))| Interval::point(c) * column[point]);
         summands.fold(Interval::point(0.0), |a, b| a + b)
     };
-    (0..n_points).map(at).collect()
+    (0..points.count).map(at).collect()
 }

@@ -16,9 +16,10 @@ impl Shortener<'_> {
         let (unit, scaled) = in_units(old);
         let before = self.length(unit, &scaled);
         let mut shorter = Vec::new();
-        let singles: Scaled = (scaled.iter())
-            .map(|&(number, expr)| (number, self.single(expr)))
-            .collect();
+        let singles = scaled
+            .iter()
+            .map(|&(number, expr)| (number, self.single(expr)));
+        let singles: Scaled = singles.collect();
         let mut candidates = vec![collected(self.pool, &singles, NestedSums::Kept)];
         if old.len() <= MAX_GROUP && self.pool.affords(1) {
             candidates.extend(self.candidates(unit, &singles));
@@ -132,13 +133,9 @@ impl Shortener<'_> {
     /// Forms of a group: of its sum as a whole, and of each term chosen by itself.
     fn candidates(&mut self, unit: Number, singles: &Scaled) -> Vec<Scaled> {
         let mut candidates = Vec::new();
-        let products: Vec<ExprId> = (singles.iter())
-            .map(|&(number, expr)| {
-                let factor = self.pool.constant(number);
-                self.pool.product(&[factor, expr])
-            })
-            .collect();
-        let sum = self.pool.sum(&products);
+        let scaled = (singles.iter()).map(|&(number, expr)| self.pool.scale(number, expr));
+        let scaled: Vec<ExprId> = scaled.collect();
+        let sum = self.pool.sum(&scaled);
         let mut forms = self.pool.forms(sum);
         forms.push(self.pool.simplify(sum));
         for form in forms {
@@ -176,16 +173,16 @@ impl Shortener<'_> {
             return Vec::new();
         }
         let common = self.pool.product(&common);
-        let left: Scaled = (singles.iter())
-            .map(|&(number, expr)| (number, self.pool.div(expr, common)))
-            .collect();
+        let mut left = singles.clone();
+        for (_, expr) in &mut left {
+            *expr = self.pool.div(*expr, common);
+        }
         let found = self.candidates(unit, &left).into_iter();
-        let with_factors = found.map(|form| {
-            let terms = form.into_iter();
-            let terms: Scaled = terms
-                .map(|(number, expr)| (number, self.pool.product(&[common, expr])))
-                .collect();
-            collected(self.pool, &terms, NestedSums::Kept)
+        let with_factors = found.map(|mut form| {
+            for (_, expr) in &mut form {
+                *expr = self.pool.mul(common, *expr);
+            }
+            collected(self.pool, &form, NestedSums::Kept)
         });
         with_factors.collect()
     }
@@ -230,12 +227,9 @@ impl Shortener<'_> {
             (_, true) => (Function::Cos, Function::Sin, 2),
         };
         let mut factors = vec![cofactor];
+        let half = self.pool.constant(Number::HALF);
         for (function, angle) in [of_sum, of_difference].into_iter().zip(angles) {
-            let mut halves = Vec::new();
-            for (number, rest) in self.pool.terms_of(angle) {
-                halves.push(self.pool.scale(number.checked_mul(Number::HALF)?, rest));
-            }
-            let half = self.pool.sum(&halves);
+            let half = self.pool.expanded_product(half, angle);
             factors.push(self.pool.apply(function, half));
         }
         let number = number.checked_mul(Number::integer(factor))?;
@@ -260,9 +254,10 @@ impl Shortener<'_> {
         if singles.len() < 2 || singles.len() > MAX_CHOSEN {
             return Vec::new();
         }
-        let summands: Summands = (singles.iter())
-            .map(|&(number, expr)| (number.to_f64(), expr))
-            .collect();
+        let summands = singles
+            .iter()
+            .map(|&(number, expr)| (number.to_f64(), expr));
+        let summands: Summands = summands.collect();
         let waves = self.all_angles(&summands);
         let mut forms: Vec<Vec<ExprId>> = Vec::new();
         for &(_, expr) in singles {

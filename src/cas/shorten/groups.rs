@@ -18,15 +18,6 @@ pub(super) enum Link {
     Logarithm(ExprId),
     /// Denominators that have the variables of this product.
     Variables(ExprId),
-    /// Tangents of an angle or their inverses: cofactor times tangent.
-    Tangent(ExprId),
-}
-
-impl Link {
-    /// Whether terms of [`Distance::Far`] alone meet by it.
-    fn is_far(self) -> bool {
-        matches!(self, Link::Monomial(ExprId::ONE) | Link::Variables(_))
-    }
 }
 
 impl Shortener<'_> {
@@ -46,7 +37,8 @@ impl Shortener<'_> {
             for &(_, expr) in &block.summands {
                 is_plain[place] &= self.is_plain(expr);
                 for link in self.links_of(expr, waves) {
-                    if distance == Distance::Near && link.is_far() {
+                    let is_far = matches!(link, Link::Monomial(ExprId::ONE) | Link::Variables(_));
+                    if distance == Distance::Near && is_far {
                         continue;
                     }
                     let other = *owner.entry(link).or_insert(place);
@@ -132,12 +124,12 @@ impl Shortener<'_> {
 
     fn links_of(&mut self, expr: ExprId, waves: ExprId) -> Vec<Link> {
         // Tangents meet sines and cosines.
-        let is_tangent = |factor: &ExprId| match *self.pool.node(*factor) {
+        let meets = |factor: &ExprId| match *self.pool.node(*factor) {
             Node::Apply(Function::Sin | Function::Cos, _) => false,
             Node::Apply(function, _) => function.is_circular(),
             _ => false,
         };
-        let is_alone = self.plain[&expr] && !self.pool.factors_of(expr).iter().any(is_tangent);
+        let is_alone = self.plain[&expr] && !self.pool.factors_of(expr).iter().any(meets);
         if is_alone || !self.pool.affords(1) {
             return vec![Link::Monomial(expr)];
         }
@@ -177,8 +169,8 @@ impl Shortener<'_> {
                 .collect();
             links.push(Link::Variables(self.pool.product(&variables)));
             // Terms that have a term of the numerator when they are multiplied by the denominator.
-            let numerator = self.pool.product(&[expr, base]);
-            let numerator = (self.pool).expand_region(numerator);
+            let numerator = self.pool.mul(expr, base);
+            let numerator = self.pool.expand_region(numerator);
             for (_, above) in self.pool.terms_of(numerator) {
                 for (_, below) in self.pool.terms_of(base) {
                     links.push(Link::Monomial(self.pool.div(above, below)));
@@ -194,7 +186,7 @@ impl Shortener<'_> {
                 Some((function, angle, _)) if function.is_circular() => {
                     let cofactor = self.pool.div(expr, factor);
                     let tangent = self.pool.apply(function, angle);
-                    links.push(Link::Tangent(self.pool.mul(cofactor, tangent)));
+                    links.push(Link::Monomial(self.pool.mul(cofactor, tangent)));
                 }
                 _ => {}
             }

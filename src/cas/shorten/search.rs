@@ -95,7 +95,9 @@ impl<'a> Shortener<'a> {
     /// The replacements that make `sum coefficient * expr` shortest, in the order of the first positions they replace;
     /// none if it is short already.
     pub fn shorten(&mut self, summands: &[(f64, ExprId)]) -> Vec<Shortened> {
-        if self.is_plain_sum(summands) && self.parts_of_powers(summands).is_empty() {
+        let mut seen = IdSet::default();
+        let is_plain = |&(_, expr): &(f64, ExprId)| seen.insert(expr) && self.is_plain(expr);
+        if summands.iter().all(is_plain) && self.parts_of_powers(summands).is_empty() {
             return Vec::new();
         }
         let searched = summands.iter().filter(|(_, expr)| !self.is_plain(*expr));
@@ -104,8 +106,8 @@ impl<'a> Shortener<'a> {
         let mut blocks = blocks_of(summands);
         for _ in 0..MAX_ROUNDS {
             let mut is_changed = false;
-            let views: [View<'a>; 3] = [Self::whole_factors, Self::whole_angles, Self::unchanged];
-            for view in views {
+            let unchanged: View<'a> = |_, summands| Some((summands.to_vec(), Vec::new()));
+            for view in [Self::whole_factors, Self::whole_angles, unchanged] {
                 is_changed |= self.pass(&mut blocks, view);
             }
             if !is_changed {
@@ -167,10 +169,10 @@ impl<'a> Shortener<'a> {
                     *place = places[0];
                 }
             }
-            let mut left = Summands::new();
-            for &place in &places {
-                left.append(&mut blocks[place].summands);
-            }
+            let taken = places
+                .iter()
+                .flat_map(|&place| std::mem::take(&mut blocks[place].summands));
+            let mut left: Summands = taken.collect();
             for summand in lost {
                 if let Some(at) = left.iter().position(|known| *known == summand) {
                     left.remove(at);
@@ -226,10 +228,8 @@ impl<'a> Shortener<'a> {
             // `cos(2*a)` may be a square of `cos(a)`.
             let half = least.checked_mul(Number::HALF);
             let least = half.filter(|_| least.is_even()).unwrap_or(least);
-            let angle: Option<Vec<ExprId>> = (self.pool.terms_of(monic).into_iter())
-                .map(|(number, rest)| Some(self.pool.scale(number.checked_mul(least)?, rest)))
-                .collect();
-            let Some(angle) = angle else { continue };
+            let factor = self.pool.constant(least);
+            let unit = self.pool.expanded_product(factor, monic);
             let variable = self.pool.placeholder("angle", place);
             let symbol = self.pool.symbol_expr(variable);
             for (factor, angle) in angles {
@@ -239,7 +239,7 @@ impl<'a> Shortener<'a> {
                     replaced.insert(angle, self.pool.scale(multiple, symbol));
                 }
             }
-            variables.push((variable, self.pool.sum(&angle)));
+            variables.push((variable, unit));
         }
         if replaced.is_empty() {
             return None;
@@ -289,15 +289,6 @@ impl<'a> Shortener<'a> {
         (!parts.is_empty()).then_some((whole, parts))
     }
 
-    fn unchanged(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
-        Some((summands.to_vec(), Vec::new()))
-    }
-
-    fn is_plain_sum(&mut self, summands: &[(f64, ExprId)]) -> bool {
-        let mut seen = IdSet::default();
-        (summands.iter()).all(|&(_, expr)| seen.insert(expr) && self.is_plain(expr))
-    }
-
     /// Whether a term is a product of variables to integer powers and at most one function of a variable, without a
     /// number.
     pub(super) fn is_plain(&mut self, expr: ExprId) -> bool {
@@ -332,16 +323,11 @@ impl<'a> Shortener<'a> {
         if let Some(&known) = self.singles.get(&expr) {
             return known;
         }
-        let single = self.pool.simplify(expr);
-        let mut is_same = || {
-            let alone = vec![(1.0, expr)];
-            Agreement::with(self.pool, &alone).holds(self.pool, &vec![(1.0, single)])
-        };
-        let single = if single == expr || is_same() {
-            single
-        } else {
-            expr
-        };
+        let mut single = self.pool.simplify(expr);
+        let agreement = || Agreement::with(self.pool, &vec![(1.0, expr)]);
+        if single != expr && !agreement().holds(self.pool, &vec![(1.0, single)]) {
+            single = expr;
+        }
         self.singles.insert(expr, single);
         single
     }
@@ -352,19 +338,14 @@ impl<'a> Shortener<'a> {
         group: &[usize],
         original: &[(f64, ExprId)],
     ) -> bool {
-        let old: Summands = (group.iter())
-            .flat_map(|&place| blocks[place].summands.iter().copied())
-            .collect();
-        let mut positions: Vec<usize> = (group.iter())
-            .flat_map(|&place| blocks[place].positions.iter().copied())
-            .collect();
+        let (mut old, mut positions) = (Summands::new(), Vec::<usize>::new());
+        for &place in group {
+            old.extend(&blocks[place].summands);
+            positions.extend(&blocks[place].positions);
+        }
         positions.sort_unstable();
         let replaced: Summands = positions.iter().map(|&place| original[place]).collect();
         let new = self.shortest(&old, &replaced);
-        let is_shorter = new.is_some();
-        if let Some(new) = new {
-            merge(blocks, group, new);
-        }
-        is_shorter
+        new.map(|new| merge(blocks, group, new)).is_some()
     }
 }

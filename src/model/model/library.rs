@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::symbolic::{
-    ExprId, ExprPool, Function, Node, Number, ParseLimits, SymbolId, integer_power,
+    ExprId, ExprPool, Function, Node, Number, SymbolId, integer_power,
 };
 
 pub const MAX_LATENT_DIM: usize = 64;
@@ -272,7 +272,7 @@ fn parse_term(pool: &mut ExprPool, latent_dim: usize, index: usize, text: &str) 
         return Err(ModelError::invalid(place(index), found, expected));
     }
     let known = |name: &str| LatentVariable::from_name(name, latent_dim).is_some();
-    let read = pool.parse_defined(text, &known, &|_, _| None, ParseLimits::default());
+    let read = pool.parse_defined(text, &known, &|_, _| None);
     let reading = read.map_err(|source| ModelError::Term {
         index,
         text: text.to_owned(),
