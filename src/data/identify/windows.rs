@@ -158,7 +158,7 @@ impl Windows {
     fn add_joints(&mut self, averaged: &Averaged<'_>) {
         let segment = averaged.segment;
         let feet = segment.feet[averaged.span.start];
-        let half = averaged.filter.window() / 2;
+        let half = averaged.filter.window / 2;
         for joint in (0..JOINT_DIM).filter(|joint| !feet[joint / 3]) {
             let unknowns = joint_unknowns(joint % 3);
             let joints = &averaged.equations.joints;

@@ -5,7 +5,6 @@
 //! disagree, a coordinate is wrong. Also times of clocks that count from an epoch, kept to the nanosecond.
 
 use super::error::RecordingError;
-use super::lines::count;
 use super::preprocess::{differences, median, resampled};
 use super::segment::Segment;
 use crate::robot::{BODY_DIM, JOINT_DIM};
@@ -61,9 +60,9 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
         false => segment.clone(),
     };
     let step_s = segment.mean_step_s();
-    let resamples = !is_even(&chosen);
+    let is_uneven = !is_even(&chosen);
     let rows = (chosen.duration_s() / step_s).round() as usize + 1;
-    let mut segment = match resamples {
+    let mut segment = match is_uneven {
         false => chosen.clone(),
         true => resampled(&chosen, rows)?,
     };
@@ -77,7 +76,7 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
         elapsed_ratio,
         mended: Mended {
             elapsed_ratio: rebuilt.then_some(elapsed_ratio),
-            resampled: resamples,
+            resampled: is_uneven,
             rates_replaced,
         },
         lost,
@@ -169,6 +168,7 @@ fn replace_angular_rates(segment: &mut Segment) -> bool {
     disagree
 }
 
+/// From one sample to the next: time by the stamps, and by the motion.
 struct Interval {
     stamped_s: f64,
     speed: f64, // weighted square of the velocity
@@ -177,24 +177,23 @@ struct Interval {
 
 impl Interval {
     fn all(segment: &Segment, coordinates: &[usize]) -> Vec<Self> {
-        let rights = 1..segment.len();
-        (rights.map(|right| Self::of(segment, right, coordinates))).collect()
-    }
-
-    fn of(segment: &Segment, right: usize, coordinates: &[usize]) -> Self {
-        let (mut speed, mut moved) = (0.0, 0.0);
-        for &row in coordinates {
-            let weight = if row < JOINT_DIM { JOINT_WEIGHT } else { 1.0 };
-            let velocity = (segment.dx[(row, right - 1)] + segment.dx[(row, right)]) / 2.0;
-            let displacement = segment.x[(row, right)] - segment.x[(row, right - 1)];
-            speed += weight * velocity * velocity;
-            moved += weight * velocity * displacement;
-        }
-        Self {
-            stamped_s: segment.time_s[right] - segment.time_s[right - 1],
-            speed,
-            moved,
-        }
+        let of = |right: usize| {
+            let (mut speed, mut moved) = (0.0, 0.0);
+            for &row in coordinates {
+                let weight = if row < JOINT_DIM { JOINT_WEIGHT } else { 1.0 };
+                let velocity = (segment.dx[(row, right - 1)] + segment.dx[(row, right)]) / 2.0;
+                let displacement = segment.x[(row, right)] - segment.x[(row, right - 1)];
+                speed += weight * velocity * velocity;
+                moved += weight * velocity * displacement;
+            }
+            let stamped_s = segment.time_s[right] - segment.time_s[right - 1];
+            Self {
+                stamped_s,
+                speed,
+                moved,
+            }
+        };
+        (1..segment.len()).map(of).collect()
     }
 
     fn elapsed_s(&self) -> f64 {
@@ -236,7 +235,7 @@ impl Instant {
 
     /// A date and time as ISO 8601 writes it, or a time of day alone, in s since 1970; also with blanks and commas.
     pub(crate) fn from_iso(text: &str) -> Option<Self> {
-        if count(text, ':') == 0 {
+        if !text.contains(':') {
             return None;
         }
         let (days, time) = match text.split_once(['T', 't', ' ']) {

@@ -57,8 +57,7 @@ impl RecordingSet {
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(2));
         for files in files.chunks(threads) {
             let all: Vec<_> = std::thread::scope(|scope| {
-                let started = files.iter().map(|file| scope.spawn(|| read(file)));
-                let started: Vec<_> = started.collect();
+                let started = Vec::from_iter(files.iter().map(|file| scope.spawn(|| read(file))));
                 let ended = started.into_iter().map(|thread| thread.join());
                 ended.map(|read| read.expect("no panic")).collect()
             });
@@ -236,8 +235,8 @@ pub fn condition(
 }
 
 fn smooth(segment: &mut Segment, filter: &SavitzkyGolay, rows: SmoothedRows) -> Outcome<()> {
-    if segment.len() < filter.window() {
-        let fault = RecordingFault::too_short(segment.len(), filter.window());
+    if segment.len() < filter.window {
+        let fault = RecordingFault::too_short(segment.len(), filter.window);
         return Err(fault.at(&segment.path, segment.row(0)));
     }
     let smooth = |m: &DMatrix<f64>| filter.smooth(m).expect("invariant: a window of samples");

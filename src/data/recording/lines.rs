@@ -145,11 +145,6 @@ pub(super) fn cells(line: &str, delimiter: char) -> impl Iterator<Item = &str> {
     })
 }
 
-pub(super) fn count(line: &str, character: char) -> usize {
-    let wanted = character as u8;
-    line.bytes().filter(|byte| *byte == wanted).count()
-}
-
 fn trimmed(cell: &str) -> &str {
     match cell.as_bytes() {
         [first, .., last] if first.is_ascii_graphic() && last.is_ascii_graphic() => cell,

@@ -62,7 +62,10 @@ impl fmt::Display for Mismatch {
     }
 }
 
-fn mismatch(kind: &'static str, breach: Breach, words: String) -> Option<Mismatch> {
+/// A mismatch, if a figure breaks a bound.
+type Found = Option<Mismatch>;
+
+fn mismatch(kind: &'static str, breach: Breach, words: String) -> Found {
     let (value, bound) = breach?;
     Some(Mismatch {
         kind,
@@ -158,8 +161,7 @@ pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
 pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
     let path = recording.path.display();
     let found = mismatches(recording, robot);
-    let found = found.iter().map(|mismatch| format!("{path}: {mismatch}"));
-    let mut notes: Vec<String> = found.collect();
+    let mut notes = Vec::from_iter(found.iter().map(|mismatch| format!("{path}: {mismatch}")));
     let findings = check(recording, robot);
     let mut faults = findings.iter().filter(|f| f.kind.can_be_left_out());
     if let Some(first) = faults.next() {
@@ -171,7 +173,7 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
 }
 
 /// Encoders and decoders were learned from jumps that begin at the origin and run along x.
-fn origin(recording: &Recording) -> Option<Mismatch> {
+fn origin(recording: &Recording) -> Found {
     let [x, y, yaw] = [0, 1, 5].map(|coordinate| {
         let starts = recording.segments.iter().map(|segment| segment.state(0));
         let starts = starts.map(|start| start[JOINT_DIM + coordinate].abs());
@@ -188,7 +190,7 @@ fn origin(recording: &Recording) -> Option<Mismatch> {
     far.or_else(|| mismatch("origin", outside(yaw, 0.0, ORIGIN.1), turned))
 }
 
-fn foot_slip(slip: &Slip) -> Option<Mismatch> {
+fn foot_slip(slip: &Slip) -> Found {
     let value = slip.rms_m()?;
     let words = format!(
         "feet on the ground move by {:.0} mm (root mean square; {:.0} mm are accepted): the joints, the body's \
@@ -213,7 +215,7 @@ fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Mismatch,
     Some((mismatch("foot_slip", breach, words)?, elements.is_some()))
 }
 
-fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mismatch> {
+fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Found {
     let value = slip.relative_rms_m()?;
     let (best, reading) = best_other_reading(recording, robot)?;
     let breach = outside(value, 0.0, READING_FACTOR * best + READING_LEAST_M);
@@ -225,7 +227,7 @@ fn legs_or_signs(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<Mi
     mismatch("legs_or_signs", breach, words)
 }
 
-fn fall(balance: &Balance) -> Option<Mismatch> {
+fn fall(balance: &Balance) -> Found {
     let (value, (low, high)) = (balance.fall_m_s2?, FALL_M_S2);
     let words = format!(
         "in flight the body accelerates by {value:.2} m/s^2 upwards, expected {low} to {high}: another axis, sign or \
@@ -234,7 +236,7 @@ fn fall(balance: &Balance) -> Option<Mismatch> {
     mismatch("fall", beyond(value, FALL_M_S2), words)
 }
 
-fn weight(balance: &Balance, robot: &Robot) -> Option<Mismatch> {
+fn weight(balance: &Balance, robot: &Robot) -> Found {
     let (value, (low, high)) = (balance.weight_share?, WEIGHT_SHARE);
     let mass_kg = (1e6 * robot.mass_kg()).round() / 1e6;
     let words = format!(
@@ -244,7 +246,7 @@ fn weight(balance: &Balance, robot: &Robot) -> Option<Mismatch> {
     mismatch("weight", beyond(value, WEIGHT_SHARE), words)
 }
 
-fn hip_torques(balance: &Balance) -> Option<Mismatch> {
+fn hip_torques(balance: &Balance) -> Found {
     let shares = Leg::ALL.into_iter().zip(balance.hip_share);
     let known = shares.filter_map(|(leg, share)| Some((leg, share?)));
     let wrong: Vec<(Leg, f64)> = known.filter(|(_, share)| *share < HIP_SHARE).collect();
@@ -285,7 +287,7 @@ const RATES: [(usize, usize, &str); 3] = [
 ];
 
 /// Velocities that are a multiple of the changes of their positions.
-fn rates(recording: &Recording) -> Option<Mismatch> {
+fn rates(recording: &Recording) -> Found {
     RATES.into_iter().find_map(|(first, end, what)| {
         let (mut product, mut squares, mut own) = (0.0, 0.0, 0.0);
         for segment in &recording.segments {
@@ -312,7 +314,7 @@ fn rates(recording: &Recording) -> Option<Mismatch> {
     })
 }
 
-fn accelerations(balance: &Balance) -> Option<Mismatch> {
+fn accelerations(balance: &Balance) -> Found {
     let (axis, value) = balance.acceleration_offset_m_s2?;
     let breach = outside(value, -ACCELERATION_M_S2, ACCELERATION_M_S2);
     let words = format!(
@@ -322,12 +324,7 @@ fn accelerations(balance: &Balance) -> Option<Mismatch> {
     mismatch("accelerations", breach, words)
 }
 
-fn other_robot(
-    recording: &Recording,
-    robot: &Robot,
-    slip: &Slip,
-    balance: &Balance,
-) -> Option<Mismatch> {
+fn other_robot(recording: &Recording, robot: &Robot, slip: &Slip, balance: &Balance) -> Found {
     let share = balance.weight_share.filter(|share| *share > 0.0)?;
     let (own, own_slip) = (share.ln().abs(), slip.rms_m()?);
     if own <= OTHER_WEIGHT.0 {

@@ -121,7 +121,7 @@ pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct SavitzkyGolay {
-    window: usize,
+    pub(crate) window: usize,
     order: usize,
     /// Row `r`: weights of the window's samples for the value at its place `r`.
     values: DMatrix<f64>,
@@ -153,10 +153,6 @@ impl SavitzkyGolay {
             order,
             values,
         })
-    }
-
-    pub(crate) fn window(&self) -> usize {
-        self.window
     }
 
     /// Each row of `rows` smoothed along its samples (columns); `None` if these are fewer than the window's.

@@ -55,11 +55,12 @@ pub(crate) struct TextFormat {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[repr(u8)]
 pub(crate) enum Delimiter {
-    Tab,
-    Blank,
-    Comma,
-    Semicolon,
+    Tab = b'\t',
+    Blank = b' ',
+    Comma = b',',
+    Semicolon = b';',
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]

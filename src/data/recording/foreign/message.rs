@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::recording::clock::Instant;
+
 const MOST_ENTRIES: usize = 64; // longest array whose entries become columns: an image is no column
 const MOST_NUMBERS: usize = 4096; // most numbers of a message
 const MOST_EMPTY: usize = 100_000; // most fields of a message without bytes of their own: empty messages
@@ -50,7 +52,7 @@ pub(super) struct Definition {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value {
     Number(f64),
-    Time(i64, u32),
+    Time(Instant),
 }
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -330,8 +332,8 @@ impl<'a> Cursor<'a> {
                 return Ok(None);
             }
             Kind::Time => {
-                let (seconds, rest) = (self.signed(4)?, self.unsigned(4)?);
-                return Ok(Some(Value::Time(seconds, rest as u32)));
+                let (whole, rest) = (self.signed(4)?, 1e-9 * self.unsigned(4)? as f64);
+                return Ok(Some(Value::Time(Instant { whole, rest })));
             }
             Kind::Bool => f64::from(u8::from(self.unsigned(1)? != 0)),
             Kind::Unsigned(size) => self.unsigned(size)? as f64,

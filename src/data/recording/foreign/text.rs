@@ -263,12 +263,7 @@ fn delimiter_of(line: &str) -> Delimiter {
 }
 
 fn character(delimiter: Delimiter) -> char {
-    match delimiter {
-        Delimiter::Blank => ' ',
-        Delimiter::Tab => '\t',
-        Delimiter::Comma => ',',
-        Delimiter::Semicolon => ';',
-    }
+    char::from(delimiter as u8)
 }
 
 fn cells(line: &str, delimiter: Delimiter) -> Vec<&str> {

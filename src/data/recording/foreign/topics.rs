@@ -113,10 +113,9 @@ impl Topics {
                     false => "have other names or lengths and are left out",
                 };
                 let mut log = table.finished();
-                if others > 0 {
-                    let note = format!("`{}`: {others} of {messages} messages {what}", log.name);
-                    log.notes.push(note);
-                }
+                let note = || format!("`{}`: {others} of {messages} messages {what}", log.name);
+                let note = (others > 0).then(note);
+                log.notes.extend(note);
                 logs.push(log);
             }
             logs.extend(topic.fault.map(|fault| Log {
@@ -170,17 +169,14 @@ impl Topic {
         }
         table.arrivals.push(self.arrived);
         self.arrived += 1;
-        let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
-        let recorded = Value::Time(seconds as i64, rest as u32);
-        let values = [(0, recorded)].into_iter();
-        for (column, value) in values.chain(order.iter().copied().zip(found.values)) {
-            let column = &mut table.log.columns[column];
+        let (whole, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
+        let (whole, rest) = (whole as i64, 1e-9 * rest as f64);
+        let columns = &mut table.log.columns;
+        columns[0].push_instant(Instant { whole, rest });
+        for (column, value) in order.iter().zip(found.values) {
             match value {
-                Value::Number(value) => column.values.push(value),
-                Value::Time(whole, nanoseconds) => {
-                    let rest = 1e-9 * f64::from(nanoseconds);
-                    column.push_instant(Instant { whole, rest });
-                }
+                Value::Number(value) => columns[*column].values.push(value),
+                Value::Time(instant) => columns[*column].push_instant(instant),
             }
         }
         Ok(())

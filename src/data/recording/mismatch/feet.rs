@@ -2,7 +2,7 @@
 //! contact belongs to which foot; those on the ground are at height zero.
 
 use super::stance::{foot_place, orders};
-use super::{Mismatch, mismatch};
+use super::{Found, mismatch};
 use crate::recording::check::outside;
 use crate::recording::preprocess::median;
 use crate::recording::{Recording, Segment};
@@ -15,7 +15,7 @@ const LEAST_GAIN: (f64, f64) = (9e-3, 0.3);
 const FLOOR_M: f64 = 0.1; // height of the feet that are on the ground, m
 
 /// Another order of the columns, if it fits the heights of the feet clearly better than the recorded one.
-pub(super) fn columns(recording: &Recording, robot: &Robot) -> Option<Mismatch> {
+pub(super) fn columns(recording: &Recording, robot: &Robot) -> Found {
     let orders = orders();
     let mut sums = vec![0.0; orders.len()];
     for segment in &recording.segments {
@@ -51,7 +51,7 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
     mean(false) - mean(true)
 }
 
-pub(super) fn floor(value: f64) -> Option<Mismatch> {
+pub(super) fn floor(value: f64) -> Found {
     // The bound has no sign.
     let breach = outside(value, -FLOOR_M, FLOOR_M).map(|(value, _)| (value, FLOOR_M));
     let words = format!(
@@ -78,7 +78,7 @@ const TRUNK: (f64, f64) = (0.05, 1.6);
 const LIES_S: f64 = 0.1; // shortest time that it lies, s
 
 /// Time, s, that the trunk lies on the ground, or under it, or on its back, if that is long enough.
-pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Option<Mismatch> {
+pub(super) fn fallen(recording: &Recording, floor_m: f64) -> Found {
     let (mut lies_s, mut lowest, mut steepest) = (0.0, f64::INFINITY, 0.0_f64);
     for segment in &recording.segments {
         let grounded = (0..segment.len()).filter(|sample| segment.feet[*sample].contains(&true));

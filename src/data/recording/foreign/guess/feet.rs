@@ -34,8 +34,7 @@ pub(super) fn force_lines(mut values: DMatrix<f64>) -> (Vec<String>, Option<Stri
     }
     let (low, high) = ends(&values);
     let range = high - low;
-    let rests = (values.row_iter()).map(|row| resting(row.iter().copied(), range));
-    let rests: Vec<Option<Rest>> = rests.collect();
+    let rests = Vec::from_iter((values.row_iter()).map(|row| resting(row.iter().copied(), range)));
     let known: Vec<Rest> = rests.iter().flatten().copied().collect();
     if known.is_empty() {
         let least = sorted(values.iter().copied())[0];

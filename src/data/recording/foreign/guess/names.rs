@@ -183,12 +183,13 @@ impl Name {
         }
         let (leg, joint) = (self.place(&LEGS), self.joint());
         let (axis, number) = (self.axis(), Self::number_of(&self.0));
-        let kind = match () {
-            () if has(TORQUE) => Quantity::JointTorque,
-            () if has(ACCELERATION) => Quantity::JointAcceleration,
-            () if has(VELOCITY) => Quantity::JointVelocity,
-            () => Quantity::JointPosition,
-        };
+        let kinds = [
+            (TORQUE, Quantity::JointTorque),
+            (ACCELERATION, Quantity::JointAcceleration),
+            (VELOCITY, Quantity::JointVelocity),
+        ];
+        let kind = kinds.into_iter().find(|(known, _)| has(known));
+        let kind = kind.map_or(Quantity::JointPosition, |(_, kind)| kind);
         if let (Some(number), [list, _]) = (number, &self.0[..])
             && let Some(found) = in_list(list, number)
         {

@@ -207,8 +207,7 @@ impl<'a> View<'a> {
 
     /// Squared distances of the places of a leg's foot in these states from their median, summed.
     fn about_median(&self, leg: Leg, states: &[[f64; STATE_DIM]]) -> f64 {
-        let places = states.iter().map(|x| foot_place(self.robot, leg, x, true));
-        let places: Vec<Vector3<f64>> = places.collect();
+        let places = Vec::from_iter(states.iter().map(|x| foot_place(self.robot, leg, x, true)));
         let stands = median_place(&places);
         let square = |place: &Vector3<f64>| (place - stands).norm_squared();
         places.iter().map(square).sum()

@@ -336,8 +336,7 @@ fn sign_line(signs: &[f64]) -> Option<String> {
         .iter()
         .zip(signs)
         .filter(|(_, sign)| **sign < 0.0);
-    let names = negative.map(|(name, _)| format!("\"{name}\" = -1"));
-    let names: Vec<String> = names.collect();
+    let names = Vec::from_iter(negative.map(|(name, _)| format!("\"{name}\" = -1")));
     match names.len() {
         0 => None,
         JOINT_DIM => Some("sign = -1".to_owned()),

@@ -38,8 +38,7 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
         file.to_string_lossy()
     );
     let (mut lines, order, mut notes) = source.scales();
-    let sound = groups.iter().filter(|group| source.is_sound(group, &lines));
-    let sound: Vec<&Group> = sound.collect();
+    let sound = Vec::from_iter(groups.iter().filter(|group| source.is_sound(group, &lines)));
     let mut open = Vec::new();
     for group in &sound {
         let key = group.quantity.key();
