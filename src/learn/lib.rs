@@ -6,10 +6,6 @@ use romc_cas as symbolic;
 use romc_codegen::{ir, lower};
 use romc_control::online;
 use romc_data::recording;
-#[cfg(test)]
-use romc_model::robot_file;
-#[cfg(test)]
-use romc_model::artifact;
 use romc_model::{files, limits, model};
 use romc_robot as robot;
 

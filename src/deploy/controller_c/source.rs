@@ -16,9 +16,7 @@ use crate::mpc::shared::{NO_PHASE, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE, tor
 use crate::mpc::{
     ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings,
 };
-use crate::robot::{
-    DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, Robot, WrenchFrame,
-};
+use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, WrenchFrame};
 
 /// `NAME_controller.c`.
 #[derive(Template)]
@@ -65,6 +63,7 @@ impl<'a> Source<'a> {
         precision: Precision,
     ) -> Result<Self, MpcError> {
         let (numbers, phases) = (Numbers(precision), plant.phases());
+        let robot = plant.robot();
         let mpc = MpcSettings::default();
         let of_given = |part: fn(&InputGivenState) -> &DMatrix<f64>| {
             let given = phases.iter().filter_map(|phase| phase.given_state.as_ref());
@@ -103,7 +102,7 @@ impl<'a> Source<'a> {
             }),
             torque_mean: numbers.matrix(phases.iter().map(|phase| &phase.torque_mean)),
             torque_deviation: nested(deviations),
-            weight_n,
+            weight_n: robot.mass_kg() * GRAVITY_M_S2,
             fallback: mpc.fallback,
             phases: &entries.phases,
         })

@@ -43,10 +43,3 @@ use crate::sim::{LatentSegment, Restart, Rollout, SimError};
 use coordinates::Mean;
 
 type Result<T, E = EvaluateError> = std::result::Result<T, E>;
-
-/// A recording below `examples/recordings`, such as `go1/test_01`.
-#[cfg(test)]
-pub(crate) fn shipped(name: &str) -> crate::recording::Recording {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/recordings");
-    crate::recording::read(format!("{folder}/{name}.csv.gz").as_ref()).expect("a shipped recording")
-}

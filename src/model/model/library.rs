@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::symbolic::{
-    ExprId, ExprPool, Function, Node, Number, SymbolId, integer_power,
-};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId, integer_power};
 
 pub const MAX_LATENT_DIM: usize = 64;
 pub(crate) const MAX_LIBRARY_DIM: usize = 20_000;
