@@ -292,7 +292,6 @@ fn add_adjoints(
     }
 }
 
-/// Adds to `out` the adjoint times the values of the steps `factors`.
 #[inline(always)]
 fn add_times(out: &mut [f64], adjoint: &[f64], values: &[Vec<f64>], factors: &[usize]) {
     let each = out.iter_mut().zip(adjoint);
@@ -305,7 +304,6 @@ fn add_times(out: &mut [f64], adjoint: &[f64], values: &[Vec<f64>], factors: &[u
     }
 }
 
-/// Derivative of `function` at `argument`, where it has the value `value`.
 fn slope(function: Function, argument: f64, value: f64) -> f64 {
     match function {
         Function::Sin => argument.cos(),
