@@ -78,9 +78,7 @@ impl ScaleOptions {
 pub(super) struct Jump {
     pub path: PathBuf,
     pub time_s: Vec<f64>,
-    /// States, `18 x n`.
     pub x: DMatrix<f64>,
-    /// Velocities, `18 x n`.
     pub dx: DMatrix<f64>,
     /// Accelerations smoothed within each phase, `18 x n`.
     pub ddx: DMatrix<f64>,
@@ -105,10 +103,8 @@ impl Jump {
     }
 }
 
-/// All jumps of a set of recordings, with the phases of the model.
 #[derive(Clone, Debug)]
 pub(super) struct Dataset {
-    /// Jumps in the order of the files and their segments.
     pub jumps: Vec<Jump>,
     pub phases: PhaseRule,
     /// Units of everything in [`Self::jumps`].
@@ -207,7 +203,6 @@ impl Dataset {
         own.map(|(jump, (_, range))| (jump, range.clone()))
     }
 
-    /// Complains unless there are jumps and enough samples of every phase.
     pub(super) fn check_for_training(&self) -> Result<(), TrainError> {
         if self.jumps.is_empty() {
             return Err(TrainError::NoRecording);

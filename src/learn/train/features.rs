@@ -292,7 +292,6 @@ fn add_adjoints(
     }
 }
 
-/// Adds to `out` the adjoint times the values of the steps `factors`.
 #[inline(always)]
 fn add_times(out: &mut [f64], adjoint: &[f64], values: &[Vec<f64>], factors: &[usize]) {
     let each = out.iter_mut().zip(adjoint);

@@ -18,9 +18,7 @@ use crate::evaluate::{eigenvalues, state_matrix};
 
 /// Steps of least change before coefficients are scaled down instead.
 const STEPS: usize = 30;
-/// Halvings after which nothing is left that could grow.
 const HALVINGS: usize = 100;
-/// Halvings of a step until it makes growth slower.
 const SHORTENED: i32 = 6;
 /// Share of the bound that steps aim at.
 const AIM: f64 = 0.99;
@@ -55,7 +53,6 @@ impl Growth {
         }
     }
 
-    /// Whether no phase grows faster than the bound, nor the sequence of phases.
     pub(super) fn admits(&self, xi: &[Xi]) -> bool {
         self.excess(&self.lower_halves(xi)) == [0.0; 2]
     }

@@ -59,12 +59,8 @@ impl<'a> Judge<'a> {
         relative
     }
 
-    /// Score of coefficients, see [`Choice::score`](super::select::Choice::score); infinite if a rollout diverges.
-    pub(super) fn score(&self, xi: &[Xi]) -> f64 {
-        self.score_within(xi, f64::MAX)
-    }
-
-    /// The same, or a number above `limit` if the score is: whole jumps are left out if 0.1 s are enough to know.
+    /// Score of coefficients, see [`Choice::score`](super::select::Choice::score), infinite if a rollout diverges; or a
+    /// number above `limit` if it is: whole jumps are left out if 0.1 s are enough to know.
     pub(super) fn score_within(&self, xi: &[Xi], limit: f64) -> f64 {
         let short = self.error(xi, SHORT);
         if short > limit {
@@ -157,7 +153,6 @@ impl<'a> Judge<'a> {
             .unwrap_or(f64::INFINITY)
     }
 
-    /// Mean squares of the errors, a coordinate.
     fn mean_squares(&self, xi: &[Xi], kind: usize) -> Vec<f64> {
         let (mut squares, mut count) = (vec![0.0; self.scales[kind].len()], 0);
         for part in self.parts() {
@@ -179,7 +174,6 @@ fn are_finite(errors: &[DVector<f64>; 2]) -> bool {
     errors.iter().flatten().all(|error| error.is_finite())
 }
 
-/// Standard deviation of a latent coordinate over all samples.
 fn row_std(latent: &[Latent], row: usize) -> f64 {
     let rows = || latent.iter().map(|samples| samples.z.row(row));
     let n = rows().map(|z| z.len()).sum::<usize>().max(1) as f64;

@@ -151,7 +151,6 @@ pub(super) fn lift_samples(
     lifted
 }
 
-/// `W_e`, of a nonlinear encoder the mean of its Jacobian over the samples of a dataset.
 pub(super) fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f64> {
     if let Some(linear) = encoder.as_affine() {
         return linear.weights().clone();

@@ -12,14 +12,11 @@ use super::rollout::{Candidate, Window, plain, predict, windows};
 use super::select::Choice;
 use crate::model::{ReducedModel, StateMap};
 use crate::recording::Recording;
-use crate::robot::JOINT_DIM;
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM};
 use crate::sim::{Restart, phase_rule};
-
-pub use crate::robot::{BODY_X, BODY_Z};
 
 /// Rows of the state that say where the robot is on the floor and which way it looks: x, y, yaw.
 pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5];
-/// Length of the short predictions.
 const SHORT_S: f64 = 0.1;
 /// Window over which the accelerations behind `ddz_r2` are averaged, in samples.
 const SMOOTHING: usize = 11;
@@ -89,7 +86,6 @@ pub(super) fn measure(
     }
 }
 
-/// Root mean square errors of decoded body x and z, in metres, over all predicted samples of the windows.
 fn body_rms(
     candidate: Candidate<'_>,
     decoder: &StateMap,
@@ -172,7 +168,6 @@ pub struct Trained {
 /// Figures of a training, as the provenance carries them too.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrainReport {
-    /// Coordinates that the encoder looks at.
     pub encoded: Vec<String>,
     /// Share of the input's energy that the latent input cannot carry.
     pub lift_loss: f64,
@@ -189,13 +184,11 @@ pub struct TrainReport {
     /// Of the parts of the training jumps' prior; empty without one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub deviations: Vec<PartScore>,
-    /// Figures on the training recordings.
     pub training: SetMetrics,
     /// Figures on the validation recordings, if there were any.
     pub validation: Option<SetMetrics>,
 }
 
-/// How well the accelerations' deviations in one part of a jump are explained.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartScore {
     pub part: String,
@@ -204,7 +197,6 @@ pub struct PartScore {
     pub ddz_r2: f64,
 }
 
-/// Number of coefficients that are not zero in one phase.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PhaseTerms {
     pub phase: String,

@@ -8,7 +8,7 @@ use super::closed_form::closed_form;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
 use super::joint::{Integrator, LossWeights, Schedule, Unroll, joint};
-use super::metrics::{BODY_X, BODY_Z, Trained};
+use super::metrics::Trained;
 use super::progress::Monitor;
 use super::task::{Origin, Recordings};
 use crate::limits::table;
@@ -18,7 +18,9 @@ use crate::model::{
 use crate::recording::PhaseRule;
 use crate::recording::phases::CHATTER_SAMPLES;
 use crate::recording::preprocess::BATCH_ROWS;
-use crate::robot::{Actuators, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
+use crate::robot::{
+    Actuators, BODY_X, BODY_Z, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame,
+};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -57,7 +59,6 @@ pub struct TrainOptions {
     pub seed: u64,
     /// How many seeds are tried, counting up from `seed`; the best is kept.
     pub n_seeds: usize,
-    /// Factors from SI to scaled units.
     pub scaling: ScaleOptions,
     /// Losses of the joints that are subtracted from the recorded torques; none if the motors' torques count.
     pub actuators: Option<Actuators>,
@@ -71,7 +72,6 @@ pub struct TrainOptions {
 pub struct JointOptions {
     pub schedule: Schedule,
     pub weights: LossWeights,
-    /// Value that all coefficients start at.
     pub xi_start: f64,
     /// Seeds trained at the same time; the result does not depend on it.
     pub threads: usize,
@@ -110,13 +110,11 @@ pub struct EncoderOptions {
     pub least_std: f64,
     /// Coordinates with a larger share of the input's energy count as actuated.
     pub least_input_share: f64,
-    /// Whether the latent basis is rotated by varimax.
     pub rotate: bool,
     pub coordinates: Coordinates,
     pub restarts: usize,
 }
 
-/// What the rows of a linear encoder are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
@@ -129,7 +127,6 @@ pub enum Coordinates {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegressionOptions {
-    /// Window of the moving average over accelerations, in samples.
     pub smoothing: usize,
     /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
     pub slack: f64,
@@ -140,7 +137,6 @@ pub struct RegressionOptions {
 }
 
 impl TrainOptions {
-    /// The defaults for a latent dimension.
     pub fn new(name: impl Into<String>, latent_dim: usize) -> Self {
         Self {
             name: name.into(),
@@ -175,7 +171,6 @@ impl TrainOptions {
         }
     }
 
-    /// How samples of a robot become inputs under these settings.
     pub fn input_rule(&self, robot: &'static Robot) -> InputRule {
         InputRule::new(robot, self.actuators.clone(), self.wrench_frame)
     }
@@ -305,7 +300,6 @@ impl JointOptions {
 }
 
 impl MapOptions {
-    /// Whether encoder and decoder are affine maps.
     pub fn is_linear(&self) -> bool {
         self.encoder_layers.is_empty() && self.decoder_layers.is_empty()
     }

@@ -23,7 +23,6 @@ impl Random {
         ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
     }
 
-    /// Entries uniform in `-bound .. bound`.
     pub(super) fn matrix(&mut self, n_rows: usize, n_columns: usize, bound: f64) -> DMatrix<f64> {
         DMatrix::from_fn(n_rows, n_columns, |_, _| bound * self.signed())
     }

@@ -13,7 +13,6 @@ use super::sparse::{Knowledge, active_terms, brake};
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
 const PRIOR: f64 = 1e-3;
-/// Relative step of the difference quotients.
 const STEP: f64 = 1e-6;
 const ATTEMPTS: usize = 6;
 const TOGETHER: usize = 64;
@@ -41,7 +40,6 @@ struct FreeCoefficients {
 }
 
 impl FreeCoefficients {
-    /// The free coefficients that are active in `xi`.
     fn of(xi: &[Xi], knowledge: &[Knowledge]) -> Self {
         let mut free = Self {
             indices: Vec::new(),
@@ -62,7 +60,6 @@ impl FreeCoefficients {
         DVector::from_iterator(self.indices.len(), values)
     }
 
-    /// Adds relative changes.
     fn add(&self, xi: &mut [Xi], change: &DVector<f64>) {
         let changes = change.component_mul(&self.scales);
         for (&(phase, term, k), change) in self.indices.iter().zip(changes.iter()) {
@@ -113,7 +110,6 @@ impl Refiner<'_> {
         self.descend(start, &free, weights, steps, monitor)
     }
 
-    /// Levenberg-Marquardt on relative changes; the coefficients that `judge` scores best.
     fn descend(
         &self,
         start: Coefficients,
@@ -128,7 +124,7 @@ impl Refiner<'_> {
         let mut current = start.xi.clone();
         self.admit(&mut current, free, Clone::clone);
         let mut best = Coefficients {
-            score: self.score(&current),
+            score: self.score_within(&current, f64::MAX),
             xi: current.clone(),
         };
         let mut damping = 1e-3;
@@ -153,7 +149,7 @@ impl Refiner<'_> {
                 (after < before).then_some((trial, after))
             });
             let Some((trial, after)) = lower else { break };
-            let score = self.score(&trial);
+            let score = self.score_within(&trial, f64::MAX);
             monitor.done(format!("score {score:.4}"));
             if score < best.score {
                 let xi = trial.clone();
@@ -184,12 +180,7 @@ impl Refiner<'_> {
         brake(self.knowledge, xi);
     }
 
-    /// Score of coefficients, infinite if they grow faster than they may or diverge.
-    fn score(&self, xi: &[Xi]) -> f64 {
-        self.score_within(xi, f64::MAX)
-    }
-
-    /// The same, or a number above `limit` if the score is.
+    /// Score of coefficients, infinite if they grow faster than they may or diverge; or a number above `limit` if it is.
     pub(super) fn score_within(&self, xi: &[Xi], limit: f64) -> f64 {
         match self.growth.admits(xi) {
             true => self.judge.score_within(xi, limit),
@@ -216,7 +207,6 @@ impl Refiner<'_> {
         Some(squares.map(|square: f64| square.sqrt().max(f64::MIN_POSITIVE).recip()))
     }
 
-    /// The squared errors about `xi`; none if a rollout diverges.
     fn model(&self, xi: &[Xi], free: &FreeCoefficients, weights: [f64; 2]) -> Option<ErrorModel> {
         let n = free.indices.len();
         let mut model = ErrorModel {

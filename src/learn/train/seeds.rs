@@ -13,7 +13,7 @@ use super::task::{Fitted, Origin, Task, provenance};
 use crate::model::{LatentVariable, Library, ModelError};
 
 /// What a seed came to and its numbers, or why it has none.
-pub type Outcome = Result<(SeedReport, Fitted), TrainError>;
+pub(super) type Outcome = Result<(SeedReport, Fitted), TrainError>;
 
 #[derive(Default)]
 pub(super) struct Seeds {

@@ -154,7 +154,7 @@ impl Trial<'_> {
     }
 
     fn score_by(&mut self, judge: &Judge<'_>) {
-        self.now.score = judge.score(&self.now.xi);
+        self.now.score = judge.score_within(&self.now.xi, f64::MAX);
     }
 
     /// Changes the coefficients until their growth keeps the bound, the least as the normal equations weigh it.
@@ -233,7 +233,7 @@ impl Refiner<'_> {
                 let fits: Vec<Vec<Xi>> = fits.collect();
                 for (number, pruning) in PRUNINGS.into_iter().enumerate() {
                     let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
-                    let score = self.judge.score(&xi);
+                    let score = self.judge.score_within(&xi, f64::MAX);
                     let mut trial = Trial {
                         now: Coefficients { xi, score },
                         regressions,

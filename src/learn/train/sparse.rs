@@ -7,9 +7,8 @@ use serde::Serialize;
 
 use super::dataset::Dataset;
 use super::features::Features;
-use super::metrics::BODY_Z;
 use super::subspace::Frame;
-use crate::robot::{FeetRule, GRAVITY_M_S2};
+use crate::robot::{BODY_Z, FeetRule, GRAVITY_M_S2};
 
 /// Least ridge on the normalised columns: far above rounding.
 const LEAST_RIDGE: f64 = 1e-10;
@@ -368,25 +367,19 @@ impl Knowledge {
             };
             fix(0..d, &mut (0..1));
             fix(0..HELD, &mut (0..d));
-            let flies = phase.feet == FeetRule::None;
-            match flies {
-                true => fix(0..d, &mut (2 * d..2 * d + HELD)),
-                false => fix(
-                    1..2,
-                    &mut (0..3 * d).filter(|i| ![upwards, force_upwards].contains(i)),
-                ),
-            }
-            if flies {
+            let one = features.constant_term();
+            if phase.feet == FeetRule::None {
+                fix(0..d, &mut (2 * d..2 * d + HELD));
                 knowledge.free.column_mut(0).fill(false);
-            }
-            if let Some(one) = features.constant_term() {
-                match flies {
-                    true => {
-                        knowledge.known[(one, 1)] = gravity;
-                        knowledge.free.column_mut(1).fill(false);
-                    }
-                    false => knowledge.kept[(one, 1)] = true,
+                if let Some(one) = one {
+                    knowledge.known[(one, 1)] = gravity;
+                    knowledge.free.column_mut(1).fill(false);
                 }
+            } else {
+                let own = [upwards, force_upwards];
+                fix(1..2, &mut (0..3 * d).filter(|i| !own.contains(i)));
+                one.into_iter()
+                    .for_each(|one| knowledge.kept[(one, 1)] = true);
             }
             let inputs = (0..d).map(|k| (2 * d + k, k));
             for (variable, k) in inputs.chain((0..HELD).map(|k| (d + k, k))) {

@@ -7,10 +7,9 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::dataset::{Dataset, Jump, scaled};
-use super::metrics::{BODY_X, BODY_Z};
 use super::options::{Coordinates, EncoderOptions};
 use super::random::Random;
-use crate::robot::{FeetRule, GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
+use crate::robot::{BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 #[derive(Clone, Debug)]
 pub(super) struct Moments {

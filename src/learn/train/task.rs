@@ -14,9 +14,7 @@ use super::features::{FeatureValues, Features};
 use super::joint::Losses;
 use super::judge::Judge;
 use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
-use super::metrics::{
-    BODY_X, BODY_Z, PLACE, PhaseTerms, SeedReport, SetMetrics, TrainReport, measure,
-};
+use super::metrics::{PLACE, PhaseTerms, SeedReport, SetMetrics, TrainReport, measure};
 use super::options::{EncoderOptions, TrainOptions};
 use super::progress::Monitor;
 use super::rollout::{Candidate, Xi};
@@ -30,7 +28,7 @@ use crate::model::{
     ReducedModel, ScaleFactors, Scaling, StateMap,
 };
 use crate::recording::Recording;
-use crate::robot::Robot;
+use crate::robot::{BODY_X, BODY_Z, Robot};
 
 /// Recordings to learn from and to choose by.
 #[derive(Clone, Copy, Debug)]

@@ -11,8 +11,7 @@ mod parameters;
 mod run;
 mod unroll;
 
-pub use descent::Schedule;
-pub use loss::LossWeights;
-pub(crate) use loss::Losses;
+pub(super) use descent::Schedule;
+pub(super) use loss::{LossWeights, Losses};
 pub use run::joint;
 pub use unroll::{Integrator, Unroll};

@@ -11,10 +11,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::super::dataset::{Dataset, Jump};
 use super::super::latent::Latent;
-use super::super::metrics::BODY_Z;
 use super::Sampled;
 use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
-use crate::robot::{ContactFlags, FeetRule};
+use crate::robot::{BODY_Z, ContactFlags, FeetRule};
 
 /// The thrust begins when the body last rises more slowly than this before the feet leave, m/s.
 const THRUST_SPEED_M_S: f64 = 0.1;
@@ -60,13 +59,8 @@ impl Cut {
     }
 }
 
-/// The cut of every jump; none where a jump has no flight with contact before it.
-pub(super) fn cuts(training: &Dataset) -> Vec<Option<Cut>> {
-    let jumps = training.jumps.iter();
-    jumps.map(|jump| cut(training, jump)).collect()
-}
-
-fn cut(training: &Dataset, jump: &Jump) -> Option<Cut> {
+/// None where a jump has no flight with contact before it.
+pub(super) fn cut(training: &Dataset, jump: &Jump) -> Option<Cut> {
     let scale = training.scaling.state[BODY_Z];
     let rising = |sample: usize| jump.dx[(BODY_Z, sample)] / scale > THRUST_SPEED_M_S;
     let patterns = &training.phases.patterns;

@@ -9,10 +9,11 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::dataset::{Dataset, centred, mean};
 use super::latent::{EncodedSet, Latent};
-use super::metrics::{BODY_X, BODY_Z, PartScore};
+use super::metrics::PartScore;
 use crate::model::{
     self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap, complement,
 };
+use crate::robot::{BODY_X, BODY_Z};
 use landmarks::{Cut, Fit, GoalRegression, PartNodes, intervals, of_commonest_kind, sample};
 
 /// Fewest jumps of one kind that say how jumps depend on their goal.
@@ -35,27 +36,14 @@ pub(super) fn learn_jumps(
     let Some(affine) = encoder.as_affine() else {
         return nothing;
     };
-    let cuts = landmarks::cuts(training);
+    let cuts = training.jumps.iter();
+    let cuts: Vec<_> = cuts.map(|jump| landmarks::cut(training, jump)).collect();
     let chosen = of_commonest_kind(&cuts);
     if chosen.len() < LEAST_JUMPS {
         return nothing;
     }
     let (kind, scale) = (&chosen[0].1.kind, &training.scaling.state);
-    let count = |part: usize| {
-        let all = chosen.iter().map(|(_, cut)| cut.duration_s(part));
-        (part, intervals(all.sum::<f64>() / chosen.len() as f64))
-    };
-    let counts: Vec<(usize, usize)> = (0..kind.len()).map(count).collect();
-    let of_jump = |&(jump, cut): &(usize, &Cut)| {
-        let (samples, latent) = (&training.jumps[jump], &latent[jump]);
-        let parts = counts.iter();
-        let parts = parts.map(|&(part, count)| sample(samples, latent, cut, part, count));
-        Sampled {
-            goal: goal_of(training, jump, cut),
-            parts: parts.collect(),
-        }
-    };
-    let sampled: Vec<Sampled> = chosen.iter().map(of_jump).collect();
+    let sampled = sampled(set, &chosen);
     let translation = affine.weights().column(BODY_X).into_owned();
     let heights = |jump: usize| training.jumps[jump].x.row(BODY_Z) / scale[BODY_Z];
     let mut start = DVector::zeros(scale.len());
@@ -94,6 +82,24 @@ pub(super) fn learn_jumps(
         parts,
     };
     (Some(prior), scores)
+}
+
+fn sampled(set: EncodedSet<'_>, chosen: &[(usize, &Cut)]) -> Vec<Sampled> {
+    let count = |part: usize| {
+        let all = chosen.iter().map(|(_, cut)| cut.duration_s(part));
+        (part, intervals(all.sum::<f64>() / chosen.len() as f64))
+    };
+    let counts: Vec<(usize, usize)> = (0..chosen[0].1.kind.len()).map(count).collect();
+    let of_jump = |&(jump, cut): &(usize, &Cut)| {
+        let (samples, latent) = (&set.dataset.jumps[jump], &set.latent[jump]);
+        let parts = counts.iter();
+        let parts = parts.map(|&(part, count)| sample(samples, latent, cut, part, count));
+        Sampled {
+            goal: goal_of(set.dataset, jump, cut),
+            parts: parts.collect(),
+        }
+    };
+    chosen.iter().map(of_jump).collect()
 }
 
 /// Distance, rise of the body at the apex and height at the start of a jump, m.
