@@ -59,11 +59,17 @@ impl ParameterVectors<'_> {
         matches!(self.role, Role::Output | Role::InOut)
     }
 
-    /// The tolerance of a point: a number, or an element of an array in these brackets of a language.
-    pub(crate) fn tolerance(&self, [open, close]: &[&str; 2]) -> String {
-        match &self.tolerances[..] {
-            [first, rest @ ..] if rest.iter().all(|other| other == first) => first.clone(),
-            all => format!("{open}{}{close}[point % {N_POINTS}]", all.join(", ")),
+    /// The tolerances of the points as a list, if they differ.
+    pub(crate) fn differing_tolerances(&self) -> Option<String> {
+        let differs = self.tolerances.windows(2).any(|pair| pair[0] != pair[1]);
+        differs.then(|| self.tolerances.join(", "))
+    }
+
+    /// The tolerance of `point`: a number, or an element of the list, which is named after the parameter.
+    pub(crate) fn tolerance(&self) -> String {
+        match self.differing_tolerances() {
+            None => self.tolerances[0].clone(),
+            Some(_) => format!("{}_tolerance[point % {N_POINTS}]", self.name),
         }
     }
 }

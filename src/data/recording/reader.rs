@@ -297,7 +297,7 @@ impl Column {
         // Hardly a name of the format.
         let hint = match missing.len() {
             0 => return Ok(columns),
-            ..30 => "",
+            1..30 => "",
             _ => {
                 "; for a log of another program `romc inspect --guess LOG` writes a map for --columns"
             }
