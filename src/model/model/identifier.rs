@@ -1,6 +1,7 @@
 //! Names that are safe in generated C, C++ and Rust.
 
 use super::*;
+use crate::symbolic::Function;
 
 /// Longest identifier in bytes, so that names made of model, phase and function stay readable.
 pub(crate) const MAX_IDENTIFIER_LEN: usize = 40;
@@ -22,6 +23,9 @@ impl Identifier {
         let identifier = name.replace(['-', '.', ' '], "_");
         let lower = identifier.to_ascii_lowercase();
         let is_listed = |(_, words): &&(&str, &str)| words.split(' ').any(|word| word == lower);
+        // C's library has all functions of the algebra under the same names, but for the sign.
+        let of_algebra = Function::ALL.into_iter().filter(|&f| f != Function::Sign);
+        let is_function = of_algebra.map(Function::name).any(|name| name == lower);
         let refusal = if name.is_empty() {
             "it is empty".to_owned()
         } else if length > MAX_IDENTIFIER_LEN {
@@ -40,6 +44,8 @@ impl Identifier {
             format!("`{identifier}` is a keyword of {language}")
         } else if let Some((owner, _)) = TAKEN.iter().find(is_listed) {
             format!("`{identifier}` is the name of {owner}")
+        } else if is_function {
+            format!("`{identifier}` is the name of a standard function or macro of C")
         } else {
             return Ok(Self(identifier));
         };
@@ -108,7 +114,7 @@ const TAKEN: [(&str, &str); 4] = [
     ),
     (
         "a standard function or macro of C",
-        "main null eof errno sin cos tan tanh exp log sqrt abs fabs pow isfinite isnan system",
+        "main null eof errno fabs pow isfinite isnan system",
     ),
     (
         "a crate that generated Rust builds on",
