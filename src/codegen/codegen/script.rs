@@ -29,16 +29,14 @@ pub enum Script {
 }
 
 /// Modules that a file of the same name would hide from NumPy, CasADi and the file itself.
-const MODULES: &str = "
-    numpy abc argparse array ast atexit base64 bisect builtins bz2 calendar cmath code codecs
-    collections concurrent contextlib contextvars copy copyreg csv ctypes dataclasses datetime
-    decimal dis email encodings enum errno fnmatch fractions functools gc genericpath getpass glob
-    gzip hashlib heapq hmac html http importlib inspect io itertools json keyword linecache locale
-    logging lzma marshal math mmap multiprocessing numbers opcode operator os pathlib pickle pkgutil
-    platform posixpath pprint queue random re secrets select selectors shutil signal site socket
-    stat statistics string struct subprocess sys sysconfig tempfile textwrap threading time token
-    tokenize traceback types typing unittest urllib
-";
+const MODULES: &str = "numpy abc argparse array ast atexit base64 bisect builtins bz2 calendar cmath code codecs \
+    collections concurrent contextlib contextvars copy copyreg csv ctypes dataclasses datetime \
+    decimal dis email encodings enum errno fnmatch fractions functools gc genericpath getpass glob \
+    gzip hashlib heapq hmac html http importlib inspect io itertools json keyword linecache locale \
+    logging lzma marshal math mmap multiprocessing numbers opcode operator os pathlib pickle pkgutil \
+    platform posixpath pprint queue random re secrets select selectors shutil signal site socket \
+    stat statistics string struct subprocess sys sysconfig tempfile textwrap threading time token \
+    tokenize traceback types typing unittest urllib";
 
 #[derive(Template)]
 #[template(config = "templates/askama.toml")]
@@ -153,16 +151,14 @@ fn column(numbers: &[usize]) -> String {
 
 /// C99. Reserved are the keywords of C and C++, and the library names that generated files use.
 pub(crate) const C: Spelling = Spelling {
-    reserved: "
-    auto break case char const continue default do double else enum extern float for goto if inline
-    int long register restrict return short signed sizeof static struct switch typedef union
-    unsigned void volatile while bool true false catch class delete explicit export friend mutable
-    namespace new noexcept nullptr operator private protected public template this throw try typeid
-    typename using virtual and or not xor main sin cos pow fabs memcpy size_t
-    uint64_t y0 y1 yn j0 j1 jn gamma signgam asm typeof constexpr concept requires import module
-    alignas alignof static_assert thread_local decltype div index time erf I NULL errno stdin stdout
-    stderr
-",
+    reserved: "auto break case char const continue default do double else enum extern float for goto if inline \
+        int long register restrict return short signed sizeof static struct switch typedef union \
+        unsigned void volatile while bool true false catch class delete explicit export friend mutable \
+        namespace new noexcept nullptr operator private protected public template this throw try typeid \
+        typename using virtual and or not xor main sin cos pow fabs memcpy size_t \
+        uint64_t y0 y1 yn j0 j1 jn gamma signgam asm typeof constexpr concept requires import module \
+        alignas alignof static_assert thread_local decltype div index time erf I NULL errno stdin stdout \
+        stderr",
     reals: ["double", "float"],
     suffixes: ["", "f"],
     not_finite: ["NAN", "INFINITY", "-INFINITY"],
@@ -210,12 +206,10 @@ pub(crate) const C: Spelling = Spelling {
 
 /// Rust without `std` or allocation. Reserved are its keywords and the names that generated crates use themselves.
 pub(crate) const RUST: Spelling = Spelling {
-    reserved: "
-    abstract as async await become box break const continue crate do dyn else enum extern false
-    final fn for gen if impl in let loop macro match mod move mut override priv pub ref return self
-    static struct super trait true try type typeof unsafe unsized use virtual where while yield f64
-    f32 usize std core libm math sin_cos sin_cos_reduced sign union
-",
+    reserved: "abstract as async await become box break const continue crate do dyn else enum extern false \
+        final fn for gen if impl in let loop macro match mod move mut override priv pub ref return self \
+        static struct super trait true try type typeof unsafe unsized use virtual where while yield f64 \
+        f32 usize std core libm math sin_cos sin_cos_reduced sign union",
     reals: ["f64", "f32"],
     suffixes: ["", ""],
     not_finite: ["f64::NAN", "f64::INFINITY", "f64::NEG_INFINITY"],
@@ -252,11 +246,9 @@ pub(crate) const RUST: Spelling = Spelling {
 
 /// Python on arrays of NumPy. Reserved are its keywords and the names that generated modules use themselves.
 pub(crate) const NUMPY: Spelling = Spelling {
-    reserved: "
-    False None True and as assert async await break class continue def del elif else except finally
-    for from global if import in is lambda nonlocal not or pass raise return try while with yield
-    match case type np casadi range list shape zip len float print _rows _sin_cos
-",
+    reserved: "False None True and as assert async await break class continue def del elif else except finally \
+        for from global if import in is lambda nonlocal not or pass raise return try while with yield \
+        match case type np casadi range list shape zip len float print _rows _sin_cos",
     scalar: "$name = $value",
     array: "$name = [$value]",
     declaration: "$name = [0.0] * $n",
@@ -292,12 +284,10 @@ pub(crate) const CASADI: Spelling = Spelling {
 
 /// MATLAB and Octave. Reserved are their keywords, and the names that generated files use themselves.
 pub(crate) const MATLAB: Spelling = Spelling {
-    reserved: "
-    arguments break case catch classdef continue else elseif end for function global if otherwise
-    parfor persistent return spmd switch try while do until unwind_protect end_try_catch endif
-    endfor endwhile endfunction endswitch methods properties events enumeration columns rows_of
-    model n zeros size numel repmat cell max error nargin sin cos power select
-",
+    reserved: "arguments break case catch classdef continue else elseif end for function global if otherwise \
+        parfor persistent return spmd switch try while do until unwind_protect end_try_catch endif \
+        endfor endwhile endfunction endswitch methods properties events enumeration columns rows_of \
+        model n zeros size numel repmat cell max error nargin sin cos power select",
     scalar: "$name = $value;",
     array: "$name = rows_of(n, $value);",
     declaration: "$name = zeros($n, n);",
