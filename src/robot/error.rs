@@ -6,13 +6,11 @@ use thiserror::Error;
 
 use super::joints::Leg;
 
-/// Faults of the robot stage.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RobotError {
     #[error("unknown robot `{found}`; known: {known}")]
     UnknownRobot { found: String, known: String },
-    /// The leg is so close to full extension (or its foot so close to the axis of hip abduction) that torques do not
-    /// determine a foot force.
+    /// So close to full extension (or the foot to the hip abduction's axis) that torques determine no foot force.
     #[error(
         "{robot}: leg {leg} is singular at hx {:.4}, hy {:.4}, kn {:.4} rad: \
          normalised determinant {determinant:.2e}, expected at least {bound:.0e}; \

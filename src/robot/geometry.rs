@@ -36,7 +36,6 @@ pub struct LegLinks {
     pub calf: Vector3<f64>,
 }
 
-/// Axes of the usual leg: x, y, y.
 const USUAL_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
 
 /// Whether a leg abducts about x, bends about y and hangs straight down but for its foot.
@@ -140,8 +139,7 @@ impl LegGeometry {
         write_force_map(&self.shape, q, is_exact, &mut map, &mut foot).then(|| matrix(&map))
     }
 
-    /// Directions and lengths at the zero posture. The foot's offset from a straight calf is left out of a leg of the
-    /// usual shape.
+    /// Axes and links at the zero posture, without the foot's offset from a straight calf in the usual shape.
     pub fn links(&self) -> LegLinks {
         let mut links = self.links;
         if is_usual(&self.axes, &self.links) {
@@ -165,9 +163,7 @@ fn matrix(rows: &[[f64; 3]; 3]) -> Matrix3<f64> {
     Matrix3::from_fn(|row, column| rows[row][column])
 }
 
-/// A quadruped with three joints per leg: abduction, flexion, knee.
-///
-/// `romc_model::robot_file` reads and checks robots; arrays are in the order of the state.
+/// A quadruped with abduction, flexion, knee per leg, read by `romc_model::robot_file`; arrays in the state's order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Robot {
     /// Name in model files and on the command line.

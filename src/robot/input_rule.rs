@@ -1,14 +1,10 @@
-//! From a measured sample to the generalised input `u = [tau; F; M]`, the one definition.
+//! From a measured sample to the generalised input `u = [tau; F; M]`, the one definition. A model states which rule its
+//! inputs were made by; training, simulation, control and generated code all follow it.
 //!
-//! `tau` are the torques at the links: the motor torques less what the joints take ([`Actuators`]). `F` and `M` follow
-//! from them through the feet in contact, in one of two frames ([`WrenchFrame`]). A model states which rule its inputs
-//! were made by; training, simulation, control and generated code all follow it.
-//!
-//! What the joints take from a motor's torque before it moves a leg.
-//!
-//! A motor that commands `tau` turns a link with the net torque `tau - b dq - c tanh(dq / v) - I ddq`: viscous
-//! friction, dry friction, and the rotor's inertia seen through the gear (the armature). The dry part is smooth around
-//! standstill, with `v` = [`DRY_SPEED_RAD_S`].
+//! `tau` are the torques at the links: a motor torque `t` less the joint's losses, `t - b dq - c tanh(dq / v) - I ddq`
+//! ([`Actuators`]): viscous friction, dry friction (smooth around standstill, `v` = [`DRY_SPEED_RAD_S`]) and the
+//! rotor's inertia seen through the gear (armature). `F` and `M` follow through the feet in contact, in a
+//! [`WrenchFrame`].
 
 use nalgebra::{ArrayStorage, Matrix3, SMatrix, Vector6};
 
@@ -90,8 +86,7 @@ impl InputRule {
         self.frame
     }
 
-    /// What the joints take at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2), in N m; zero without
-    /// actuators.
+    /// [`Actuators::losses`] in N m at `dq` (rad/s) and `ddq` (rad/s^2); zero without actuators.
     pub fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         match &self.actuators {
             None => [0.0; JOINT_DIM],
@@ -100,9 +95,7 @@ impl InputRule {
     }
 
     /// Force and moment on the body `[F; M]`, in N and N m, of the torques at the links `net` (N m) at a state `x`
-    /// (joint angles and attitude count), by the feet in contact.
-    ///
-    /// Near a singularity of a leg its force is damped, see [`Robot::damped_force_map`].
+    /// (joint angles and attitude count), by the feet in contact; damped as in [`Robot::damped_force_map`].
     pub fn wrench(
         &self,
         x: &[f64; STATE_DIM],
@@ -134,8 +127,7 @@ impl InputRule {
     }
 }
 
-/// The product, to the bit as nalgebra has it, which calls a function out of line for each column and factor: every
-/// entry is the sum of its products in their order.
+/// Sums of products in their order, to the bit as nalgebra's, without its call for each column and factor.
 fn product(
     left: &SMatrix<f64, BODY_DIM, BODY_DIM>,
     right: &SMatrix<f64, BODY_DIM, JOINT_DIM>,
@@ -223,8 +215,7 @@ impl Actuators {
         })
     }
 
-    /// What the joints take at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2), in N m: `b dq + c tanh(dq /
-    /// v) + I ddq`.
+    /// `b dq + c tanh(dq / v) + I ddq`, in N m, at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2).
     #[must_use]
     pub fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         std::array::from_fn(|i| {

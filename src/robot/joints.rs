@@ -1,7 +1,5 @@
-//! Names and order of joints, legs and body coordinates.
-//!
-//! One order holds everywhere: legs front right, front left, rear right, rear left; in each leg hip abduction, hip
-//! flexion, knee; then the body's position and its roll, pitch and yaw.
+//! Names and order of joints, legs and body coordinates, the same everywhere: legs front right, front left, rear right,
+//! rear left; in each hip abduction, hip flexion, knee; then the body's position and its roll, pitch and yaw.
 
 use std::fmt;
 

@@ -1,10 +1,9 @@
 //! Joints, legs, geometry and limits of quadrupeds.
 //!
-//! Enters: joint angles, joint torques and contact flags. Leaves: foot positions, leg Jacobians, the force and moment
-//! that the legs put on the body (equations 4 to 8, 22 and 23), and the limits a command has to keep. Read [`joints`]
-//! for names and order first, then [`leg`] for one leg, `wrench` for all four and [`input_rule`]
-//! for the inputs of a model; `romc_model::robot_file` reads robots from files; generated controllers hold these
-//! sources.
+//! Joint angles, torques and contact flags enter; foot positions, leg Jacobians, the force and moment of the legs on
+//! the body (equations 4 to 8, 22 and 23) and limits of commands leave. Read [`joints`] for names and order first, then
+//! [`leg`] for one leg, `wrench` for all four and [`input_rule`] for the inputs of a model; `romc_model::robot_file`
+//! reads robots from files; generated controllers hold these sources.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};

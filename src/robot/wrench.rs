@@ -1,11 +1,8 @@
-//! From joint torques to the force and moment on the body.
+//! From joint torques to the force and moment on the body; rules on which feet are on the ground.
 //!
 //! Equation 4 with the sign of a reaction: the feet push the ground with `J^-T tau`, the ground pushes the body with
-//! `F_k = -J_k^-T tau_k`. Forces are expressed in axes parallel to the body's, and the arm `x_k` of the moment is the
-//! foot in its own hip frame, as in the recordings the method was published with; the moment is `x_k x F_k` (the paper
-//! prints `F_k x x_k`).
-//!
-//! Rules on which feet are on the ground.
+//! `F_k = -J_k^-T tau_k`. Forces are in axes parallel to the body's; the moment is `x_k x F_k` (the paper prints `F_k x
+//! x_k`) with the foot in its own hip frame as the arm, as in the recordings the method was published with.
 
 use std::fmt;
 
@@ -18,13 +15,11 @@ use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg};
 use super::leg::{SINGULAR_BOUND, add_wrench};
 
 impl Robot {
-    /// Force of a leg in contact on the body, in N: `F = -J^-T tau` (equation 4).
-    ///
-    /// `q` in rad, `tau` in N m: abduction, flexion, knee.
+    /// Force of a leg in contact on the body, in N: `F = -J^-T tau` (equation 4), at `q` in rad and `tau` in N m:
+    /// abduction, flexion, knee.
     ///
     /// # Errors
-    /// [`RobotError::SingularLeg`] at full extension (see [`SINGULAR_BOUND`]), [`RobotError::NotFinite`] for NaN or
-    /// infinite arguments.
+    /// [`RobotError::SingularLeg`] at full extension (see [`SINGULAR_BOUND`]), [`RobotError::NotFinite`].
     pub fn foot_force(
         &self,
         leg: Leg,
@@ -50,13 +45,10 @@ impl Robot {
         geometry.force_map(q, true).ok_or_else(singular)
     }
 
-    /// As [`Robot::foot_force_map`], for any posture.
-    ///
-    /// Near a singularity small torques would mean any force: a stretched knee, or a foot at the height of its hip,
-    /// where the abduction has no lever. There the levers are kept from getting shorter than
+    /// As [`Robot::foot_force_map`], for any posture. Near a singularity (a stretched knee, or a foot at the height of
+    /// its hip, where the abduction has no lever) small torques would mean any force; levers there stay above
     /// [`LEAST_SPAN`](super::leg::LEAST_SPAN) thigh calf over the distance of the foot and
-    /// [`LEAST_HEIGHT`](super::leg::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm; everywhere else the
-    /// matrix is the exact one.
+    /// [`LEAST_HEIGHT`](super::leg::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm. Elsewhere it is exact.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
         match self.geometry(leg).force_map(q, false) {
@@ -99,8 +91,7 @@ impl Robot {
         Ok(wrench.into())
     }
 
-    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` at a posture and contact, by the arms of a frame, in axes
-    /// parallel to the body's; columns of legs in the air are zero.
+    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` in [`Self::wrench_by_arms`]; zero columns for legs in the air.
     pub(super) fn map_by_arms(
         &self,
         frame: WrenchFrame,

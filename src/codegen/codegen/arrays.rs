@@ -225,8 +225,7 @@ impl Translator<'_> {
         matrix
     }
 
-    /// The output array in which each row is a run of elements, all equally far apart, if nothing in it is still to be
-    /// read.
+    /// The output array in which these rows are equally far apart, if nothing in it is still to be read.
     fn output_matrix(&self, first: usize, rows: usize, cols: usize) -> Option<MatrixStorage> {
         let results = self.program.results();
         let find = |value: usize| results.iter().position(|e| e.value.index() == value);

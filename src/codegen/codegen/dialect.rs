@@ -1,11 +1,6 @@
-//! What languages spell differently: a table of patterns per language.
-//!
-//! In a pattern `$name` and its like stand for what is filled in; `$model`, `$upper`, `$real` and `$f` (identifier of
-//! the model, the same in upper case, type of numbers, suffix of literals) are known everywhere.
-//!
-//! Arrays and functions of generated code, before a dialect spells them.
-//!
-//! Breaking lists and comments into lines.
+//! The spellings of a language as a table of patterns; arrays and functions before they are spelled; lists and comments
+//! broken into lines. `$name` and its like in a pattern stand for what is filled in; `$model`, `$upper`, `$real` and
+//! `$f` (identifier of the model, the same in upper case, type of numbers, suffix of literals) are known everywhere.
 
 use super::ident::Ident;
 use super::options::Precision;
@@ -25,8 +20,7 @@ pub(crate) struct Spelling {
     /// An array of `$n` elements that are assigned later.
     pub declaration: &'static str,
     pub assignment: &'static str,
-    /// `+=`, where the language has it.
-    pub addition: Option<&'static str>,
+    pub addition: Option<&'static str>, // `+=`, where the language has it
     /// Head of a loop of `$name` from 0 to below `$n`, or to `$last`; and what closes its body.
     pub loop_head: &'static str,
     pub loop_end: Option<&'static str>,
@@ -34,8 +28,7 @@ pub(crate) struct Spelling {
     pub continuation: &'static str,
     /// Sum, difference, product and quotient, with the spaces around them.
     pub operators: [&'static str; 4],
-    /// Function `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two operations by
-    /// themselves.
+    /// `f(a, b, c) = a*b + c` for loops, in a language whose compilers never fuse the two by themselves.
     pub multiply_add: Option<&'static str>,
     /// A function `$name` of `$a`, and the functions that are spelled otherwise.
     pub function: &'static str,
@@ -47,8 +40,7 @@ pub(crate) struct Spelling {
     pub element: &'static str,
     pub entry: &'static str,
     pub first_index: usize,
-    /// Arrays that a call reads or writes: a whole parameter, a whole local array, elements from `$first` (`$next` from
-    /// one) to below `$end`.
+    /// Arrays of a call: whole parameter, whole local array, elements from `$first` (`$next` from one) to below `$end`.
     pub read: [&'static str; 3],
     pub written: [&'static str; 3],
     /// Calls of the sine-and-cosine kernel for `$n` angles and of a generated function.
@@ -60,13 +52,11 @@ pub(crate) struct Spelling {
     /// What stands for a result of the core that is not used, if it may be left out.
     pub unused_lane: Option<&'static str>,
     pub prefix: &'static str,
-    /// Beginning of the names of constant tables, a table, and its rows: what opens them, stands after every eighth
-    /// entry and closes them.
+    /// Beginning of the names of tables; a table; what opens its rows, follows each eighth entry and closes them.
     pub table_base: &'static str,
     pub table: &'static str,
     pub rows: [&'static str; 3],
-    /// Head of a function with its parameters: arrays that are read, arrays that are written, scalars; and the mention
-    /// of a parameter that nothing reads.
+    /// Head of a function; its parameters: arrays read, arrays written, scalars; mention of one that nothing reads.
     pub head: &'static str,
     pub parameters: [&'static str; 3],
     pub mention: &'static str,
@@ -75,8 +65,7 @@ pub(crate) struct Spelling {
 #[derive(Clone)]
 pub(crate) struct Dialect {
     pub spelling: &'static Spelling,
-    /// Identifier of the model, the beginning of all external names in C.
-    pub model: String,
+    pub model: String, // identifier, the beginning of all external names in C
     pub precision: Precision,
 }
 
@@ -209,8 +198,7 @@ impl Dialect {
         self.fill(self.spelling.head, &words)
     }
 
-    /// The function without its documentation, with a mention of each parameter that nothing reads; ends without a
-    /// newline.
+    /// The function without documentation and last newline; with a mention of each parameter that nothing reads.
     pub(crate) fn definition(&self, function: &Function) -> String {
         let mention = |name: &Ident| self.fill(self.spelling.mention, &[("name", name.as_str())]);
         let unused = function.unused.iter();
@@ -224,7 +212,6 @@ impl Dialect {
 /// A subscript `offset + sum_i stride_i * name_i`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Index {
-    /// Strides and the variables that they multiply.
     pub terms: Vec<(usize, Ident)>,
     pub offset: usize,
 }
@@ -259,7 +246,6 @@ pub(crate) struct Span {
     pub offset: usize,
     pub len: usize,
     pub of: usize,
-    /// Whether the array is a parameter of the function rather than a local array.
     pub is_parameter: bool,
 }
 
@@ -291,8 +277,7 @@ pub(crate) enum Role {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Parameter<N = Ident> {
     pub name: N,
-    /// Number of elements; an output may have none.
-    pub len: usize,
+    pub len: usize, // an output may have none
     pub role: Role,
 }
 
@@ -300,7 +285,6 @@ pub(crate) struct Function {
     pub name: Ident,
     pub docs: Vec<String>,
     pub parameters: Vec<Parameter>,
-    /// Parameters that the body does not mention.
     pub unused: Vec<Ident>,
     pub body: String,
 }
@@ -338,8 +322,7 @@ impl Function {
     }
 }
 
-/// `{a, b, c}`, broken with `indent` after every eight elements of a long list; an `indent` without a newline leaves
-/// breaking to the printer.
+/// `{a, b, c}` with `indent` after every eight elements; one without a newline leaves breaking to the printer.
 pub(crate) fn braced(elements: &[String], indent: &str) -> String {
     let lines: Vec<String> = elements.chunks(8).map(|line| line.join(", ")).collect();
     format!("{{{}}}", lines.join(&format!(",{indent}")))

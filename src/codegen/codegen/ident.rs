@@ -21,7 +21,6 @@ impl fmt::Display for Ident {
     }
 }
 
-/// Mints the names of one scope: identifiers, no keyword, none twice.
 pub(crate) struct Namer {
     used: BTreeSet<String>,
 }
@@ -34,9 +33,7 @@ impl Namer {
         Self { used }
     }
 
-    /// The wanted name if it is free, otherwise the name with the first free number.
-    ///
-    /// Characters that no identifier may have become underscores.
+    /// The wanted name, with underscores for other characters, and with the first free number if it is taken.
     pub(crate) fn mint(&mut self, wanted: &str) -> Ident {
         let mut base: String = wanted
             .chars()

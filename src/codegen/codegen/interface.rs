@@ -25,12 +25,10 @@ pub struct PhaseInterface {
     pub(crate) step: FunctionSpec,
 }
 
-/// Everything that is generated for a model.
 #[derive(Clone, Debug)]
 pub struct ModelInterface {
     pub identifier: String,
     pub name: String,
-    /// Units of robot coordinates at the interface.
     pub units: Units,
     /// Whether latent quantities are in physical units instead of the model's scaled ones.
     pub is_physical: bool,
@@ -42,7 +40,6 @@ pub struct ModelInterface {
 }
 
 impl ModelInterface {
-    /// Lowers all functions of a model.
     pub fn new(system: &Equations<'_>, form: Form, units: Units) -> Result<Self, LowerError> {
         let model = &units.convert(system.model())?;
         let phases = (0..model.phases().len())
@@ -93,8 +90,7 @@ pub(super) fn computes_angles(statement: &Statement) -> bool {
     matches!(statement, Statement::SinCos { .. })
 }
 
-/// What computes the input of the maps, and torques of the motors from it, if the model is over a known robot's
-/// coordinates.
+/// The input of the maps, and motor torques from it, for a model over a known robot's coordinates.
 fn input_entries(model: &ReducedModel) -> Result<Vec<FunctionSpec>, LowerError> {
     let (Some(input), Some(torque)) = (
         lower::generalised_input(model)?,
@@ -179,8 +175,7 @@ fn phase_entries(
     })
 }
 
-/// An entry whose outputs of the same name as an input are updated in place; its documentation ends with the lengths of
-/// all arrays.
+/// Outputs named as an input are updated in place; the documentation ends with the lengths of all arrays.
 fn entry(name: &str, program: Program, mut docs: Vec<String>) -> FunctionSpec {
     let mut parameters: Vec<Parameter<String>> = Vec::new();
     let inputs = program.inputs().iter().map(|slot| (slot, Role::Input));

@@ -1,8 +1,7 @@
-//! From programs to source code: C, Rust, Python, CasADi, MATLAB.
+//! From programs to source code: C, Rust, Python, CasADi, MATLAB. Nothing mathematical is decided here.
 //!
-//! A `ModelInterface` enters: every function that is generated for a model, as a program. Text leaves. `interface`
-//! lists the functions, `translate` and `arrays` turn programs into statements, `printer` prints these by the patterns
-//! of a language (`dialect`, `languages`), templates place them. Nothing mathematical is decided here.
+//! `interface` lists the functions of a model as programs, `translate` and `arrays` turn them into statements,
+//! `printer` prints these by the patterns of a language (`dialect`, `script`), templates place them.
 
 mod arrays;
 #[doc(hidden)] // for `deploy`, in the crate above

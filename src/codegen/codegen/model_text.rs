@@ -24,8 +24,7 @@ pub(crate) struct PhaseText<'a> {
     pub pattern: &'a JacobianPattern,
     /// Accelerations, then with Jacobian, then a step.
     pub functions: [Function; 3],
-    /// Body of the loop over the lanes of a batch.
-    pub lanes: Option<String>,
+    pub lanes: Option<String>, // body of the loop over the lanes of a batch
     /// Whether the accelerations have sines, whose arguments may be beyond the kernel's limit.
     pub lanes_have_angles: bool,
 }
@@ -97,8 +96,7 @@ pub(crate) struct KernelText {
     /// Polynomials of sine and cosine in `t`, with `t2` its square.
     pub sin: String,
     pub cos: String,
-    /// From bit 1 of a number to its sign.
-    pub to_sign: usize,
+    pub to_sign: usize, // from bit 1 of a number to its sign
 }
 
 impl KernelText {

@@ -43,7 +43,6 @@ impl Precision {
         self == Self::Single
     }
 
-    /// A number as a program in this precision holds it.
     pub(crate) fn nearest(self, value: f64) -> f64 {
         match self {
             Self::Double => value,
@@ -101,8 +100,7 @@ pub enum Units {
     /// SI units; the model's scaling factors are folded into the maps.
     #[default]
     Si,
-    /// Scaled values as the model was learned with: `s_x x`, `s_x dx`, `s_u u`; the maps are the encoder's and the
-    /// decoder's very weights.
+    /// Scaled values as the model was learned with, `s_x x`, `s_x dx`, `s_u u`: the maps are bare encoder and decoder.
     Scaled,
 }
 

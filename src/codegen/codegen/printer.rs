@@ -14,15 +14,12 @@ enum Precedence {
     Atom,
 }
 
-/// A printed expression, with what printing its use in another one needs.
 #[derive(Clone)]
 pub(crate) struct Text {
     pub text: String,
     binds: Precedence,
-    /// How deeply operations are nested in it.
     pub depth: usize,
-    /// Of an element: its array and its position.
-    pub place: Option<(Ident, usize)>,
+    pub place: Option<(Ident, usize)>, // of an element: its array and its position
     /// Of a product that may be fused with a sum: its factors, and the first negated.
     factors: Option<Box<[String; 3]>>,
 }
@@ -38,12 +35,10 @@ impl Text {
         }
     }
 
-    /// Something that needs no parentheses, without an operation.
     pub(crate) fn atom(text: String) -> Self {
         Self::new(text, Precedence::Atom, 0)
     }
 
-    /// The text as an operand that has to bind so tightly.
     fn operand(&self, at_least: Precedence) -> String {
         match self.binds >= at_least {
             true => self.text.clone(),
@@ -80,7 +75,6 @@ impl Dialect {
         Text::atom(self.fill(self.spelling.entry, &words))
     }
 
-    /// A subscript such as `4*i + 3`.
     fn subscript(&self, index: &Index) -> String {
         let terms = index.terms.iter().filter(|(stride, _)| *stride != 0);
         let terms = terms.map(|(stride, name)| match stride {
@@ -118,8 +112,7 @@ impl Dialect {
         Text::new(text, Precedence::Atom, depth.unwrap_or(0) + 1)
     }
 
-    /// An operation on two operands; `in_loop`, a sum with a product is printed with a function, if the language has
-    /// one.
+    /// `in_loop`, a sum with a product is printed with a function, if the language has one.
     pub(crate) fn binary(&self, op: Binary, a: &Text, b: &Text, in_loop: bool) -> Text {
         let depth = a.depth.max(b.depth) + 1;
         let multiply_add = self.spelling.multiply_add.filter(|_| in_loop);
@@ -155,8 +148,7 @@ impl Dialect {
     }
 }
 
-/// The arguments of `f(x, y, rest) = x*y + rest` for a sum or difference with a product; the same two roundings, unless
-/// the target can fuse them.
+/// The arguments of `f(x, y, rest) = x*y + rest` for a sum with a product; rounded twice unless the target can fuse.
 fn multiply_added(op: Binary, a: &Text, b: &Text) -> Option<[String; 3]> {
     let (a_factors, b_factors) = (a.factors.as_deref(), b.factors.as_deref());
     let (x, y, rest) = match (op, a_factors, b_factors) {

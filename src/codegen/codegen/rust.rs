@@ -1,5 +1,4 @@
-//! A Rust crate without `std` and without allocation: `NAME/Cargo.toml`, `NAME/src/lib.rs` and
-//! `NAME/tests/selftest.rs`.
+//! A Rust crate without `std` and allocation: `NAME/Cargo.toml`, `NAME/src/lib.rs` and `NAME/tests/selftest.rs`.
 
 use askama::Template;
 

@@ -1,11 +1,8 @@
-//! Languages that run scripts: `NAME.py` on NumPy, `NAME_casadi.py` with functions of CasADi, `NAME.m` for MATLAB and
-//! Octave, a function that returns a struct of function handles.
+//! Scripts: `NAME.py` on NumPy, `NAME_casadi.py` with functions of CasADi, `NAME.m` for MATLAB and Octave, a function
+//! that returns a struct of function handles; and the spellings of all languages.
 //!
-//! Arrays are matrices with a column per point, or a vector for one point, and every operation is element by element,
-//! so that the statements of a program serve one state and many alike. What a generated function writes into its
-//! parameters elsewhere is returned here.
-//!
-//! The spellings of C, Rust, Python on NumPy or CasADi, and MATLAB.
+//! Arrays of scripts are matrices with a column per point (a vector for one), and operations are element by element: a
+//! program's statements serve one state and many. What is written into parameters elsewhere is returned here.
 
 use askama::Template;
 
@@ -17,12 +14,9 @@ use super::options::{CodegenError, Precision};
 use crate::files::EmittedFile;
 use crate::ir::{Statement, Unary};
 
-/// A language of scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Script {
-    /// Python on arrays of NumPy.
     NumPy,
-    /// Python with symbolic scalars of CasADi.
     Casadi,
     /// MATLAB without toolboxes; Octave runs the same.
     Matlab,
@@ -183,8 +177,7 @@ pub(crate) const C: Spelling = Spelling {
     written: ["$name", "$name", "&$name[$first]"],
     sin_cos: "$model_sin_cos($n, $read, $written);",
     call: "$name($read, $written);",
-    // A choice between numbers: compilers vectorise it where they do not vectorise a comparison that becomes an
-    // integer.
+    // A choice between numbers: compilers vectorise it, but not a comparison that becomes an integer.
     sin_cos_lane: &[
         "$real $sine, $cosine;",
         "$model_sin_cos_reduced($a, &$sine, &$cosine);",

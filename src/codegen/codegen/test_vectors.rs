@@ -1,6 +1,4 @@
-//! Input and output vectors for self-tests of generated code, made by the interpreter.
-//!
-//! Points of self-tests, where possible those at which the functions have finite values.
+//! Input and output vectors for self-tests of generated code, from the interpreter, at finite results where possible.
 
 use super::dialect::Role;
 use super::interface::{FunctionSpec, ModelInterface};
@@ -19,8 +17,7 @@ pub(crate) const TOLERANCE_F64: f64 = 1e-11;
 /// Accepted share of one plus the largest value of an output in single precision.
 const TOLERANCE_F32: f64 = 1e-4;
 
-/// Accepted multiple of the error that the interpreter has in single precision: other libraries and fused operations
-/// round otherwise.
+/// Accepted multiple of the interpreter's own error in single precision: other libraries and fused operations differ.
 const ERROR_MARGIN: f64 = 16.0;
 
 /// Points of the batch that self-tests run, which are those of single calls again and again.
@@ -30,26 +27,22 @@ pub(crate) struct FunctionVectors<'a> {
     pub name: &'a str,
     pub parameters: Vec<ParameterVectors<'a>>,
     pub is_defined: bool,
-    /// Whether there is a function of the same name for batches.
     pub has_batch: bool,
 }
 
 impl FunctionVectors<'_> {
-    /// The arguments of a call, each as `spell` prints it.
     pub(crate) fn arguments(&self, spell: impl Fn(&ParameterVectors<'_>) -> String) -> String {
         let arguments: Vec<String> = self.parameters.iter().map(spell).collect();
         arguments.join(", ")
     }
 }
 
-/// What a parameter holds at each point: before the call, and what is expected after it.
+/// A row per point before the call, none for outputs; a row per point expected after it, none for inputs.
 pub(crate) struct ParameterVectors<'a> {
     pub role: Role,
     pub name: &'a str,
     pub len: usize,
-    /// A row per point; empty for outputs.
     pub before: Vec<Vec<f64>>,
-    /// A row per point; empty for inputs.
     pub after: Vec<Vec<f64>>,
     tolerances: Vec<String>,
 }
@@ -74,8 +67,7 @@ impl ParameterVectors<'_> {
     }
 }
 
-/// The tolerance of a self-test: relative in double precision; in single precision the given one, rounded up to two
-/// digits.
+/// The bound of a self-test: relative in double precision, the given one rounded up to two digits in single.
 fn spelled(bound: f64, precision: Precision) -> String {
     match precision {
         Precision::Double => format!("{TOLERANCE_F64:?}"),
@@ -92,9 +84,8 @@ pub(crate) fn all(entries: &ModelInterface, precision: Precision) -> Vec<Functio
     vectors.collect()
 }
 
-/// The vectors of all parameters of an entry, at points where its results are finite if such points are found; inputs
-/// are numbers of the precision. Functions of the state are run at rest at last, those with batches at an angle beyond
-/// the limit of the inline sine at first.
+/// The vectors of all parameters, in numbers of the precision, at points with finite results if such are found.
+/// Functions of the state run last at rest, those with batches first at an angle beyond the limit of the inline sine.
 fn vectors(entry: &FunctionSpec, has_batch: bool, precision: Precision) -> FunctionVectors<'_> {
     let mut random = Random::new();
     let points = (0..N_POINTS).map(|position| {
@@ -181,9 +172,8 @@ impl TestPoint {
         }
     }
 
-    /// The point with some arrays at zero, as a robot that stands still has them, if the function of the state has
-    /// kinks and finite results there. A slope that is not a number there although the accelerations are counts as
-    /// zero, so that the test fails.
+    /// The point with some arrays at zero, if the function of the state has kinks and finite results there: a robot at
+    /// rest. A NaN slope there with accelerations that are numbers counts as zero: the test fails.
     fn at_rest(self, entry: &FunctionSpec, precision: Precision, zero: &[&str]) -> Self {
         let is_of_state = entry.program.inputs().iter().any(|slot| slot.name == "dz");
         if !is_of_state || !entry.program.has(has_kink) {
@@ -230,7 +220,6 @@ impl TestPoint {
     }
 }
 
-/// Whether a statement is not smooth where an operand is zero.
 fn has_kink(statement: &Statement) -> bool {
     matches!(
         statement,

@@ -1,6 +1,4 @@
-//! Programs to the text of a function's body: names, and what is nested into one expression.
-//!
-//! No mathematics happens here: the tree of operations of the program is kept as it is.
+//! Programs to the text of a function's body: names and nested expressions; the tree of operations stays.
 
 use super::dialect::{Dialect, Function, Index, Parameter, Role, Span};
 use super::ident::{Ident, Namer, Tables};
@@ -18,21 +16,17 @@ pub(super) struct Translator<'a> {
     pub tables: &'a mut Tables,
     pub callees: &'a [Ident],
     inputs: Vec<Parameter>,
-    /// Parameter of each output slot; one that is also an input (role `InOut`) is assigned only after everything has
-    /// been read.
+    /// Parameters of output slots; one that is an input too (`InOut`) is assigned after everything has been read.
     pub outputs: Vec<Parameter>,
     pub locals: Namer,
     pub n_uses: Vec<usize>,
-    /// How a value is read: a name, an element, or an expression to be nested once.
-    pub spelled: Vec<Option<Text>>,
+    pub spelled: Vec<Option<Text>>, // a name, an element, or an expression to be nested once
     pub printer: Printer<'a>,
-    /// All arrays: parameters, and those that the function declares.
     pub arrays: Vec<Span>,
     pub copies: Vec<(Vec<ValueId>, Span)>,
     pub lane: Option<Ident>,
 }
 
-/// The function of an entry, with the functions that it calls.
 pub(crate) fn function(
     entry: &FunctionSpec,
     name: Ident,
@@ -68,9 +62,8 @@ pub(crate) fn function(
     }
 }
 
-/// The body of the loop over the lanes of a block of points; arrays are called `z_lanes` and so on, with elements
-/// `array[element][lane]`, the loop variable `lane`. Nothing if the program is better run point by point: it loops over
-/// tables itself, or calls functions that no compiler vectorises.
+/// The body of the loop over the lanes of a block of points, with elements `z_lanes[element][lane]` and so on. Nothing
+/// if the program runs better point by point: it loops over tables, or calls functions that no compiler vectorises.
 pub(crate) fn lanes(program: &Program, dialect: &Dialect, sines: SineCosine) -> Option<String> {
     let is_by_library = sines == SineCosine::Library && program.has(computes_angles);
     if is_by_library || !program.statements().iter().all(vectorises) {
@@ -233,7 +226,6 @@ impl<'a> Translator<'a> {
         text.expect("values are defined before they are read")
     }
 
-    /// Input parameters that no statement mentions.
     pub(super) fn unused(&self) -> impl Iterator<Item = &Ident> {
         let is_read = |wanted: usize| {
             let mut statements = self.program.statements().iter().enumerate();

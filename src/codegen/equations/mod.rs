@@ -1,8 +1,7 @@
-//! The latent dynamics as equations, between a model and everything that prints or emits it.
+//! The latent dynamics as equations: nothing else reads Xi to print or emit. Read `system.rs` first.
 //!
 //! For each phase the accelerations are sums of coefficients times expressions over named variables, in library order,
-//! in one pool, in their shortest form unless asked otherwise; nothing else reads Xi to print or emit. Read `system.rs`
-//! first.
+//! in one pool, in their shortest form unless asked otherwise.
 //!
 //! ```
 //! use nalgebra::DMatrix;

@@ -6,12 +6,8 @@
 //! mean of these, the weights adding up to one, the largest positive. Its input becomes a force or a moment, `U_i = u_i
 //! / upsilon_i` with `1 / upsilon_i = +- sum_j |W_e,ij| / s_u,j` over the inputs of the unit that does work along it,
 //! so that the shares of `u = W_e^T u_lat / s_u` in that unit add up to one. Rows that no unit rules keep pure numbers:
-//! `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike.
-//!
-//! Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z, sigma dZ, upsilon U)`, numeric factors taken out of
-//! every term and into its coefficient.
-//!
-//! Physical units as products of powers of metre, radian, kilogram and second.
+//! `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike. Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z,
+//! sigma dZ, upsilon U)`, numeric factors taken out of every term and into its coefficient.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -26,33 +22,24 @@ use crate::model::{
 };
 use crate::symbolic::{ExprId, ExprPool, Node, SymbolId};
 
-/// Share of a row's sum of squares from which its unit rules it.
-const RULES: f64 = 0.5;
+const RULES: f64 = 0.5; // share of a row's sum of squares from which its unit rules it
 
 /// Why equations cannot be in physical units.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum PhysicalError {
-    /// The model lacks a part, or has nonlinear maps.
     #[error(
         "physical units need an affine encoder and decoder, scale factors, and names and units of state and input"
     )]
     Maps(#[from] ModelError),
-    /// Published equations alone.
     #[error(
         "model `{model}`: physical units need an encoder and a decoder, which the model does not have; leave --units out"
     )]
     LatentOnly { model: String },
-    /// State or input have no units.
     #[error(
         "model `{model}`: physical units need `{part}` with names and units, which the model does not have"
     )]
-    NoUnits {
-        model: String,
-        /// Key of the model file.
-        part: &'static str,
-    },
-    /// A row of the encoder has no weight, or a coefficient overflows.
+    NoUnits { model: String, part: &'static str },
     #[error("model `{model}`: {place} has no finite value in physical units")]
     NotFinite { model: String, place: String },
 }
@@ -83,8 +70,7 @@ impl LatentUnits {
         self.position[output].per_second().per_second()
     }
 
-    /// The unit of a term: that of a product of powers of variables; anything else counts as a pure number, whose inner
-    /// numbers carry the units.
+    /// The unit of a product of powers of variables; in any other term, a pure number, inner numbers carry the units.
     pub(crate) fn of_term(&self, pool: &ExprPool, term: ExprId) -> Unit {
         let factors = pool.factors_of(term).iter().map(|&factor| {
             let (base, exponent) = match pool.node(factor) {
@@ -110,8 +96,7 @@ impl Equations<'_> {
     /// The same equations in metres, radians, seconds, newtons and newton metres, with the model's maps.
     ///
     /// # Errors
-    /// [`PhysicalError`] for equations without robot coordinates, nonlinear maps, missing units, or values beyond
-    /// floats.
+    /// [`PhysicalError`] without robot coordinates or units, for nonlinear maps, or for values beyond floats.
     pub fn in_physical_units(&self) -> Result<Equations<'static>, PhysicalError> {
         let model = self.model();
         if model.encoder_map().is_err() && model.decoder_map().is_err() {
@@ -234,8 +219,7 @@ fn ruling_unit(weights: &DVector<f64>, names: &CoordinateNames) -> Option<Unit> 
     shares.into_iter().find(rules).map(|(unit, _)| unit)
 }
 
-/// Sum of the absolute weights of a unit, with the sign of the largest; without a unit, or where it has no weight, the
-/// norm of all.
+/// Sum of a unit's absolute weights, with the sign of the largest; the norm of all without a unit or its weights.
 fn scale_of(weights: &DVector<f64>, names: &CoordinateNames, unit: Option<Unit>) -> f64 {
     let of_unit = (weights.iter().zip(&names.units))
         .filter(|(_, name)| unit.is_some() && Unit::from_name(name) == unit)
@@ -281,9 +265,7 @@ fn in_metres(model: &ReducedModel, scales: &[Scale]) -> Result<ReducedModel, Phy
     Ok(builder.decoder(decoder).scaling(scaling).build()?)
 }
 
-/// A unit: exponents of m, rad, kg and s. The default is the unit 1.
-///
-/// Radians are kept apart from 1, so that angles and lengths can be told from pure numbers.
+/// Exponents of m, rad, kg and s; 1 by default. Radians are kept apart from 1, so that angles are no pure numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Unit([i8; 4]);
 

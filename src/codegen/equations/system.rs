@@ -1,9 +1,5 @@
-//! The accelerations of all phases as sums of coefficients times expressions.
-//!
-//! Exact simplification: each acceleration in its shortest form, equal as a real function.
-//!
-//! The algebra finds the form ([`Shortener`]); here the new terms get their places among the old: each stands where the
-//! first term that it replaces stood.
+//! The accelerations of all phases as sums of coefficients times expressions, and their shortest form, equal as real
+//! functions: the algebra finds it ([`Shortener`]); a new term stands where the first that it replaces stood.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -21,9 +17,7 @@ use crate::symbolic::{ExprId, ExprPool, Shortened, Shortener, SymbolId};
 /// One summand of an equation: `coefficient * terms[term]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summand {
-    /// Finite and not zero.
-    pub coefficient: f64,
-    /// Index into [`Equations::terms`].
+    pub coefficient: f64, // finite and not zero
     pub term: usize,
 }
 
@@ -38,8 +32,7 @@ pub struct PhaseEquations {
     pub ddz: Vec<Vec<Summand>>,
 }
 
-/// `ddz = Xi^T Theta(z, dz, u_lat)` of all phases of a model, with the model whose maps, names and scale factors belong
-/// to it.
+/// `ddz = Xi^T Theta(z, dz, u_lat)` of all phases, with the model of its maps, names and scale factors.
 #[derive(Clone)]
 pub struct Equations<'a> {
     pub(super) model: Cow<'a, ReducedModel>,
@@ -52,8 +45,7 @@ pub struct Equations<'a> {
 }
 
 impl<'a> Equations<'a> {
-    /// The equations of a model as they are printed and emitted unless asked otherwise: in the shortest equal form that
-    /// is found.
+    /// The equations as they are printed and emitted unless asked otherwise: in the shortest equal form that is found.
     pub fn of(model: &'a ReducedModel) -> Self {
         Self::as_learned(model).simplified()
     }
@@ -120,7 +112,6 @@ impl<'a> Equations<'a> {
         self
     }
 
-    /// The same equations with a model of their own.
     pub(crate) fn into_owned(self) -> Equations<'static> {
         Equations {
             model: Cow::Owned(self.model.into_owned()),
@@ -132,8 +123,7 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// These equations in the scaled units of the model's maps, whose latent inputs are those of `W_e`: what a
-    /// controller computes with.
+    /// These equations in the scaled units of the model's maps, with the latent inputs of `W_e`, for controllers.
     pub fn in_scaled_units(&self) -> &Equations<'_> {
         match &self.physical {
             Some((_, scaled)) => scaled,
@@ -356,8 +346,7 @@ impl Equations<'_> {
 struct NewTerms {
     /// Of each term: the term as learned that it is or follows, then its number among new ones.
     places: Vec<(usize, usize)>,
-    /// All terms by expression, made at the first need.
-    known: HashMap<ExprId, usize>,
+    known: HashMap<ExprId, usize>, // by expression, made at the first need
 }
 
 impl NewTerms {

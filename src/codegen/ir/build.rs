@@ -23,8 +23,7 @@ enum Key {
     Select([ValueId; 3]),
 }
 
-/// Appends statements in order of evaluation and numbers values, so that a scalar computation which is asked for twice
-/// is made once.
+/// Appends statements in order of evaluation and numbers values; equal scalar computations are made once.
 #[derive(Debug)]
 pub struct ProgramBuilder {
     program: Program,

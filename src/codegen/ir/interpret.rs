@@ -1,45 +1,36 @@
 //! Runs programs: the reference for generated code, and what simulation and control run.
 //!
-//! Sine and cosine together, without branches; the arithmetic of the emitted kernels.
+//! Sine and cosine are computed together, without branches. The argument is reduced by the nearest multiple of pi/2,
+//! held as three parts (Cody and Waite); two minimax polynomials give sine and cosine of the remainder, and the low two
+//! bits of the multiple exchange and negate them. The polynomials minimise the relative error over +-pi/4 and were
+//! found by a Remez exchange with coefficients rounded one after the other; their error is 2^-57.9 (sine) and 2^-63.9
+//! (cosine), in single precision 2^-27.9 and 2^-33. Beyond `LIMIT`, at infinities and NaN: the standard library.
 //!
-//! The argument is reduced by the nearest multiple of pi/2, held as three parts (Cody and Waite); two minimax
-//! polynomials give sine and cosine of the remainder, and the low two bits of the multiple exchange and negate them.
-//! The polynomials minimise the relative error over +-pi/4 and were found by a Remez exchange with coefficients rounded
-//! one after the other; their error is 2^-57.9 (sine) and 2^-63.9 (cosine), in single precision 2^-27.9 and 2^-33.
-//! Arguments beyond `LIMIT`, infinities and NaN go to the standard library.
-//!
-//! C and Rust emit these very operations in this very order, from these constants. The parts of pi/2 (40, 40 and 53
-//! bits; in single precision 17, 17 and 24) are cut off rather than rounded: the first two times a multiple up to 2^13,
-//! 2^7 are exact, and a positive tail keeps the sign of zero. Adding `ROUND`, 1.5 times 2^52 or 2^23, rounds to an
-//! integer, which the low bits then hold. `SIN` is (r - sin r) / r^3 in powers of r^2, `COS` is (cos r - 1 + r^2/2) /
-//! r^4.
+//! C and Rust emit these very operations in this order, from these constants. The parts of pi/2 (40, 40 and 53 bits; in
+//! single precision 17, 17 and 24) are cut off rather than rounded: the first two times a multiple up to 2^13, 2^7 are
+//! exact, and a positive tail keeps the sign of zero. Adding `ROUND`, 1.5 times 2^52 or 2^23, rounds to an integer,
+//! which the low bits then hold. `SIN` is (r - sin r) / r^3 in powers of r^2, `COS` is (cos r - 1 + r^2/2) / r^4.
 
 pub use double::{LIMIT, reduced_sin_cos, sin_cos};
 
 use super::operation::{Binary, Real, Unary};
 use super::program::{Program, Slot, Statement, Table, ValueId};
 
-/// Runs one program as often as asked; owns the memory of all its values, so that a run allocates nothing.
-///
-/// Numbers are `f64` unless another `Real` is named: `Interpreter::<f32>::new(&program)` is the reference for generated
-/// code in single precision.
+/// Runs one program as often as asked; owns the memory of all its values, so that a run allocates nothing. Numbers are
+/// `f64` unless another `Real` is named: `Interpreter::<f32>` is the reference for code in single precision.
 #[derive(Clone, Debug)]
 pub struct Interpreter<T = f64> {
-    /// Lengths of the slots.
-    inputs: Vec<usize>,
+    inputs: Vec<usize>, // lengths of the slots
     outputs: Vec<usize>,
-    /// Positions among the values of the elements of all inputs.
-    loads: Vec<usize>,
+    loads: Vec<usize>, // positions of the elements of all inputs among the values
     steps: Vec<Step>,
     tables: Vec<Table<T>>,
     callees: Vec<Interpreter<T>>,
     stores: Vec<ValueId>,
-    /// Constants are set once; every other value is computed before it is read.
-    values: Vec<T>,
+    values: Vec<T>, // constants are set once; every other value is computed before it is read
 }
 
-/// A statement that computes something, and the position of its first value. Those of one operation are small, as most
-/// steps are.
+/// A statement that computes something, and the position of its first value; small for single operations, as most are.
 #[derive(Clone, Debug)]
 enum Step {
     Unary(Unary, ValueId, usize),
@@ -221,8 +212,7 @@ fn accumulate<T: Real>(table: &Table<T>, weights: &[ValueId], first: usize, valu
     }
 }
 
-/// A kernel for one kind of number: its constants, its polynomial in `t = r^2`, and the tail of the remainder, of which
-/// `lost` is what rounding the remainder loses.
+/// A kernel for one kind of number: constants, polynomial in `t = r^2`, tail of the remainder (`lost`: by rounding it).
 macro_rules! kernel {
     (
         $float:ident, limit: $limit:expr, round: $round:expr, to_sign: $to_sign:expr, pi_2: $pi_2:expr,

@@ -1,8 +1,7 @@
 //! Programs: what is computed, in which order.
 //!
-//! A [`Program`] enters from `lower` (through [`ProgramBuilder`]) and leaves to the interpreter and to all code
-//! generators: C, Rust and the interpreter run the same statements in the same order with the same association, so that
-//! their results agree bit for bit. Read `program` first, then `interpret`.
+//! A [`Program`] enters from `lower` (through [`ProgramBuilder`]); C, Rust and the interpreter run its statements in
+//! the same order with the same association, so that results agree bit for bit. Read `program` first, then `interpret`.
 //!
 //! ```
 //! use romc::ir::{Binary, Interpreter, ProgramBuilder};

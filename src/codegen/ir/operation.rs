@@ -65,9 +65,7 @@ pub enum Binary {
     Pow,
 }
 
-/// A number that programs compute with: `f64` or `f32`.
-///
-/// Each operator rounds once, as generated code does with contraction off.
+/// `f64` or `f32`; each operator rounds once, as generated code does with contraction off.
 pub trait Real:
     Copy
     + Debug
@@ -78,13 +76,10 @@ pub trait Real:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// A constant of a program.
     fn constant(value: f64) -> Self;
 
-    /// A function of one number.
     fn unary(op: Unary, a: Self) -> Self;
 
-    /// `self ^ exponent`.
     fn power(self, exponent: Self) -> Self;
 
     /// Sine and cosine by the kernel of this precision.

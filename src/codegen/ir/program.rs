@@ -74,19 +74,16 @@ pub enum Statement {
     Unary(Unary, ValueId),
     /// A scalar operation on two values.
     Binary(Binary, ValueId, ValueId),
-    /// The second value where the first one is zero, of either sign; the third elsewhere, also where the first is NaN.
-    /// Both are computed.
+    /// The second value where the first is zero of either sign, else the third, also for NaN; both are computed.
     Select([ValueId; 3]),
     /// Sine and cosine of all arguments by [`super::interpret::sin_cos`]: defines the n sines, then the n cosines.
     SinCos {
         /// The n arguments, in rad.
         arguments: Vec<ValueId>,
     },
-    /// Matrix-vector product with an offset, `y_j = t_0j + sum_i t_(i+1)j w_i`: the first row of the table is the
-    /// offset, each later row is scaled by one weight.
-    ///
-    /// Association: the accumulator starts at the offset and takes four rows at a time, `y += (t_1 w_1 + t_2 w_2) +
-    /// (t_3 w_3 + t_4 w_4)`; the rows that remain are added one by one. Defines `cols` values.
+    /// Matrix-vector product with an offset, `y_j = t_0j + sum_i t_(i+1)j w_i`. The accumulator starts at the offset,
+    /// the first row, and adds four rows at a time, `y += (t_1 w_1 + t_2 w_2) + (t_3 w_3 + t_4 w_4)`; the rows that
+    /// remain are added one by one. Defines `cols` values.
     Accumulate {
         /// Position of a table with one row more than there are weights.
         table: usize,
@@ -98,12 +95,10 @@ pub enum Statement {
     Scaled {
         /// What the sums begin with, row-major; nothing if absent.
         base: Option<Vec<ValueId>>,
-        /// Positions of at least one table, all of one shape, each with a weight per column; without weights the
-        /// entries are added as they are.
+        /// Positions of at least one table, all of one shape, each with a weight per column or added as it is.
         groups: Vec<(usize, Option<Vec<ValueId>>)>,
     },
-    /// Evaluation of another program; the arguments fill its input slots in order. Defines the values of its output
-    /// slots in order.
+    /// Evaluation of another program: arguments fill its input slots, values are those of its output slots, in order.
     Call {
         /// Position in [`Program::callees`].
         callee: usize,
@@ -113,7 +108,6 @@ pub enum Statement {
 }
 
 impl Statement {
-    /// The values that the statement reads, in order.
     pub(crate) fn operands(&self) -> Vec<ValueId> {
         match self {
             Self::Constant(_) | Self::Input { .. } => Vec::new(),
@@ -130,7 +124,6 @@ impl Statement {
     }
 }
 
-/// One element of an output slot and the value that it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ResultEntry {
     pub slot: usize,
@@ -138,16 +131,14 @@ pub(crate) struct ResultEntry {
     pub value: ValueId,
 }
 
-/// A validated, scheduled computation of named output arrays from named input arrays; made by
-/// [`super::ProgramBuilder`].
+/// A validated, scheduled computation of named output arrays from named input arrays; see [`super::ProgramBuilder`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
     pub(super) name: String,
     pub(super) inputs: Vec<Slot>,
     pub(super) outputs: Vec<Slot>,
     pub(super) statements: Vec<Statement>,
-    /// First value of each statement, and the number of values at the end.
-    pub(super) first: Vec<u32>,
+    pub(super) first: Vec<u32>, // value of each statement, and the number of values at the end
     pub(super) tables: Vec<Table>,
     pub(super) callees: Vec<Program>,
     pub(super) results: Vec<ResultEntry>,

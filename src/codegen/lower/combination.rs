@@ -1,8 +1,6 @@
-//! Linear combinations of expressions with floating-point coefficients, and in which order sums are added.
-//!
-//! Generated code keeps the association of the program, so it is chosen here: terms that are known early are added in
-//! up to four partial sums, which run side by side; terms that wait for a sine or an exponential come last, so that
-//! they delay as little as possible.
+//! Linear combinations of expressions with floating-point coefficients. Generated code keeps the order in which sums
+//! are added here: terms that are known early in up to four partial sums side by side, terms that wait for a sine or an
+//! exponential last, so that they delay as little as possible.
 
 use std::collections::HashMap;
 
@@ -90,7 +88,6 @@ impl Combination {
 pub(super) struct Term {
     pub coefficient: f64,
     pub value: ValueId,
-    /// Whether the value waits for a transcendental function.
     pub late: bool,
 }
 

@@ -8,11 +8,9 @@ use crate::ir::Interpreter;
 use crate::lower;
 use crate::model::ReducedModel;
 
-/// The accelerations, Jacobians and Runge-Kutta steps of all phases of a model, run by the interpreter with the very
-/// arithmetic of the generated code. Evaluation allocates nothing; clone it for another thread.
-///
-/// All vectors have `latent_dim` elements, in scaled units. Methods panic where a phase does not exist or a length does
-/// not fit.
+/// The accelerations, Jacobians and Runge-Kutta steps of all phases of a model, run by the interpreter with the
+/// arithmetic of the generated code. Evaluation allocates nothing; clone it for another thread. All vectors have
+/// `latent_dim` elements, in scaled units. Methods panic where a phase does not exist or a length does not fit.
 #[derive(Clone, Debug)]
 pub struct CompiledModel {
     latent_dim: usize,
@@ -26,8 +24,7 @@ struct CompiledPhase {
     pattern: JacobianPattern,
     entries: Vec<f64>,
     step: Interpreter,
-    /// Result of a step before it replaces the state: z, then dz.
-    next: Vec<f64>,
+    next: Vec<f64>, // z, then dz, before they replace the state
 }
 
 impl CompiledModel {
@@ -70,8 +67,7 @@ impl CompiledModel {
         dynamics.run(&[z, dz, u_lat], &mut [ddz]);
     }
 
-    /// `ddz` and the entries of its Jacobian by `(z, dz, u_lat)` that [`CompiledModel::pattern`] names; how many there
-    /// are.
+    /// `ddz` and the entries of its Jacobian that [`CompiledModel::pattern`] names; returns their number.
     ///
     /// # Panics
     /// If `phase` does not exist, a vector does not fit or there is no room for the entries.

@@ -1,8 +1,6 @@
-//! Dense models: tables of coefficients instead of one operation per coefficient.
-//!
-//! The accelerations are a matrix-vector product over the distinct candidate terms. Of their Jacobian the columns of
-//! variables that occur only linearly are constants; in the others the derivatives of sines and cosines of variables
-//! are tables whose columns are scaled, and those of all other terms another matrix-vector product.
+//! Dense models by tables of coefficients: the accelerations are a matrix-vector product over the distinct candidate
+//! terms. The columns of their Jacobian are constants for variables that occur only linearly; in the others,
+//! derivatives of sines and cosines of variables are tables whose columns are scaled, the rest a matrix-vector product.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -64,14 +62,12 @@ fn angle_of(pool: &ExprPool, expr: ExprId) -> Option<(Function, SymbolId)> {
 /// The Jacobian of equations, divided into what has a form of its own.
 pub(super) struct DenseJacobian {
     curved: Vec<SymbolId>,
-    /// Variables that occur only linearly.
-    linear: Vec<SymbolId>,
+    linear: Vec<SymbolId>, // variables that occur only linearly
     /// Derivatives by the curved variables, row by row, of all terms but sines and cosines of variables.
     slopes: Vec<Combination>,
 }
 
 impl DenseJacobian {
-    /// Divides the equations; `pool` takes the derivatives.
     pub(crate) fn new(
         pool: &mut ExprPool,
         equations: &[Combination],
@@ -211,7 +207,6 @@ const FEWEST_COEFFICIENTS: usize = 120;
 const LEAST_FILL: f64 = 0.45;
 
 impl Form {
-    /// Whether the equations should become loops over tables.
     pub(super) fn uses_tables(self, equations: &[Combination]) -> bool {
         match self {
             Self::StraightLine => false,

@@ -1,5 +1,4 @@
-//! The accelerations `ddz = Xi^T Theta(z, dz, u_lat)` of a phase, their Jacobian, and one step of the classical
-//! Runge-Kutta method, with the input held.
+//! The accelerations `ddz = Xi^T Theta(z, dz, u_lat)` of a phase, their Jacobian, and a Runge-Kutta step.
 
 use super::combination::Combination;
 use super::dense::{DenseJacobian, Form, distinct, matrix_vector};
@@ -126,8 +125,7 @@ fn with_derivatives(
     Ok((builder.finish()?, pattern))
 }
 
-/// Accelerations, then the entries of the pattern, in nested form: what a variable was taken out of in an acceleration
-/// is a part of its derivative by that variable.
+/// In nested form: what a variable was taken out of in an acceleration is a part of its derivative by that variable.
 fn nested(
     pool: &mut ExprPool,
     equations: &[Combination],
@@ -152,7 +150,7 @@ fn nested(
     sums
 }
 
-/// The right-hand sides with folded coefficients, one a latent coordinate.
+/// The right-hand sides with folded coefficients, one per latent coordinate.
 fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination>, LowerError> {
     let phase = system.phase(phase)?;
     let equation = |row| {
@@ -174,7 +172,6 @@ fn finite(phase: &PhaseEquations, row: usize, sum: Combination) -> Result<Combin
     }
 }
 
-/// A lowering whose program has the inputs `z`, `dz` and `u_lat`.
 fn start<'a>(system: &Equations<'_>, pool: &'a ExprPool, name: &str) -> ExpressionLowering<'a> {
     let d = system.latent_dim();
     let mut builder = ProgramBuilder::new(name);
@@ -199,8 +196,7 @@ fn values(lowering: &mut ExpressionLowering, sums: &[Nested]) -> Vec<ValueId> {
 }
 
 /// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over `h` seconds with constant
-/// `u_lat`: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz` after the step. It calls the program of the accelerations
-/// four times.
+/// `u_lat`, in four calls of the accelerations: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz` after it.
 pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program, LowerError> {
     let accelerations = dynamics(system, phase, form)?;
     let d = system.latent_dim();

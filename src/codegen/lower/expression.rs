@@ -14,8 +14,7 @@ pub(super) struct ExpressionLowering<'a> {
     values: HashMap<ExprId, ValueId>,
     angles: HashMap<ExprId, (ValueId, ValueId)>,
     variables: HashMap<SymbolId, ValueId>,
-    /// Expressions that wait for a function of the library or the kernel.
-    late: HashSet<ExprId>,
+    late: HashSet<ExprId>, // wait for a function of the library or the kernel
 }
 
 impl<'a> ExpressionLowering<'a> {
@@ -129,8 +128,7 @@ impl<'a> ExpressionLowering<'a> {
         combination.items.iter().map(term).collect()
     }
 
-    /// The value of a nested sum and of the `single` part of each of its groups; `shared` is the part that is known
-    /// already.
+    /// The value of a nested sum and of each group's `single` part; `shared` is the part that is known already.
     pub(crate) fn nested(
         &mut self,
         nested: &Nested,
@@ -168,8 +166,7 @@ impl<'a> ExpressionLowering<'a> {
         (sum, singles)
     }
 
-    /// Factors with negative exponents form one divisor; the others multiply in canonical order, so that monomials
-    /// share their beginnings.
+    /// Factors with negative exponents form one divisor; canonical order lets monomials share their beginnings.
     fn product(&mut self, expr: ExprId) -> ValueId {
         let pool = self.pool;
         let (number, rest) = pool.split(expr);

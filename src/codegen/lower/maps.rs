@@ -1,13 +1,9 @@
 //! The maps between robot and latent coordinates, with the scaling folded in.
 //!
-//! Each says what it is for a linear model. With a nonlinear encoder or decoder the weights are the Jacobian at a
-//! state, which is then the first input: `x` of the encoder's maps, `z` of the decoder's.
-//!
-//! The maps of nonlinear encoders and decoders.
-//!
-//! A layer's products with its weights go through a table, [`crate::ir::Statement::Accumulate`]; activations and their
-//! slopes are scalar operations without branches. Velocities run forwards through the layers, lifted inputs backwards;
-//! the projection takes the Jacobian row by row and solves with it.
+//! [`Map`] has the equations of linear models. With a nonlinear encoder or decoder the weights are the Jacobian at a
+//! state, the first input: `x` of the encoder's maps, `z` of the decoder's. A layer's products with its weights go
+//! through a table, [`crate::ir::Statement::Accumulate`]; activations and slopes are without branches. Velocities run
+//! forwards through the layers, lifted inputs backwards; the projection solves with the rows of the Jacobian.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -271,10 +267,8 @@ fn divided<'b>(values: &[Number<'b>], factors: &DVector<f64>) -> Layer<'b> {
     pairs.map(|(&value, &factor)| value / factor).collect()
 }
 
-/// `phi(a)` and `phi'(a)`.
-///
-/// Without branches: `min(a, 0) = (a - |a|)/2` and `max(a, 0) = (a + |a|)/2` are exact in floating point, so that elu
-/// has the slope `e = exp(min(a, 0))` and the value `max(a, 0) + (e - 1)`.
+/// `phi(a)` and `phi'(a)` without branches: `min(a, 0) = (a - |a|)/2` and `max(a, 0) = (a + |a|)/2` are exact in
+/// floating point, so that elu has the slope `e = exp(min(a, 0))` and the value `max(a, 0) + (e - 1)`.
 fn activation(activation: Activation, a: Number) -> (Number, Number) {
     match activation {
         Activation::Linear => (a, a.constant(1.0)),
@@ -351,11 +345,9 @@ fn gelu_tanh(a: Number) -> (Number, Number) {
     (a * half, half + bend)
 }
 
-/// `pinv(J^T) w = (J J^T)^-1 J w` for the `d x n` matrix with these rows, `d <= n`.
-///
-/// The normal equations by Cholesky, `J J^T = L L^T`; d is small, so all is unrolled. The error grows with the square
-/// of J's condition number. If J has not full row rank a pivot is zero or negative, and the result infinite or not a
-/// number.
+/// `pinv(J^T) w = (J J^T)^-1 J w` for the `d x n` matrix with these rows, `d <= n`: the normal equations by Cholesky,
+/// `J J^T = L L^T`, unrolled as d is small. The error grows with the square of J's condition number. If J has not full
+/// row rank a pivot is zero or negative, and the result infinite or NaN.
 pub(super) fn pinv_times<'b>(
     sheet: &'b Sheet<'b>,
     rows: &[Vec<Number<'b>>],

@@ -1,9 +1,8 @@
-//! From a model to programs.
+//! From a [model](crate::model::ReducedModel) to [programs](crate::ir::Program): a phase's accelerations, their
+//! Jacobian, a Runge-Kutta step, the maps between robot and latent coordinates, the generalised inputs.
 //!
-//! A [`ReducedModel`](crate::model::ReducedModel) and a phase enter, a [`Program`](crate::ir::Program) leaves: the
-//! accelerations, their Jacobian, a Runge-Kutta step, one of the maps between robot and latent coordinates, or the
-//! generalised inputs. Every decision that changes a rounding is made here: which subexpressions are shared, in which
-//! order sums are added, that a power is a chain of products. Read `dynamics` first, then `expression`.
+//! Every decision that changes a rounding is made here: which subexpressions are shared, in which order sums are added,
+//! that a power is a chain of products. Read `dynamics` first, then `expression`.
 
 mod combination;
 mod compiled;

@@ -1,9 +1,8 @@
-//! Sums of products in nested form: `a x y + b x z^2` becomes `x (a y + b z^2)`.
+//! Sums of products in nested form: `a x y + b x z^2` becomes `x (a y + b z^2)`, Horner's rule for several variables.
 //!
-//! A product that only one sum uses costs a multiplication of its own beside the one with its coefficient. Taking a
-//! common factor out of several such products saves theirs and costs one for the group (Horner's rule for several
-//! variables). A product that many sums use is computed once for all of them and stays. What is left after a factor has
-//! been taken out is often needed again: it is the derivative of the sum by that factor.
+//! Taking a common factor out of products that only one sum uses saves a multiplication each and costs one for the
+//! group. A product of many sums is computed once for all and stays. What a factor was taken out of is often needed
+//! again, as the derivative of the sum by that factor.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -15,7 +14,6 @@ pub(super) struct Nested {
     pub flat: Combination,
     /// A part that another sum has computed: which sum, and the group of which it is the `single`.
     pub shared: Option<(usize, usize)>,
-    /// Common factors, in the order in which they were taken out.
     pub groups: Vec<Group>,
 }
 
@@ -56,7 +54,6 @@ pub(super) struct Demand {
 struct Quotient {
     factor: ExprId,
     rest: ExprId,
-    /// Whether the rest contains the factor again.
     repeats: bool,
     /// Multiplications that are saved when the product becomes this one.
     saving: f64,
@@ -102,8 +99,7 @@ impl Demand {
         quotients
     }
 
-    /// Takes factors out of a sum wherever that saves multiplications: first the factor whose group saves most, while
-    /// one saves more than it costs.
+    /// Takes factors out of a sum: first the one whose group saves most, while one saves more than it costs.
     pub(crate) fn nest(&self, pool: &mut ExprPool, sum: &Combination) -> Nested {
         let items = sum.items.iter();
         let mut items: Vec<((f64, ExprId), Vec<Quotient>)> = items
@@ -172,8 +168,7 @@ fn n_factors(pool: &ExprPool, expr: ExprId) -> usize {
     counts.fold(0, usize::saturating_add)
 }
 
-/// What remains of a product without one of its factors, for each distinct factor; nothing if it is no product of
-/// factors with positive integer exponents.
+/// What remains of a product without each distinct factor; nothing unless all exponents are positive integers.
 fn quotients(pool: &mut ExprPool, expr: ExprId) -> Vec<Quotient> {
     let factors = pool.factors_of(expr).to_vec();
     let bases: Option<Vec<(ExprId, i64)>> = factors.iter().map(|&f| base_of(pool, f)).collect();

@@ -1,8 +1,5 @@
-//! Generalised inputs from what a robot measures: its state, joint torques and contacts; and back, from torques at the
-//! links to those of the motors.
-//!
-//! The same forces and moments as [`InputRule::wrench`](crate::robot::InputRule::wrench), in the closed form that
-//! `romc_robot::leg` has.
+//! Generalised inputs from a robot's measured state, joint torques and contacts; and motor torques from those at the
+//! links. Forces and moments as of [`InputRule::wrench`](crate::robot::InputRule::wrench), in closed form.
 
 use super::dynamics::LowerError;
 use super::number::{Number, Sheet};
@@ -16,13 +13,12 @@ use crate::robot::{
 };
 
 /// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the ground, by the
-/// model's rule (equations 4 to 7, 22 and 23): inputs `x` and `dx` (18 robot coordinates and their velocities), `tau`
-/// (torques of the motors, 12, N m), `feet` (4, order of [`Leg::ALL`]: 1 on the ground, 0 in the air); output `u` (18,
-/// N m and N). `None` for a model that is not over the 18 coordinates of a robot that romc knows.
+/// model's rule (equations 4 to 7, 22, 23): inputs `x` and `dx` (18 robot coordinates and their velocities), `tau`
+/// (motor torques, 12, N m), `feet` (4, order of [`Leg::ALL`]: 1 on the ground, 0 in the air); output `u` (18, N m and
+/// N). `None` for a model that is not over the 18 coordinates of a known robot.
 ///
-/// `net` is `tau` less viscous and dry friction; the inertia of the motors needs accelerations, which are not measured,
-/// and is left out. A foot's force and moment are multiplied with its element of `feet`; at 0 they are zero in every
-/// posture.
+/// `net` is `tau` less viscous and dry friction, without the inertia of the motors: accelerations are not measured. A
+/// foot's force and moment are multiplied with its element of `feet`; at 0 they are zero in every posture.
 pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
     rule_of(model).map(|rule| input_of(&rule)).transpose()
 }
@@ -122,8 +118,7 @@ fn damped<'b>(numerator: Number<'b>, divisor: Number<'b>, least: f64) -> Number<
     2.0 * (numerator * divisor) / twice_larger
 }
 
-/// Force and moment in the body's axes as the generalised forces of the body's coordinates, with sine and cosine of
-/// roll, pitch and yaw.
+/// From the body's axes to the generalised forces of its coordinates; sines and cosines of roll, pitch and yaw.
 fn in_world<'b>(
     [[s_r, s_p, s_y], [c_r, c_p, c_y]]: [[Number<'b>; 3]; 2],
     [f_x, f_y, f_z, m_x, m_y, m_z]: [Number<'b>; BODY_DIM],

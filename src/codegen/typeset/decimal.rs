@@ -31,16 +31,11 @@ pub struct Decimal {
 }
 
 const MOST_DIGITS: usize = 40;
-/// Fewest places after the point of [`Rounding::Adaptive`].
-pub(super) const LEAST_DECIMALS: usize = 2;
-/// Places after the point beyond which it turns to powers of ten.
-const MOST_DECIMALS: usize = 6;
-/// Its largest |printed - value| / |value| of any coefficient.
-pub(super) const RELATIVE_ERROR: f64 = 0.05;
-/// Values from here on are printed with a power of ten.
-const LARGE: f64 = 1e7;
-/// Values below are printed with a power of ten where digits are not fixed.
-const SMALL: f64 = 1e-4;
+pub(super) const LEAST_DECIMALS: usize = 2; // fewest after the point of `Rounding::Adaptive`
+const MOST_DECIMALS: usize = 6; // beyond, it turns to powers of ten
+pub(super) const RELATIVE_ERROR: f64 = 0.05; // its largest |printed - value| / |value|
+const LARGE: f64 = 1e7; // from here on with a power of ten
+const SMALL: f64 = 1e-4; // below with a power of ten where digits are not fixed
 
 impl Decimal {
     /// The shortest text that reads back as `value`, which must be finite.
@@ -124,7 +119,6 @@ impl Decimal {
         value.expect("sign, digits and exponent form a number")
     }
 
-    /// Whether it prints as nothing but zeros.
     pub(crate) fn is_zero(&self) -> bool {
         !self.digits.contains(|digit| ('1'..='9').contains(&digit))
     }
@@ -184,7 +178,6 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// A coefficient with its equation and its candidate term, as the library spells it and laid out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Occurrence {
     pub phase: String,
@@ -195,7 +188,6 @@ pub struct Occurrence {
     pub math: Signed,
 }
 
-/// What rounding for print changed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RoundingReport {
     /// Largest |printed - coefficient|, where it is not zero, and where it occurs.
@@ -210,8 +202,7 @@ pub struct RoundingReport {
 /// Makes equations out of coefficients and terms, and keeps the record.
 pub(super) struct Rounder {
     rounding: Rounding,
-    /// Whether whole numbers are printed as such, and one is left out before a term.
-    is_exact: bool,
+    is_exact: bool, // whole numbers are printed as such, and one is left out before a term
     pub(super) report: RoundingReport,
 }
 

@@ -10,7 +10,6 @@ use super::expression::terms;
 use super::symbols::SymbolTable;
 use super::tree::{Math, Signed, Symbol};
 
-/// The equations of one phase, ready for a printer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EquationSystem {
     pub phase: String,
@@ -21,22 +20,19 @@ pub struct EquationSystem {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Equation {
     pub left: Symbol,
-    /// Coefficient and candidate term, one entry each.
     pub terms: Vec<Signed>,
     /// Whether small terms were left out, so that the sides are nearly equal.
     pub is_approximate: bool,
 }
 
-/// Every candidate term that is printed somewhere, with its coefficients.
+/// Every candidate term that is printed somewhere, with its coefficients; in library order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientTable {
     /// Column heads: the acceleration, with the phase it belongs to, and its unit where that is physical.
     pub columns: Vec<(String, Symbol, Option<Unit>)>,
-    /// In library order.
     pub rows: Vec<CoefficientRow>,
 }
 
-/// One candidate term and its coefficient in each column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientRow {
     pub term: Math,
@@ -46,11 +42,9 @@ pub struct CoefficientRow {
     pub coefficients: Vec<Option<Decimal>>,
 }
 
-/// A model's equations with all that printers need of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Typeset {
-    /// One system a phase, in the model's order.
-    pub systems: Vec<EquationSystem>,
+    pub systems: Vec<EquationSystem>, // one per phase, in the model's order
     pub table: CoefficientTable,
     pub rounding: RoundingReport,
 }

@@ -16,7 +16,6 @@ pub fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signe
     Layout { pool, symbols }.signed(expr)
 }
 
-/// Lays out all terms of equations, each with its text.
 pub(super) fn terms<'e>(
     equations: &'e Equations<'_>,
     symbols: &SymbolTable,
@@ -53,7 +52,6 @@ struct Layout<'a> {
     symbols: &'a SymbolTable,
 }
 
-/// What a factor is sorted by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum FactorKey {
     Number,

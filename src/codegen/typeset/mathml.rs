@@ -1,5 +1,4 @@
-//! Equations for pages: the typeset tree as MathML Core, which browsers draw without scripts, a page that shows it, and
-//! the one way for text from outside into a page.
+//! Pages: equations in MathML Core, which browsers draw without scripts, and the one way in for text from outside.
 
 use std::fmt;
 
@@ -16,8 +15,7 @@ use crate::typeset::{
     SymbolTable, break_lines, symbol_width,
 };
 
-/// What a continued line is set in by, in em.
-const INDENT: f64 = 2.0;
+const INDENT: f64 = 2.0; // of a continued line, in em
 
 /// One phase as a `math` element with lines of `width_em`; an annotation for copying has its LaTeX.
 pub fn system(system: &EquationSystem, width_em: f64) -> String {

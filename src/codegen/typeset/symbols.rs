@@ -8,7 +8,6 @@ use super::tree::{Glyph, Symbol, greek, greek_letter};
 use crate::files::EmittedFile;
 use crate::model::LatentVariable;
 
-/// Why a table of new names was refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct RenameError(String);
@@ -65,7 +64,6 @@ impl SymbolTable {
         })
     }
 
-    /// How the acceleration of a latent coordinate is written, its index counted from 0.
     pub(crate) fn acceleration(&self, output: usize) -> Symbol {
         self.derivative(output, 2)
     }
@@ -113,8 +111,7 @@ impl std::fmt::Display for Glyph {
 const NAME: &str = "a letter, a word or a Greek letter's name, with an optional subscript of letters and digits after \
                     `_` (x, theta, p_x, F_lin,1)";
 
-/// Longest word in a name; more is surely a mistake.
-const LONGEST_WORD: usize = 24;
+const LONGEST_WORD: usize = 24; // more is surely a mistake
 
 fn parse_symbol(text: &str) -> Option<Symbol> {
     let (base, subscript) = match text.split_once('_') {
@@ -192,10 +189,8 @@ pub struct PrintOptions {
     pub form: Form,
 }
 
-/// The files of a printed form.
 pub type Emitted = Result<Vec<EmittedFile>, TypesetError>;
 
-/// Why the equations of a model could not be printed.
 #[derive(Debug, thiserror::Error)]
 pub enum TypesetError {
     /// A coefficient in robot coordinates is too large once folded with weights and scale factors.

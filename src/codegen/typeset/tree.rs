@@ -10,7 +10,6 @@ use crate::symbolic::Function;
 pub enum Math {
     /// A number without sign.
     Number(Decimal),
-    /// A variable with its dots and subscript.
     Symbol(Symbol),
     /// Terms with signs; a single negative term is a negated expression.
     Sum(Vec<Signed>),
@@ -30,7 +29,6 @@ pub enum Math {
     Group(Box<Math>),
 }
 
-/// A piece of mathematics with the sign in front of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signed {
     pub negative: bool,
@@ -55,17 +53,14 @@ impl Signed {
     }
 }
 
-/// A variable: a glyph, dots above it for time derivatives, and a subscript.
+/// A variable: a glyph, up to two dots above it for time derivatives, and a subscript, its parts joined by commas.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Symbol {
     pub glyph: Glyph,
-    /// How many dots stand above it: 0, 1 or 2.
     pub dots: u8,
-    /// The parts of the subscript, printed with commas between them.
     pub subscript: Vec<Glyph>,
 }
 
-/// A letter or word inside a symbol.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Glyph {
     /// One Latin letter, italic.
@@ -119,7 +114,6 @@ impl Math {
         }
     }
 
-    /// Whether the first thing printed is a digit.
     pub fn starts_with_digit(&self) -> bool {
         match self {
             Math::Number(_) => true,
@@ -144,10 +138,8 @@ const POINT: f64 = 0.278;
 const LETTER: f64 = 0.55;
 const THIN_SPACE: f64 = 0.167;
 const PARENTHESIS: f64 = 0.39;
-/// A binary plus or minus with its spaces.
-const OPERATOR: f64 = 1.222;
-/// An equals sign with its spaces.
-pub(crate) const EQUALS: f64 = 1.333;
+const OPERATOR: f64 = 1.222; // plus or minus with its spaces
+pub(crate) const EQUALS: f64 = 1.333; // with its spaces
 const MINUS: f64 = 0.778;
 /// Of a character in a script of the same, whose font is wider than the large one scaled to its size.
 const SCRIPT: f64 = 0.8;

@@ -1,5 +1,4 @@
-//! Sentences that every printed form of a model carries, in a spelling that the form chooses, and what pages of Markdown
-//! and HTML are made of.
+//! Sentences of every printed form of a model, in the form's spelling, and what Markdown and HTML pages are made of.
 
 use askama::Template;
 
@@ -168,8 +167,7 @@ fn at_most(error: f64) -> Decimal {
     Decimal::rounded(error, Rounding::Significant(2))
 }
 
-/// Longest line of an equation unless chosen, in em.
-const WIDTH_EM: f64 = 44.0;
+const WIDTH_EM: f64 = 44.0; // longest line of an equation unless chosen
 
 pub(super) struct Page<'a> {
     pub equations: &'a Equations<'a>,
@@ -199,7 +197,6 @@ impl<'a> Page<'a> {
         }
     }
 
-    /// Name, feet and equations of each phase.
     pub(super) fn phases(
         &self,
         math: impl Fn(&EquationSystem, f64) -> String,

@@ -114,11 +114,9 @@ enum Document<'a> {
     #[template(path = "latex/nomenclature.askama")]
     Nomenclature {
         header: String,
-        /// Symbol, unit and meaning of each latent coordinate.
-        positions: Vec<(String, Option<String>, String)>,
+        positions: Vec<(String, Option<String>, String)>, // symbol, unit, meaning
         velocities: String,
-        /// Symbol, unit and number of each input in physical units.
-        inputs: Vec<(String, String, usize)>,
+        inputs: Vec<(String, String, usize)>, // symbol, unit and number
         all_inputs: String,
         is_physical: bool,
         /// The map of velocities: the weights of an affine encoder, the Jacobian of another.
@@ -130,8 +128,7 @@ enum Document<'a> {
     Preview {
         header: String,
         model: &'a ReducedModel,
-        /// Introduction and identifier of each phase.
-        phases: Vec<(&'a str, &'a Identifier)>,
+        phases: Vec<(&'a str, &'a Identifier)>, // introduction and identifier
         rounding: String,
         siunitx: bool,
         two_columns: bool,
@@ -149,7 +146,6 @@ pub(super) fn is_narrow(width_em: f64) -> bool {
     width_em <= TWO_COLUMNS_EM
 }
 
-/// Running text of LaTeX.
 const TEX: Spelling = Spelling {
     text: tex_text,
     math: |math, _| format!("${}$", tex(math, NumberStyle::Plain)),
@@ -259,12 +255,9 @@ fn file(path: String, template: &Document<'_>) -> Result<EmittedFile, TypesetErr
     Ok(EmittedFile::new(path, rendered(template)?))
 }
 
-/// How many of an encoder row's weights are named.
-const STRONGEST: usize = 3;
-/// Weights below this share of the row's largest are not named.
-const NEGLIGIBLE: f64 = 0.1;
+const STRONGEST: usize = 3; // of an encoder row's weights are named
+const NEGLIGIBLE: f64 = 0.1; // share of the row's largest weight below which none is named
 
-/// The list of symbols with what each means.
 fn symbol_list<'a>(system: &Equations<'_>, header: String, options: &PrintOptions) -> Document<'a> {
     let (model, units) = (system.model(), system.latent_units());
     let (dim, numbers) = (model.latent_dim(), options.numbers);

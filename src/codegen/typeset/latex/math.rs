@@ -133,10 +133,8 @@ pub(crate) fn tex_unit(unit: Unit) -> String {
 }
 
 pub(super) const WIDTH_EM: f64 = 30.5;
-/// What a continued line is set in by, in em: `\qquad` and the empty group before its sign.
-const INDENT: f64 = 2.3;
-/// What the brace of `cases` takes of the line, in em.
-const BRACE: f64 = 1.8;
+const INDENT: f64 = 2.3; // of a continued line, in em: `\qquad` and the empty group before its sign
+const BRACE: f64 = 1.8; // of the brace of `cases`, in em
 /// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: no page holds many more.
 pub(super) const CASES_LINES: usize = 30;
 
@@ -145,8 +143,7 @@ pub(super) struct Block {
     pub count: usize,
     /// Whether the lines belong into `align` rather than `cases`.
     pub aligned: bool,
-    /// The lines with `\\` where they need it.
-    pub lines: Vec<String>,
+    pub lines: Vec<String>, // with `\\` where they need it
 }
 
 impl Block {

@@ -1,7 +1,6 @@
 //! Equations for papers: [`Equations`](crate::equations::Equations) enter, LaTeX files leave.
 //!
-//! Read [`document`](self::emit) first: it names the files. Names from a model file pass through [`tex_text`] and
-//! nothing else.
+//! Read [`emit`] first: it names the files. Names from a model file pass through [`tex_text`] and nothing else.
 //!
 //! ```
 //! use nalgebra::DMatrix;

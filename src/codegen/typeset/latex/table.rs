@@ -6,10 +6,8 @@ use super::document::is_narrow;
 use super::math::{label, tex, tex_number, tex_symbol, tex_text, tex_unit};
 
 const TERM_HEAD_EM: f64 = 2.31;
-/// Space around a column, in em: twice LaTeX's `\tabcolsep` at 10 pt.
-const COLUMN_SPACE_EM: f64 = 1.2;
-/// Width of a unit beside a term, in em.
-const UNIT_EM: f64 = 5.0;
+const COLUMN_SPACE_EM: f64 = 1.2; // around a column: twice LaTeX's `\tabcolsep` at 10 pt
+const UNIT_EM: f64 = 5.0; // beside a term
 /// Rows from which a table breaks across pages, or is cut where it cannot.
 const LONGEST: usize = 40;
 
