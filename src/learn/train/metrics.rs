@@ -17,14 +17,10 @@ use crate::sim::{Restart, phase_rule};
 
 pub use crate::robot::{BODY_X, BODY_Z};
 
-/// Rows of the state that say where the robot is on the floor and which way it looks: x, y, yaw.
-pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5];
-/// Length of the short predictions.
+pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5]; // place and heading: x, y, yaw
 const SHORT_S: f64 = 0.1;
-/// Window over which the accelerations behind `ddz_r2` are averaged, in samples.
-const SMOOTHING: usize = 11;
+const SMOOTHING: usize = 11; // samples, of the accelerations behind `ddz_r2`
 
-/// Figures of one model on one set of jumps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
@@ -129,7 +125,6 @@ fn ddz_r2(candidate: Candidate<'_>, set: EncodedSet<'_>, phase: usize) -> f64 {
     determination(&predicted, &target.transpose())
 }
 
-/// Of the samples whose torques can be the robot's, see [`is_plausible`](crate::evaluate::is_plausible).
 fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
     let (mut predicted, mut recorded) = (Vec::new(), Vec::new());
     for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
@@ -169,7 +164,6 @@ pub struct Trained {
     pub report: TrainReport,
 }
 
-/// Figures of a training, as the provenance carries them too.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrainReport {
     /// Coordinates that the encoder looks at.
@@ -177,7 +171,6 @@ pub struct TrainReport {
     /// Share of the input's energy that the latent input cannot carry.
     pub lift_loss: f64,
     pub active_terms: Vec<PhaseTerms>,
-    /// The regression that was chosen, where there was a choice.
     pub choice: Option<Choice>,
     pub candidates: usize,
     /// The seeds that were tried, where there were several; the first is the one kept.
@@ -189,22 +182,17 @@ pub struct TrainReport {
     /// Of the parts of the training jumps' prior; empty without one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub deviations: Vec<PartScore>,
-    /// Figures on the training recordings.
     pub training: SetMetrics,
-    /// Figures on the validation recordings, if there were any.
     pub validation: Option<SetMetrics>,
 }
 
-/// How well the accelerations' deviations in one part of a jump are explained.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartScore {
     pub part: String,
-    /// Coefficient of determination of the accelerations' deviations from the prior, each jump left out of prior and
-    /// fit in turn.
+    /// R^2 of the accelerations' deviations from the prior, each jump left out of prior and fit in turn.
     pub ddz_r2: f64,
 }
 
-/// Number of coefficients that are not zero in one phase.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PhaseTerms {
     pub phase: String,

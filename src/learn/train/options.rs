@@ -57,7 +57,6 @@ pub struct TrainOptions {
     pub seed: u64,
     /// How many seeds are tried, counting up from `seed`; the best is kept.
     pub n_seeds: usize,
-    /// Factors from SI to scaled units.
     pub scaling: ScaleOptions,
     /// Losses of the joints that are subtracted from the recorded torques; none if the motors' torques count.
     pub actuators: Option<Actuators>,
@@ -71,7 +70,6 @@ pub struct TrainOptions {
 pub struct JointOptions {
     pub schedule: Schedule,
     pub weights: LossWeights,
-    /// Value that all coefficients start at.
     pub xi_start: f64,
     /// Seeds trained at the same time; the result does not depend on it.
     pub threads: usize,
@@ -81,17 +79,14 @@ pub struct JointOptions {
     pub maps: MapOptions,
 }
 
-/// Layers of encoder and decoder; without hidden layers both are affine maps.
+/// Widths of the hidden layers of encoder and decoder, which end with a linear layer; without any both are affine maps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapOptions {
-    /// Widths of the encoder's hidden layers; a linear layer to the latent coordinates follows.
     pub encoder_layers: Vec<usize>,
-    /// Widths of the decoder's hidden layers; a linear layer to the state follows.
     pub decoder_layers: Vec<usize>,
     pub activation: Activation,
 }
 
-/// What follows the joint step on contact data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
     /// The published steps by Adam: decoder on whole jumps, then Xi of every phase.
@@ -140,7 +135,6 @@ pub struct RegressionOptions {
 }
 
 impl TrainOptions {
-    /// The defaults for a latent dimension.
     pub fn new(name: impl Into<String>, latent_dim: usize) -> Self {
         Self {
             name: name.into(),
@@ -175,7 +169,6 @@ impl TrainOptions {
         }
     }
 
-    /// How samples of a robot become inputs under these settings.
     pub fn input_rule(&self, robot: &'static Robot) -> InputRule {
         InputRule::new(robot, self.actuators.clone(), self.wrench_frame)
     }
@@ -305,7 +298,6 @@ impl JointOptions {
 }
 
 impl MapOptions {
-    /// Whether encoder and decoder are affine maps.
     pub fn is_linear(&self) -> bool {
         self.encoder_layers.is_empty() && self.decoder_layers.is_empty()
     }

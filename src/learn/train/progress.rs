@@ -25,12 +25,10 @@ impl<'a> Monitor<'a> {
         Self { listener, cancel }
     }
 
-    /// Whether the training should end with what it has.
     pub(crate) fn cancelled(&self) -> bool {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    /// The flag itself, for threads that work for this training.
     pub(super) fn cancel_flag(&self) -> &'a AtomicBool {
         self.cancel
     }
