@@ -1,6 +1,4 @@
-//! What is learned, computed and judged along recordings: training, simulation, control, plans, evaluation.
-//!
-//! `romc` re-exports every module; depend on that.
+//! Training, simulation, control, planning and evaluation of reduced-order models; `romc` re-exports every module.
 
 use romc_cas as symbolic;
 use romc_codegen::{ir, lower};

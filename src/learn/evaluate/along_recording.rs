@@ -1,7 +1,5 @@
-//! The controller along a recording: each control step sees the measured state, its reference is the recording itself.
-//!
-//! This is not a closed loop, the robot does not feel the commands. It asks what the controller would have commanded
-//! where the robot really was, and compares with what was commanded then.
+//! The controller along a recording, which is its reference: each command at a measured state is compared with the
+//! recorded one. Not a closed loop: the robot does not feel the commands.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -12,7 +10,6 @@ use super::*;
 use crate::mpc::{Lift, ReferenceSamples, StanceState, foot_forces, to_upright};
 use crate::robot::GRAVITY_M_S2;
 
-/// Where the controller's input reference comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum ReferenceInput {
     /// The recorded torques and forces, projected into the latent space.
@@ -63,8 +60,7 @@ impl Run {
     }
 }
 
-/// Runs the controller along a recording, one segment after the other. Recorded torques beyond twice the robot's limits
-/// are left out of the comparison and counted. `progress(done, total)` is called once per control step.
+/// Torques beyond twice the robot's limits are counted, not compared. `progress(done, total)` is called once per step.
 /// # Errors
 /// Those of [`Controller::set_reference`], [`MpcError::Step`], [`MpcError::NoStep`] for segments that are all shorter
 /// than one step, [`MpcError::Recording`].

@@ -201,7 +201,6 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    /// The pendulum with the published constants, and with those that `segments` fit best.
     pub fn all(rule: &InputRule, segments: &[&Segment]) -> Result<Vec<Self>, RecordingError> {
         let published = ("ASLIP, published constants", Aslip::PUBLISHED);
         let fitted = fit_aslip(rule, segments)?.map(|fitted| ("ASLIP, fitted constants", fitted));

@@ -108,8 +108,7 @@ impl<'a> Assessment<'a> {
     }
 }
 
-/// What speaks against using a model on these recordings: they are not of its robot ([`notes`]), or it does not explain
-/// their accelerations at all.
+/// Reasons against a model on these recordings: another robot ([`notes`]) or unexplained accelerations.
 pub fn remarks(model: &ReducedModel, recordings: &[Recording]) -> Result<Vec<String>> {
     let robot = model.robot()?;
     let mut pointwise = PointwiseSums::new(model);

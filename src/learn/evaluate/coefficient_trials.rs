@@ -10,11 +10,9 @@ pub(super) const GOOD_R2: f64 = 0.2;
 const NAMED: f64 = 1.2;
 /// The same of exchanged phases and of orders without a name, which are many.
 const UNNAMED: f64 = 4.0;
-/// Part of the variance below which residuals count as equal.
-const NO_RESIDUAL: f64 = 1e-9;
+const NO_RESIDUAL: f64 = 1e-9; // share of the variance below which residuals count as equal
 
-/// The names of tensors by the parts of a model that they are.
-pub(super) type Tensors<'a> = &'a dyn Fn(&str) -> Option<String>;
+pub(super) type Tensors<'a> = &'a dyn Fn(&str) -> Option<String>; // name of a tensor by its part of the model
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientTrials {
@@ -34,7 +32,7 @@ struct Reading {
 }
 
 impl CoefficientTrials {
-    /// Tries all readings of a model; `order` is that of a shorthand's terms in the file.
+    /// `order` is that of a shorthand's terms in the file.
     pub(super) fn new(
         model: &ReducedModel,
         segments: &[&Segment],
@@ -80,7 +78,6 @@ impl CoefficientTrials {
         })
     }
 
-    /// The order that the recordings decide on, among those that have a name.
     pub fn decided_order(&self) -> Option<LibraryOrder> {
         let residual = |r2: f64| (1.0 - r2).max(NO_RESIDUAL);
         let (best, r2) = (self.by_order.iter().copied())
@@ -134,7 +131,6 @@ fn readings(model: &ReducedModel, given: Option<LibraryOrder>) -> Result<Vec<Rea
     Ok(readings)
 }
 
-/// Another reading in words, with the options of an import that state it.
 fn advice(
     model: &ReducedModel,
     order: Option<LibraryOrder>,

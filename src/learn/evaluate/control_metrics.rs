@@ -136,8 +136,7 @@ pub struct ConstantVelocity {
     pub prediction_rms: Option<PredictionError>,
 }
 
-/// Measures a model and its baselines along a recording; programs that the structured solver takes whole are solved by
-/// it, as there are some thirty times as many as along the recording alone.
+/// Uses the structured solver where it accepts the whole program: there are some thirty times as many as in one run.
 pub fn control_metrics(
     model: &ReducedModel,
     recording: &Recording,
@@ -218,27 +217,22 @@ const LARGEST_M: f64 = 0.1;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Driver {
-    /// The controller, given the state with the deviation.
-    Feedback,
-    /// The controller, given the recorded state.
-    NoFeedback,
+    Feedback,   // measures the recorded state with the deviation
+    NoFeedback, // measures the recorded state
     Replay,
 }
 
 /// Mean squares over times and pushes.
 #[derive(Default)]
 pub(super) struct Recovery {
-    /// Of the body's deviation from the recording, m.
-    pub deviations: Mean,
-    /// Of planned minus reference positions, in standard deviations of the reference.
-    pub planned: Mean,
+    pub deviations: Mean, // of the body from the recording, m
+    pub planned: Mean, // planned minus reference positions, in standard deviations of the reference
 }
 
-/// The controller's feedback in a closed loop that no model has a part in: along a recording the measured state is the
-/// reference, so that feedback has nothing to do. Here the trunk gets a push and moves on by Newton's law under what
-/// the commanded torques differ from the recorded ones, `m dv' = sum_k R F_k(tau_command - tau_recorded)` with `F_k =
-/// -J_k^-T tau_k` for each foot `k` on the ground, `dp' = dv`, `J_k dq_k = -R^T dp`. The controller measures the
-/// recorded state plus this deviation.
+/// The controller's feedback in a closed loop without a model: along a recording the measured state is the reference,
+/// so that feedback has nothing to do. Here a pushed trunk moves by Newton's law under the difference of commanded and
+/// recorded torques, `m dv' = sum_k R F_k(tau_command - tau_recorded)` with `F_k = -J_k^-T tau_k` for each foot `k` on
+/// the ground, `dp' = dv`, `J_k dq_k = -R^T dp`. The controller measures the recorded state plus this deviation.
 pub(super) fn recovery(
     controller: &mut Controller,
     recording: &Recording,

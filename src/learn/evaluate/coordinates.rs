@@ -1,17 +1,14 @@
-//! Root mean square and coefficient of determination, of one number, of the robot's coordinates
-//! in SI units, and of torques.
+//! Root mean square and R^2 of one number, of the robot's coordinates in SI units, and of torques.
 
 use super::*;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
-    /// Root mean square of the residuals, in the unit of the samples.
     pub rms: f64,
     /// `1 - sum (y - y_hat)^2 / sum (y - mean y)^2`; `None` when the record does not move.
     pub r2: Option<f64>,
 }
 
-/// Sums that a [`Fit`] follows from; filled sample by sample, over several recordings if wanted.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FitSums {
     count: usize,
@@ -100,7 +97,6 @@ impl CoordinateSums {
         })
     }
 
-    /// Decodes a rollout of `segment`, encoded as `latent`, and adds its residuals.
     pub fn add_rollout(
         &mut self,
         model: &ReducedModel,
@@ -220,7 +216,6 @@ pub struct ByContact {
 
 type JointSums = [FitSums; JOINT_DIM];
 
-/// Running sums of a comparison of torques, contact and flight apart and together.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Comparison {
     contact: JointSums,

@@ -85,7 +85,6 @@ impl<'m> Probe<'m> {
         (self.model).ddz(self.phase, &self.model.encode(x)?, &dz, &u_lat)
     }
 
-    /// The same at rest.
     fn ddz_at_rest(&self, u: &DVector<f64>) -> Result<DVector<f64>, ModelError> {
         self.ddz([self.rest, &DVector::zeros(STATE_DIM), u])
     }

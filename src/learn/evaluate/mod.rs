@@ -1,8 +1,8 @@
-//! How good a model is, in numbers.
+//! Figures of a model's quality.
 //!
-//! Rollouts and recordings come in; fits (root mean square in SI units, coefficient of determination), template models
-//! under the same inputs, stability, the losses of the lift and a [`Verdict`] leave. `docs/mathematics.md` defines each
-//! figure once. Start with `assessment.rs`, then [`coordinates`](Fit).
+//! In: rollouts and recordings. Out: fits (root mean square in SI units, coefficient of determination), template models
+//! under the same inputs, stability, the losses of the lift and a [`Verdict`]. `docs/mathematics.md` defines each
+//! figure once. Start with `assessment`, then [`coordinates`](Fit).
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 

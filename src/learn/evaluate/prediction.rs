@@ -30,8 +30,7 @@ impl PredictionError {
 pub(super) struct RecordedStage {
     pub phase: usize,
     pub duration_s: f64,
-    /// `(z, dz)` at the beginning and at the end.
-    pub start: (DVector<f64>, DVector<f64>),
+    pub start: (DVector<f64>, DVector<f64>), // z, dz
     pub end: (DVector<f64>, DVector<f64>),
     pub input: DVector<f64>,
 }

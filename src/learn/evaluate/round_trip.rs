@@ -5,16 +5,12 @@ use super::*;
 use crate::model::{CoordinateOrder, StateMap};
 
 const SAMPLES: usize = 240;
-/// Relative error beyond which maps do not fit: that of an answer that never changes.
-const LARGEST_ERROR: f64 = 1.0;
-/// How many times smaller the error has to get for a slip to explain it.
-const EXPLAINED: f64 = 4.0;
+const LARGEST_ERROR: f64 = 1.0; // relative; beyond it maps do not fit: that of an answer that never changes
+const EXPLAINED: f64 = 4.0; // times smaller that a slip has to make the error to explain it
 /// How much larger than the smallest an error may be for an earlier slip to be taken: left and right differ little.
 const ALIKE: f64 = 1.5;
-/// Relative error that needs no explanation.
-const SMALL_ERROR: f64 = 0.01;
-/// Relative error beyond which no slip explains anything, however much larger the error was.
-const UNEXPLAINED: f64 = 0.3;
+const SMALL_ERROR: f64 = 0.01; // relative; needs no explanation
+const UNEXPLAINED: f64 = 0.3; // relative error beyond which no slip explains anything, however much larger it was
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoundTrip {
@@ -41,8 +37,7 @@ enum ScalingSlip {
 }
 
 impl RoundTrip {
-    /// None without recordings or without both maps. `order` is that of a standard library's terms in the file,
-    /// `tensors` has the names of tensors by their parts.
+    /// None without recordings or both maps. `order`: a standard library's terms in the file; `tensors`: names by part.
     pub fn of_import(
         model: &ReducedModel,
         segments: &[&Segment],

@@ -6,12 +6,10 @@ const NO_BETTER: f64 = 0.98;
 /// As a share of that of a constant velocity in x and z together: a coordinate alone may hardly accelerate.
 const SHORT_SHARE: f64 = 0.25;
 const WHOLE_SHARE: f64 = 1.0 / 3.0;
-/// Error of a constant velocity in body x and z below which recordings hardly move the body, m.
-const STILL_M: f64 = 1e-4;
+const STILL_M: f64 = 1e-4; // error of a constant velocity in body x and z below which recordings hardly move it
 const TORQUE_R2: f64 = 0.5;
 const UNPLANNED_SHARE: f64 = 0.5;
-/// Least number of latent directions in which inputs act on the ground: forwards and upwards.
-const LEAST_RANK: usize = 2;
+const LEAST_RANK: usize = 2; // latent directions in which inputs act on the ground: forwards and upwards
 const WHOLE: &str = "whole motion";
 const TORQUES: &str = "torques";
 const CONTROL: &str = "control";

@@ -1,5 +1,4 @@
-//! From a model to what the controller runs on: its numbers and its programs. The one place where the controller meets
-//! [`ReducedModel`].
+//! The controller's numbers and programs from a [`ReducedModel`]: the one place where the two meet.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,10 +18,8 @@ use crate::robot::{JOINT_DIM, STATE_DIM};
 /// Share of a recording's sampling below which the controller's step is too short for it.
 pub const STEP_SLACK: f64 = 0.99;
 
-/// Share of the mean variance added to every variance, for directions in which training inputs never moved.
-const VARIANCE_FLOOR: f64 = 1e-6;
+const VARIANCE_FLOOR: f64 = 1e-6; // share of the mean variance, for directions in which training inputs never moved
 
-/// The accelerations of a model's phases, run by the interpreter.
 #[derive(Debug)]
 struct ModelDynamics(CompiledModel);
 
@@ -49,16 +46,14 @@ impl LatentDynamics for ModelDynamics {
 }
 
 /// # Errors
-/// [`MpcError::Control`] for settings out of range or a problem that the solver refuses, those of [`control_model`] if
-/// the model lacks something and [`MpcError::Lower`] if its dynamics do not compile.
+/// Those of [`control_model`], [`MpcError::Lower`], and [`MpcError::Control`] for settings or problems refused.
 pub fn controller(model: &ReducedModel, settings: MpcSettings) -> Result<Controller, MpcError> {
     let plant = control_model(model)?;
     let dynamics = Box::new(ModelDynamics(CompiledModel::new(model)?));
     Ok(Controller::with_plant(plant, dynamics, settings)?)
 }
 
-/// Of a nonlinear model the matrices are those at the state that the decoder gives for `z = 0`, until a reference
-/// comes.
+/// Matrices of a nonlinear model are those at the state decoded from `z = 0` until a reference comes.
 ///
 /// # Errors
 /// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input statistics, [`MpcError::StateDim`]
@@ -99,7 +94,6 @@ pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
     Ok(plant.checked()?)
 }
 
-/// The nonlinear maps of a model over the robot's coordinates with full maps: checked when the plant was made.
 #[derive(Debug)]
 struct ModelMaps(ReducedModel);
 
@@ -209,8 +203,7 @@ pub const SOLVERS: [(&str, &str, Solver); 2] = [
     ),
 ];
 
-/// Why a controller could not be built or given a reference; once it runs, each command carries a
-/// [`Status`](super::Status).
+/// Why a controller could not be built or given a reference; commands carry a [`Status`](super::Status).
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "each variant's message names its fields")]
@@ -229,14 +222,12 @@ pub enum MpcError {
     Step {
         path: PathBuf,
         found_s: f64,
-        /// Time between samples, s.
         recorded_s: f64,
     },
     #[error("{}: {longest_s:.3} s without a gap, found a step of {found_s:.3e} s, expected a shorter one or a longer recording", path.display())]
     NoStep {
         path: PathBuf,
         found_s: f64,
-        /// The recording's longest segment, s.
         longest_s: f64,
     },
     #[error(transparent)]

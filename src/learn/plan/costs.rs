@@ -8,10 +8,8 @@ use super::*;
 use crate::mpc::{Cone, sparse};
 
 const TIME_UNIT_S: f64 = 0.01;
-/// The first latent coordinate that counts as posture: the two before it carry the body.
-const FIRST_OF_POSTURE: usize = 2;
+const FIRST_OF_POSTURE: usize = 2; // the two before it carry the body
 
-/// Half the sum of weighted squares.
 pub(crate) fn add(task: &Task<'_>, y: &[f64], builder: &mut Builder) {
     for (expression, weight) in squares(task, y) {
         builder.square(&expression, weight);
@@ -149,7 +147,6 @@ pub(crate) struct Affine {
 }
 
 impl Affine {
-    /// The expression with `factor` times a variable on top.
     pub(crate) fn plus(mut self, variable: usize, factor: f64) -> Self {
         if factor != 0.0 {
             self.terms.push((variable, factor));

@@ -1,10 +1,9 @@
 //! Jumps that nobody recorded: a goal in, a trajectory of the model's coordinates out.
 //!
 //! In: a model with landmarks and prior of its training jumps (`JumpPrior`), a [`Goal`]. Out: a [`Plan`], which is a
-//! recording that every other part of romc takes, and how far it is from what was recorded. Read `transcribe` first,
-//! which states the program; `seed` makes the trajectory it starts from, `solve` solves it by sequential convex
-//! programs on `QpSolver`, `motion` samples the result and checks it between the nodes, `verdict` says whether to
-//! trust it.
+//! recording, and its distance from what was recorded. Read `transcribe` first, which states the program; `seed` makes
+//! the trajectory it starts from, `solve` solves it by sequential convex programs on `QpSolver`, `motion` samples the
+//! result and checks it between the nodes, `verdict` judges it.
 //!
 //! ```
 //! use romc::plan::Goal;

@@ -11,8 +11,7 @@ const SOURCE: &str = "plan";
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Margins {
     pub torque_share: f64,
-    /// Farthest that a joint is outside its limits, rad; negative inside.
-    pub beyond_joint_limit_rad: f64,
+    pub beyond_joint_limit_rad: f64, // largest over the joints, negative inside
     pub beyond_friction_n: f64,
     /// At the nodes, beyond what it does in the prior, along and above the floor, m.
     pub foot_slip_m: [f64; 2],

@@ -17,11 +17,9 @@ pub(crate) struct Seed<'a> {
     pub goal: Goal,
     pub start: [DVector<f64>; 2],
     pub start_lost: Vec<String>,
-    /// `x = decode z + decode_bias`, SI units.
-    pub decode: DMatrix<f64>,
+    pub decode: DMatrix<f64>, // x = decode z + decode_bias, SI units
     pub decode_bias: DVector<f64>,
-    /// `u = lift u_lat`, SI units.
-    pub lift: DMatrix<f64>,
+    pub lift: DMatrix<f64>, // u = lift u_lat, SI units
     pub parts: Vec<SeedPart<'a>>,
 }
 
@@ -38,8 +36,7 @@ pub(crate) struct SeedPart<'a> {
     pub drift: Vec<DVector<f64>>,
     /// `d ddz / d (zeta, nu, mu)` at each node, in the program's variables, `latent_dim x 3 latent_dim`.
     pub slope: Vec<DMatrix<f64>>,
-    /// Lower Cholesky factor of the input covariance: `u_lat = prior + root mu`.
-    pub root: DMatrix<f64>,
+    pub root: DMatrix<f64>, // lower Cholesky factor of the input covariance: u_lat = prior + root mu
 }
 
 impl SeedPart<'_> {

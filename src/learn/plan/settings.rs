@@ -64,7 +64,6 @@ settings! {
     inset: f64 = 0.3, 0.5;
     /// Share of the torque limits that a plan may use at its nodes.
     torque_share: f64 = 0.9, 1.0;
-    /// Friction between feet and floor.
     friction: f64 = 0.6, ANY;
     /// Force that may exceed the friction cone, N: the input's force is not free of noise.
     friction_slack_n: f64 = 10.0, ANY;
@@ -76,7 +75,6 @@ settings! {
     height_slack_m: f64 = 0.02, ANY;
     /// Input deviation beyond which a plan comes with a warning.
     warn_deviation: f64 = 0.6, ANY;
-    /// Input deviation beyond which a plan is refused.
     refuse_deviation: f64 = 1.2, ANY;
     /// Distance of goals from the range of the training jumps, in widths of it, beyond which they are not tried.
     reach: f64 = 1.5, ANY;
@@ -146,7 +144,6 @@ impl Goal {
         self.goal_m
     }
 
-    /// Refuses goals that are farther from the training jumps' range than `reach` times its width.
     pub(super) fn check_within(&self, prior: &JumpPrior, height_m: f64, reach: f64) -> Result<()> {
         // Heights count from wherever the recordings have their zero.
         let names = [

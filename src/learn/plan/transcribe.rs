@@ -20,8 +20,7 @@
 use super::costs::{Affine, Builder};
 use super::*;
 
-/// Change of a duration that the variable `tau` counts as one.
-pub(crate) const DURATION_SHARE: f64 = 0.15;
+pub(crate) const DURATION_SHARE: f64 = 0.15; // change of a duration for tau = 1
 const DURATION_BOUND: f64 = 3.0;
 const DURATION_STEP: f64 = 2.0;
 /// Cost per unit of a bound that is not kept: high enough that only bounds that cannot be kept are not.
@@ -36,8 +35,7 @@ const FAR_JOINT_RAD: f64 = 0.3;
 pub enum Bound {
     Torque,
     Joint,
-    /// The friction cone, in 100 N.
-    Friction,
+    Friction, // violation in 100 N
     Height,
 }
 
@@ -354,7 +352,6 @@ impl<'a> Task<'a> {
     }
 }
 
-/// Rows that keep an expression in a range, with a violation if there is a variable for it.
 fn within(builder: &mut Builder, value: &Affine, range: [f64; 2], slack: Option<usize>) {
     for (sign, bound) in [(-1.0, -range[0]), (1.0, range[1])] {
         side(builder, value, (sign, bound), slack);
@@ -369,7 +366,7 @@ fn side(builder: &mut Builder, value: &Affine, (sign, bound): (f64, f64), slack:
     });
 }
 
-/// The same rows where the expression is not inside `far` at the iterate.
+/// [`within`], but only where the expression is not inside `far` at the iterate.
 fn near(
     builder: &mut Builder,
     value: &Affine,

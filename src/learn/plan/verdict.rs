@@ -14,12 +14,10 @@ pub enum Verdict {
     Trusted,
     /// Beyond the recordings, with the reasons: it may miss its goal.
     Extrapolates(Vec<String>),
-    /// Not to be carried out, with the reasons.
     Refused(Vec<String>),
 }
 
 impl Verdict {
-    /// One word: `trusted`, `extrapolates`, `refused`.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Trusted => "trusted",

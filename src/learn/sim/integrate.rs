@@ -9,18 +9,15 @@ use nalgebra::{DMatrix, DVector};
 
 /// A system of ordinary differential equations `dy/dt = f(t, y)`; only asked at finite states.
 pub trait OdeSystem {
-    /// Writes `f(t, y)`.
     fn rate(&mut self, time_s: f64, y: &[f64], dy: &mut [f64]);
 
     /// Writes `df/dy`, `state_dim x state_dim`.
     fn jacobian(&mut self, time_s: f64, y: &[f64], jacobian: &mut DMatrix<f64>);
 }
 
-/// How exactly to integrate, and when to give up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntegrationOptions {
     pub relative_tolerance: f64,
-    /// Absolute tolerance of a step, in the unit of the state.
     pub absolute_tolerance: f64,
     /// A state component beyond this magnitude counts as divergence.
     pub divergence_bound: f64,
@@ -39,12 +36,10 @@ impl Default for IntegrationOptions {
     }
 }
 
-/// States at the requested times, as far as the integration came.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Integration {
     /// `state_dim x reached`: a column for each requested time that was reached.
     pub states: DMatrix<f64>,
-    /// Time in seconds at which the state left the divergence bound, if it did.
     pub diverged_at_s: Option<f64>,
     pub method: IntegrationMethod,
 }
@@ -55,9 +50,7 @@ pub enum IntegrationMethod {
     Implicit,
 }
 
-/// States of `system` at `times`, from `initial` at `times[0]`.
-///
-/// A step shorter than 1e-13 of the whole time counts as divergence: a finite-time blow-up.
+/// States at `times` from `initial` at `times[0]`; a step below 1e-13 of the whole time is a blow-up: divergence.
 pub fn integrate(
     system: &mut impl OdeSystem,
     initial: &[f64],
@@ -93,8 +86,7 @@ struct Stepper<'a, S> {
     options: &'a IntegrationOptions,
     shortest: f64,
     evaluations: usize,
-    /// Index of the table at which the next step is expected to meet the tolerance.
-    goal: usize,
+    goal: usize, // index of the table expected to meet the tolerance
     budget: usize,
 }
 
@@ -168,8 +160,7 @@ impl<S: OdeSystem> Stepper<'_, S> {
         }
     }
 
-    /// Results with ever more substeps, until two neighbours in the extrapolation table agree to the tolerance or one
-    /// result more than expected was not enough.
+    /// Results with ever more substeps until two neighbours in the table agree or one more than expected fails.
     fn step(&mut self, time: f64, y: &DVector<f64>, h: f64) -> Trial {
         let begun = self.evaluations;
         let mut rate = DVector::zeros(y.len());

@@ -1,6 +1,5 @@
-//! Integration of the hybrid model.
-//!
-//! A model and recorded inputs come in; rollouts leave. `rollout.rs` first, `integrate.rs` for the method.
+//! Integration of the hybrid model: a model and recorded inputs in, rollouts out. Read `rollout` first, then
+//! `integrate`.
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 

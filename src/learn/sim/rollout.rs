@@ -1,6 +1,5 @@
-//! Rollouts: the hybrid model integrated over the recorded inputs, equation (24).
-//!
-//! Phases switch as recorded; between samples the latent input is interpolated linearly.
+//! Rollouts: the hybrid model integrated over the recorded inputs, equation (24). Phases switch as recorded; between
+//! samples the latent input is interpolated linearly.
 
 use std::ops::Range;
 
@@ -17,7 +16,7 @@ use crate::recording::{PhaseRule, RecordingError, Segment};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Restart {
     Never,
-    /// After this many seconds, over and over.
+    /// Period in s.
     Every(f64),
 }
 
@@ -31,7 +30,6 @@ pub struct Window {
     pub diverged_at_s: Option<f64>,
 }
 
-/// A segment's rollout: windows in the order of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rollout {
     pub windows: Vec<Window>,
@@ -204,10 +202,8 @@ impl OdeSystem for PhaseDynamics<'_> {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimError {
-    /// The model lacks a part, or a shape does not fit.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The recording cannot be turned into inputs.
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }
@@ -230,7 +226,6 @@ pub struct LatentSegment {
 }
 
 impl LatentSegment {
-    /// Encodes a segment.
     pub fn encode(model: &ReducedModel, segment: &Segment) -> Result<Self, SimError> {
         let input = segment.input(&model.input_rule()?)?;
         let samples = |map: &dyn Fn(usize) -> Result<DVector<f64>, SimError>| {
@@ -270,7 +265,6 @@ impl LatentSegment {
     }
 }
 
-/// By the spans of the model's phases ([`PhaseRule::spans`]), as in training.
 fn phases(model: &ReducedModel, segment: &Segment) -> Result<Vec<usize>, SimError> {
     let mut phases = vec![0; segment.len()];
     for span in phase_rule(model).spans(segment)? {

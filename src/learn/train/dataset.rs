@@ -19,7 +19,6 @@ use crate::robot::{FeetRule, InputRule, JOINT_DIM, STATE_DIM, WrenchFrame};
 /// Fewest samples of a segment, and of a phase over all segments.
 pub const MIN_SAMPLES: usize = 50;
 
-/// Factors from SI to scaled units, one a coordinate.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Scaling {
     pub state: DVector<f64>,
@@ -36,7 +35,6 @@ pub struct ScaleOptions {
 }
 
 impl ScaleOptions {
-    /// One factor for everything, as the paper has it.
     pub(crate) fn uniform(factor: f64) -> Self {
         Self {
             state: factor,
@@ -73,22 +71,19 @@ impl ScaleOptions {
     }
 }
 
-/// One continuous jump (a segment of a recording); samples are columns, all in scaled units.
+/// One continuous jump (a segment of a recording), scaled units; samples are columns: `18 x n`, of the losses `12 x n`.
 #[derive(Clone, Debug)]
 pub(super) struct Jump {
     pub path: PathBuf,
     pub time_s: Vec<f64>,
     pub x: DMatrix<f64>,
     pub dx: DMatrix<f64>,
-    /// Accelerations smoothed within each phase, `18 x n`.
-    pub ddx: DMatrix<f64>,
-    /// Inputs `[tau; F; M]`, `18 x n`.
-    pub u: DMatrix<f64>,
-    /// Joint friction and rotor inertia, which recorded torques have on top of `u`, `12 x n`; none without actuators.
+    pub ddx: DMatrix<f64>, // smoothed within each phase
+    pub u: DMatrix<f64>,   // [tau; F; M]
+    /// Joint friction and rotor inertia, which recorded torques have on top of `u`; none without actuators.
     pub losses: Option<DMatrix<f64>>,
     pub phase: Vec<usize>,
-    /// Maximal runs of one phase.
-    pub spans: Vec<(usize, Range<usize>)>,
+    pub spans: Vec<(usize, Range<usize>)>, // maximal runs of one phase
     /// Samples whose recorded torques are no torques of the robot, see [`is_plausible`].
     pub implausible: Vec<usize>,
 }
@@ -105,17 +100,14 @@ impl Jump {
 
 #[derive(Clone, Debug)]
 pub(super) struct Dataset {
-    pub jumps: Vec<Jump>,
+    pub jumps: Vec<Jump>, // in the order of the files and their segments
     pub phases: PhaseRule,
-    /// Units of everything in [`Self::jumps`].
-    pub scaling: Scaling,
-    /// Window of the moving average over accelerations, in samples.
-    pub(super) smoothing: usize,
+    pub scaling: Scaling,        // of the jumps
+    pub(super) smoothing: usize, // window of the moving average over accelerations, samples
     pub(super) rule: InputRule,
 }
 
 impl Dataset {
-    /// `smoothing` is the window of the moving average over accelerations, in samples.
     pub(super) fn new(
         recordings: &[Recording],
         rule: &InputRule,
@@ -136,12 +128,11 @@ impl Dataset {
         Ok(dataset)
     }
 
-    /// States of one phase or of all side by side, `18 x samples`.
+    /// One phase or all side by side, `18 x samples`; likewise the inputs.
     pub(super) fn states(&self, phase: Option<usize>) -> DMatrix<f64> {
         self.gather(phase, |jump| &jump.x)
     }
 
-    /// Inputs of one phase or of all side by side, `18 x samples`.
     pub(super) fn inputs(&self, phase: Option<usize>) -> DMatrix<f64> {
         self.gather(phase, |jump| &jump.u)
     }

@@ -40,7 +40,6 @@ pub enum TrainError {
     LatentDim { requested: usize, active: usize },
     #[error("{option} is {found}, expected {expected}")]
     Option {
-        /// As on the command line.
         option: &'static str,
         found: String,
         expected: &'static str,

@@ -1,9 +1,7 @@
-//! A bound on the growth of deviations.
-//!
-//! About the mean state of a phase a deviation moves by `A = [0 I; d ddz/dz  d ddz/d dz]`, so it grows at most at the
-//! largest real part of the eigenvalues of `A`. Through phases of durations `T_1 ... T_k` it is multiplied by `M =
-//! e^(A_k T_k) ... e^(A_1 T_1)`, whose eigenvalues `mu` have rates `ln|mu| / sum T`: feedback that is stable in every
-//! phase may still grow through their sequence.
+//! A bound on the growth of deviations. About the mean state of a phase a deviation moves by
+//! `A = [0 I; d ddz/dz  d ddz/d dz]`, so it grows at most at the largest real part of the eigenvalues of `A`. Through
+//! phases of durations `T_1 ... T_k` it is multiplied by `M = e^(A_k T_k) ... e^(A_1 T_1)`, whose eigenvalues `mu` have
+//! rates `ln|mu| / sum T`: feedback that is stable in every phase may still grow through their sequence.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,14 +14,11 @@ use super::latent::EncodedSet;
 use super::rollout::Xi;
 use crate::evaluate::{eigenvalues, state_matrix};
 
-/// Steps of least change before coefficients are scaled down instead.
-const STEPS: usize = 30;
-const HALVINGS: usize = 100;
-const SHORTENED: i32 = 6;
-/// Share of the bound that steps aim at.
-const AIM: f64 = 0.99;
-/// Difference of the quotients, relative to the largest value that is moved.
-const DIFFERENCE: f64 = 1e-6;
+const STEPS: usize = 30; // of least change, before coefficients are scaled down instead
+const HALVINGS: usize = 100; // after which nothing is left that could grow
+const SHORTENED: i32 = 6; // of a step, until it makes growth slower
+const AIM: f64 = 0.99; // share of the bound that steps aim at
+const DIFFERENCE: f64 = 1e-6; // of the quotients, relative to the largest value that is moved
 
 pub(super) struct Growth {
     bound_per_s: f64,            // infinite without a bound
@@ -265,7 +260,6 @@ fn slopes_at(mean: &[f64], features: &Features) -> DMatrix<f64> {
     })
 }
 
-/// The order of phases that most jumps have, with their mean durations.
 fn usual_sequence(dataset: &Dataset) -> Vec<(usize, f64)> {
     let mut orders: BTreeMap<Vec<usize>, (usize, Vec<f64>)> = BTreeMap::new();
     for jump in &dataset.jumps {

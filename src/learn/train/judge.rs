@@ -9,16 +9,12 @@ use super::latent::{EncodedSet, Latent};
 use super::rollout::{Candidate, Change, Window, Xi, plain, predict, predict_changed, windows};
 use crate::sim::Restart;
 
-/// Weight of whole-jump rollouts against predictions of 0.1 s in a score.
-const ROLLOUT_WEIGHT: f64 = 0.2;
-/// Samples between errors that coefficients are refined by.
-const THINNED: usize = 5;
+const ROLLOUT_WEIGHT: f64 = 0.2; // of whole-jump rollouts against predictions of 0.1 s
+const THINNED: usize = 5; // samples between errors that coefficients are refined by
 /// Jumps of a part: with all errors at once, their derivatives would fill the memory for sets of many jumps.
 const JUMPS: usize = 64;
-/// Least error, in standard deviations, that others are taken relative to.
-const LEAST_ERROR: f64 = 1e-3;
-/// Kinds of windows: 0.1 s, and whole jumps.
-const SHORT: usize = 0;
+const LEAST_ERROR: f64 = 1e-3; // in standard deviations; others are relative to at least this
+const SHORT: usize = 0; // windows of 0.1 s; LONG: whole jumps
 const LONG: usize = 1;
 
 /// A library, and samples to judge its coefficients on (`library_dim x latent_dim` a phase).
@@ -43,8 +39,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Judges by errors relative to those of `xi`, so that a tenth less counts the same for a body that jumps half a
-    /// metre and for a leg.
+    /// Judges by errors relative to those of `xi`: a tenth less counts alike for a body that jumps 0.5 m and a leg.
     pub(super) fn relative_to(&self, xi: &[Xi]) -> Self {
         let mut relative = self.clone();
         for kind in [SHORT, LONG] {

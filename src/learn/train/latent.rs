@@ -13,14 +13,10 @@ const FITS: &str = "invariant: a trained or checked map takes the robot's coordi
 /// Latent samples of one jump; columns are samples, scaled units.
 #[derive(Clone, Debug)]
 pub(super) struct Latent {
-    /// `z = W_e x + b_e`, of a nonlinear encoder `E(x)`.
-    pub z: DMatrix<f64>,
-    /// `dz = W_e dx`, or `J dx` with the Jacobian at the sample.
-    pub dz: DMatrix<f64>,
-    /// `ddz = W_e ddx`, or `J ddx + dJ/dt dx`.
-    pub ddz: DMatrix<f64>,
-    /// `u_lat = pinv(W_e^T) u`, or `pinv(J^T) u`.
-    pub u_lat: DMatrix<f64>,
+    pub z: DMatrix<f64>,     // W_e x + b_e, of a nonlinear encoder E(x)
+    pub dz: DMatrix<f64>,    // W_e dx, or J dx with the Jacobian at the sample
+    pub ddz: DMatrix<f64>,   // W_e ddx, or J ddx + dJ/dt dx
+    pub u_lat: DMatrix<f64>, // pinv(W_e^T) u, or pinv(J^T) u
 }
 
 impl Latent {

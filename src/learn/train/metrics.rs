@@ -15,13 +15,10 @@ use crate::recording::Recording;
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM};
 use crate::sim::{Restart, phase_rule};
 
-/// Rows of the state that say where the robot is on the floor and which way it looks: x, y, yaw.
-pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5];
+pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5]; // place and heading: x, y, yaw
 const SHORT_S: f64 = 0.1;
-/// Window over which the accelerations behind `ddz_r2` are averaged, in samples.
-const SMOOTHING: usize = 11;
+const SMOOTHING: usize = 11; // samples, of the accelerations behind `ddz_r2`
 
-/// Figures of one model on one set of jumps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
@@ -125,7 +122,6 @@ fn ddz_r2(candidate: Candidate<'_>, set: EncodedSet<'_>, phase: usize) -> f64 {
     determination(&predicted, &target.transpose())
 }
 
-/// Of the samples whose torques can be the robot's, see [`is_plausible`](crate::evaluate::is_plausible).
 fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
     let (mut predicted, mut recorded) = (Vec::new(), Vec::new());
     for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
@@ -165,14 +161,12 @@ pub struct Trained {
     pub report: TrainReport,
 }
 
-/// Figures of a training, as the provenance carries them too.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrainReport {
     pub encoded: Vec<String>,
     /// Share of the input's energy that the latent input cannot carry.
     pub lift_loss: f64,
     pub active_terms: Vec<PhaseTerms>,
-    /// The regression that was chosen, where there was a choice.
     pub choice: Option<Choice>,
     pub candidates: usize,
     /// The seeds that were tried, where there were several; the first is the one kept.
@@ -185,15 +179,13 @@ pub struct TrainReport {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub deviations: Vec<PartScore>,
     pub training: SetMetrics,
-    /// Figures on the validation recordings, if there were any.
     pub validation: Option<SetMetrics>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartScore {
     pub part: String,
-    /// Coefficient of determination of the accelerations' deviations from the prior, each jump left out of prior and
-    /// fit in turn.
+    /// R^2 of the accelerations' deviations from the prior, each jump left out of prior and fit in turn.
     pub ddz_r2: f64,
 }
 

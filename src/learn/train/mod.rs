@@ -1,8 +1,8 @@
 //! Learning: recordings in, a reduced-order model with its figures out.
 //!
-//! Enters: recordings of jumps, a robot, [`TrainOptions`]. Leaves: a [`Trained`] model, whose provenance says how to
-//! repeat it, and a [`TrainReport`]. Read [`closed_form()`] first: it walks from the dataset over the encoder's row
-//! space (`subspace`) and the decoder (`latent`) to the dynamics (`weak_form`, `sparse`, `select`), judged by rollouts.
+//! In: recordings of jumps, a robot, [`TrainOptions`]. Out: a [`Trained`] model, whose provenance says how to repeat
+//! it, and a [`TrainReport`]. Read [`closed_form()`] first: it walks from the dataset over the encoder's row space
+//! (`subspace`) and the decoder (`latent`) to the dynamics (`weak_form`, `sparse`, `select`), judged by rollouts.
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 

@@ -81,17 +81,14 @@ pub struct JointOptions {
     pub maps: MapOptions,
 }
 
-/// Layers of encoder and decoder; without hidden layers both are affine maps.
+/// Widths of the hidden layers of encoder and decoder, which end with a linear layer; without any both are affine maps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapOptions {
-    /// Widths of the encoder's hidden layers; a linear layer to the latent coordinates follows.
     pub encoder_layers: Vec<usize>,
-    /// Widths of the decoder's hidden layers; a linear layer to the state follows.
     pub decoder_layers: Vec<usize>,
     pub activation: Activation,
 }
 
-/// What follows the joint step on contact data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
     /// The published steps by Adam: decoder on whole jumps, then Xi of every phase.

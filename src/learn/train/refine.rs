@@ -13,11 +13,10 @@ use super::sparse::{Knowledge, active_terms, brake};
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
 const PRIOR: f64 = 1e-3;
-const STEP: f64 = 1e-6;
+const STEP: f64 = 1e-6; // relative, of the difference quotients
 const ATTEMPTS: usize = 6;
 const TOGETHER: usize = 64;
-/// Share of the squared errors that a step must lower them by to be followed by another.
-const LEAST_GAIN: f64 = 2e-3;
+const LEAST_GAIN: f64 = 2e-3; // share of the squared errors that a step must lower them by to be followed by another
 
 /// Coefficients of all phases, `library_dim x latent_dim` each, and the score that judges them.
 #[derive(Clone, Debug)]
@@ -163,8 +162,7 @@ impl Refiner<'_> {
         best
     }
 
-    /// Keeps the bound on growth by the least change, as `inverse` weighs relative ones, and braking coefficients at
-    /// most 0.
+    /// Keeps the bound on growth by the least relative change (`inverse`), and braking coefficients at most 0.
     fn admit(
         &self,
         xi: &mut [Xi],
@@ -188,7 +186,6 @@ impl Refiner<'_> {
         }
     }
 
-    /// Squared errors of all parts; none if a rollout diverges.
     fn squared_error(&self, xi: &[Xi], weights: [f64; 2]) -> Option<f64> {
         let of_part =
             |part| Some(stacked(&self.training.errors(xi, part)?, weights).norm_squared());
@@ -238,7 +235,6 @@ impl Refiner<'_> {
     }
 }
 
-/// Errors of both kinds of windows, weighted, one below the other.
 fn stacked(errors: &[DVector<f64>; 2], weights: [f64; 2]) -> DVector<f64> {
     let each = errors.iter().zip(weights);
     let values = each.flat_map(|(errors, weight)| errors.iter().map(move |e| e * weight));
@@ -258,12 +254,9 @@ fn add_gram(gram: &mut DMatrix<f64>, a: &DMatrix<f64>) {
     }
 }
 
-/// Damping of the changes, relative to each coefficient's own weight.
-const DAMPING: f64 = 1e-3;
-/// Terms tried about the same coefficients before it is taken that none can be dropped.
-const DROP_ATTEMPTS: usize = 8;
-/// Terms dropped about the same coefficients, after which the form is computed anew.
-const DROPPED_TOGETHER: usize = 4;
+const DAMPING: f64 = 1e-3; // of the changes, relative to each coefficient's own weight
+const DROP_ATTEMPTS: usize = 8; // terms tried about the same coefficients before none counts as droppable
+const DROPPED_TOGETHER: usize = 4; // about the same coefficients; then the form is computed anew
 
 impl Refiner<'_> {
     /// Drops terms one at a time, those first that training misses least, while `judge` scores at most `limit`. Inputs
@@ -339,12 +332,9 @@ impl Refiner<'_> {
 #[derive(Clone)]
 struct QuadraticForm {
     free: FreeCoefficients,
-    /// Relative changes that make the coefficients zero.
-    to_zero: DVector<f64>,
-    /// Where the form is lowest, with those that are gone at zero.
-    lowest: DVector<f64>,
-    /// Inverse of the form's matrix on those that are not gone.
-    inverse: DMatrix<f64>,
+    to_zero: DVector<f64>, // relative changes that make the coefficients zero
+    lowest: DVector<f64>,  // where the form is lowest, with those that are gone at zero
+    inverse: DMatrix<f64>, // of the form's matrix, on those that are not gone
     gone: Vec<bool>,
 }
 

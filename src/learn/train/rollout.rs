@@ -1,6 +1,5 @@
-//! Rollouts of candidate models, many at once, by the classical Runge-Kutta method.
-//!
-//! Loops go over indices: iterators of several slices at once are calls in code for other vector units than the rest.
+//! Rollouts of candidate models, many at once, by the classical Runge-Kutta method. Loops go over indices: iterators of
+//! several slices at once are calls in code for other vector units than the rest.
 
 use std::cmp::Reverse;
 
@@ -11,15 +10,12 @@ use super::features::{FeatureValues, Features, vectorised};
 use super::latent::EncodedSet;
 use crate::sim::{Restart, restart_windows};
 
-/// Magnitude of a state from which a rollout counts as diverged.
-const DIVERGED: f64 = 1e6;
+const DIVERGED: f64 = 1e6; // magnitude of a state from which a rollout counts as diverged
 /// Input of the step (start, middle, end) that each stage has, and its share of the step.
 const STAGES: [(usize, f64); 4] = [(0, 0.0), (1, 0.5), (1, 0.5), (2, 1.0)];
 
-/// Coefficients of one phase, `library_dim x latent_dim`.
-pub(super) type Xi = DMatrix<f64>;
-/// Phase, term and latent coordinate of a coefficient.
-pub(super) type CoefficientIndex = (usize, usize, usize);
+pub(super) type Xi = DMatrix<f64>; // of one phase, library_dim x latent_dim
+pub(super) type CoefficientIndex = (usize, usize, usize); // phase, term, latent coordinate
 
 /// Latent dynamics under trial: `ddz = Xi_phase^T theta(z, dz, u_lat)`.
 #[derive(Clone, Copy, Debug)]
@@ -37,10 +33,8 @@ pub(super) struct Change {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Window {
     pub jump: usize,
-    /// First sample; the rollout starts at its true latent state.
-    pub start: usize,
-    /// Steps to take; the window covers samples `start ..= start + steps`.
-    pub steps: usize,
+    pub start: usize, // first sample: the rollout starts at its true latent state
+    pub steps: usize, // the window covers samples start ..= start + steps
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -70,10 +64,9 @@ pub(super) fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
     windows
 }
 
-/// Latent positions predicted in every row, `latent_dim x steps` (samples `start + 1 ..= start + steps`).
-///
-/// The latent input is interpolated linearly, the phase is that of the sample a step starts from. Values beyond 1e6 are
-/// infinite from there on. What is computed for a row does not depend on the others.
+/// Latent positions predicted in every row, `latent_dim x steps` (samples `start + 1 ..= start + steps`), whatever the
+/// other rows. The latent input is interpolated linearly, the phase is that of the sample a step starts from. Values
+/// beyond 1e6 are infinite from there on.
 pub(super) fn predict(
     candidate: Candidate<'_>,
     set: EncodedSet<'_>,
@@ -177,7 +170,6 @@ impl<'a> Stepper<'a> {
         }
     }
 
-    /// Fits everything but the state to the number of rows.
     fn make_room(&mut self) {
         let (n, d) = (self.rows.len(), self.candidate.features.latent_dim);
         self.phase = vec![0; n];
@@ -243,7 +235,6 @@ impl<'a> Stepper<'a> {
 }
 
 vectorised! {
-    /// States that are some of the step from `state` along `rates`.
     fn move_along(moved: &mut [f64], state: &[f64], rates: &[f64], step_s: &[f64], share: f64) {
         for (column, moved) in moved.chunks_exact_mut(step_s.len()).enumerate() {
             let n = moved.len();
@@ -257,7 +248,6 @@ vectorised! {
 }
 
 vectorised! {
-    /// `ddz = Xi_phase^T theta` of all rows.
     fn accelerate(
         ddz: &mut [f64],
         features: &Features,

@@ -12,7 +12,6 @@ use super::rollout::Xi;
 use super::task::{Fitted, Origin, Task, provenance};
 use crate::model::{LatentVariable, Library, ModelError};
 
-/// What a seed came to and its numbers, or why it has none.
 pub(super) type Outcome = Result<(SeedReport, Fitted), TrainError>;
 
 #[derive(Default)]
@@ -95,8 +94,7 @@ fn is_of_one_seed(error: &TrainError) -> bool {
     matches!(error, NoStableModel { .. } | TermValue { .. } | Model(_))
 }
 
-/// Encoder weights and Xi of every phase.
-type Run<'a> = (&'a DMatrix<f64>, &'a [Xi]);
+type Run<'a> = (&'a DMatrix<f64>, &'a [Xi]); // encoder weights, Xi of every phase
 
 /// Mean over pairs of runs of (coefficients active in both) / (active in either), after matching latent coordinates.
 fn support_overlap(

@@ -18,8 +18,7 @@ use super::weak_form::windowed_samples;
 
 /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
 const WINDOWS: [usize; 3] = [0, 25, 50];
-/// Ridges on the normalised columns.
-const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2];
+const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2]; // on the normalised columns
 /// Prunings; eliminations share the walk that drops terms one by one.
 const PRUNINGS: [Pruning; 10] = [
     Pruning::Elimination(1e-3),
@@ -36,17 +35,12 @@ const PRUNINGS: [Pruning; 10] = [
 /// How many candidates are pruned further, a term at a time, while their score stays within the slack.
 const SWEEPS: usize = 3;
 
-/// Share of the score that a term must bring to be added.
-const LEAST_GAIN: f64 = 0.005;
-/// Terms tried in a round of adding.
-const ATTEMPTS: usize = 60;
-/// Rounds of adding.
-const ROUNDS: usize = 3;
+const LEAST_GAIN: f64 = 0.005; // share of the score that a term must bring to be added
+const ATTEMPTS: usize = 60; // terms tried in a round of adding
+const ROUNDS: usize = 3; // of adding
 
-/// A share of the energy, and the phase, row and column of the term that it belongs to.
-type RankedTerm = (f64, usize, usize, usize);
+type RankedTerm = (f64, usize, usize, usize); // share of the energy; phase, row, column of its term
 
-/// How a candidate was fitted, and how it did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     pub window: usize,
@@ -57,11 +51,9 @@ pub struct Choice {
     pub active: usize,
 }
 
-/// Of all combinations of windows, ridges and prunings within the slack of the best, the sparsest: Xi of every phase,
-/// how it was fitted, and how many candidates there were.
-///
-/// The best by `judge` sets the scale: from there on errors are relative to its own. If cancelled, the search ends as
-/// soon as a candidate is stable.
+/// Of all combinations of windows, ridges and prunings within the slack of the best by `judge`, the sparsest: Xi of
+/// every phase, how it was fitted, and the number of candidates. Once there is a best, errors are relative to its own.
+/// If cancelled, the search ends as soon as a candidate is stable.
 pub(super) fn select(
     set: EncodedSet<'_>,
     knowledge: &[Knowledge],
@@ -167,7 +159,6 @@ impl Trial<'_> {
         });
     }
 
-    /// What `shares` gives for each column of every phase.
     fn places(
         &self,
         shares: fn(&Regression, usize, &DMatrix<bool>, f64) -> Vec<(usize, f64)>,
@@ -184,8 +175,7 @@ impl Trial<'_> {
     }
 }
 
-/// Of every phase, for each of the windows.
-type Regressions = [Vec<Regression>; WINDOWS.len()];
+type Regressions = [Vec<Regression>; WINDOWS.len()]; // of every phase, for each of the windows
 
 impl Refiner<'_> {
     /// All combinations; where the library has terms that are not affine also those without them, and the best of these

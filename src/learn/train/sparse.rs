@@ -10,13 +10,10 @@ use super::features::Features;
 use super::subspace::Frame;
 use crate::robot::{BODY_Z, FeetRule, GRAVITY_M_S2};
 
-/// Least ridge on the normalised columns: far above rounding.
-const LEAST_RIDGE: f64 = 1e-10;
-/// Supports up to this size are solved anew after every elimination, larger ones by an update.
-const RECOMPUTED: usize = 64;
+const LEAST_RIDGE: f64 = 1e-10; // on the normalised columns: far above rounding
+const RECOMPUTED: usize = 64; // up to this size, supports are solved anew after an elimination, larger ones updated
 
-/// Active terms, `library_dim x latent_dim`.
-type Support = DMatrix<bool>;
+type Support = DMatrix<bool>; // active terms, library_dim x latent_dim
 
 /// Normal equations of `ddz = theta Xi` for one phase, columns normalised to unit root mean square.
 #[derive(Clone, Debug)]
@@ -28,7 +25,6 @@ pub(super) struct Regression {
     knowledge: Knowledge,
 }
 
-/// When a term of the library is dropped.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Pruning {
@@ -180,7 +176,6 @@ impl Regression {
             .collect()
     }
 
-    /// One column of Xi on a given support (`library_dim x latent_dim`, true where a term is active).
     pub(super) fn fit_column(&self, column: usize, support: &Support, ridge: f64) -> DVector<f64> {
         let rows = self.active_terms(column, support);
         let solution = self.solve(column, &rows, ridge);
@@ -189,8 +184,7 @@ impl Regression {
         xi.column(column).into_owned()
     }
 
-    /// The inverse of the normal equations applied to a gradient, each column relative to the energy of its
-    /// accelerations.
+    /// The inverse of the normal equations times a gradient, each column relative to the energy of its accelerations.
     pub(super) fn change(
         &self,
         xi: &DMatrix<f64>,
@@ -313,20 +307,15 @@ fn column_rms(matrix: &DMatrix<f64>) -> DVector<f64> {
     DVector::from_iterator(matrix.ncols(), rms)
 }
 
-/// Rows that a frame holds: the centre of mass forwards and upwards.
-const HELD: usize = 2;
+const HELD: usize = 2; // rows that a frame holds: the centre of mass forwards and upwards
 
-/// Coefficients of one phase that are known, those that a regression may choose, and those that it must keep.
+/// Known coefficients of one phase, and those left to a regression; all `library_dim x latent_dim`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Knowledge {
-    /// `library_dim x latent_dim`, zero where nothing is known.
-    pub known: DMatrix<f64>,
-    /// Whether a coefficient is free, `library_dim x latent_dim`.
-    pub free: DMatrix<bool>,
-    /// Whether a free coefficient stays whatever it explains, `library_dim x latent_dim`.
-    pub kept: DMatrix<bool>,
-    /// Whether a free coefficient is at most 0 once it is refined, `library_dim x latent_dim`.
-    pub braking: DMatrix<bool>,
+    pub known: DMatrix<f64>,    // zero where nothing is known
+    pub free: DMatrix<bool>,    // to be chosen by a regression
+    pub kept: DMatrix<bool>,    // free, and stay whatever they explain
+    pub braking: DMatrix<bool>, // free, and at most 0 once refined
 }
 
 impl Knowledge {
@@ -339,9 +328,8 @@ impl Knowledge {
         }
     }
 
-    /// What is known of each phase in a frame that holds the centre of mass as `z1` (forwards) and `z2` (upwards).
-    ///
-    /// The floor is the same everywhere: no term depends on `z1`. Forces move a centre of mass and losses brake it,
+    /// What is known of each phase in a frame that holds the centre of mass as `z1` (forwards) and `z2` (upwards). The
+    /// floor is the same everywhere: no term depends on `z1`. Forces move a centre of mass and losses brake it,
     /// wherever it and the legs are: no term of `ddz1` and `ddz2` depends on a position, and each keeps its own
     /// velocity, braking. With feet on the ground `ddz2` depends on its own force and velocity alone, and keeps its
     /// constant (gravity, less what the ground carries of the legs' weight). In flight `ddz1 = 0`, `ddz2 = -g`, and no

@@ -1,8 +1,6 @@
-//! The encoder's row space.
-//!
-//! Reconstruction and lift depend on `W_e` only through the space its rows span, so the search runs over orthonormal
-//! bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`) of the directions of a [`Frame`]; [`varimax`] then chooses the
-//! basis inside the space: as few coordinates a latent as possible.
+//! The encoder's row space. Reconstruction and lift depend on `W_e` only through the space its rows span, so the search
+//! runs over orthonormal bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`) of the directions of a [`Frame`];
+//! [`varimax`] then chooses the basis inside the space: as few coordinates per latent as possible.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -13,10 +11,8 @@ use crate::robot::{BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, JOINT_DIM, Leg, Robot
 
 #[derive(Clone, Debug)]
 pub(super) struct Moments {
-    /// Covariance of the state, `state_dim x state_dim`.
-    pub state: DMatrix<f64>,
-    /// Second moment of the input about zero, `state_dim x state_dim`.
-    pub input: DMatrix<f64>,
+    pub state: DMatrix<f64>, // covariance
+    pub input: DMatrix<f64>, // second moment about zero
 }
 
 impl Moments {
@@ -34,12 +30,11 @@ impl Moments {
 const ITERATIONS: usize = 2000;
 
 /// Finds the orthonormal basis of least `reconstruction + lift_weight * lift_loss` over the frame's free directions.
-///
 /// With the state covariance `C`, the coordinate weights `D` (diagonal) and the input second moment `U`:
 /// `reconstruction = (tr DC - tr((Q^T C Q)^-1 Q^T C D C Q)) / n` is the weighted mean square error of the least-squares
-/// decoder, `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T) u||^2 / ||u||^2`. Rows that the frame
-/// holds are taken as seen: `C` is the covariance given them. Descent along the exact gradient on the Stiefel manifold
-/// from several starting points; the best is kept.
+/// decoder, `lift_loss = 1 - tr(Q^T U Q) / tr U` is `||u - W_e^T pinv(W_e^T) u||^2 / ||u||^2`. `C` is the covariance
+/// given the rows that the frame holds. Descent along the exact gradient on the Stiefel manifold from several starting
+/// points; the best is kept.
 pub(super) fn find_subspace(
     moments: &Moments,
     frame: &Frame,
@@ -112,7 +107,6 @@ impl Objective {
         (self.total_state - explained) / self.state_dim + self.lift_weight * lift_loss
     }
 
-    /// Gradient of [`Self::value`] with respect to an orthonormal `Q`.
     fn gradient(&self, basis: &DMatrix<f64>) -> DMatrix<f64> {
         let inverse = self.inverse_latent_covariance(basis);
         let seen = basis.transpose() * &self.state_squared * basis;
@@ -208,8 +202,7 @@ fn leading(symmetric: DMatrix<f64>, count: usize) -> DMatrix<f64> {
 }
 
 /// Orthogonal `T` for which `loadings * T` (`diag(std) Q`) is simplest: planar rotations increase the sum over columns
-/// of the variance of the squared entries (Kaiser 1958, The varimax criterion for analytic rotation in factor
-/// analysis).
+/// of the variance of the squared entries (Kaiser 1958, The varimax criterion).
 pub(super) fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
     let n_columns = loadings.ncols();
     let n_rows = loadings.nrows() as f64;
@@ -288,26 +281,19 @@ fn turn(matrix: &mut DMatrix<f64>, a: usize, b: usize, angle: f64) {
 }
 
 const PITCH: usize = JOINT_DIM + 4;
-/// Time over which accelerations in flight are averaged, in s.
-const WINDOW_S: f64 = 0.05;
-/// Samples left out at both ends of a flight, where feet still slip or already touch.
-const TRIM: usize = 4;
-/// Fewest averaged accelerations in flight that tell the centre of mass.
-const LEAST_WINDOWS: usize = 50;
-/// Ridge, relative to the mean square of all joints' accelerations.
-const RIDGE: f64 = 1e-2;
+const WINDOW_S: f64 = 0.05; // over which accelerations in flight are averaged
+const TRIM: usize = 4; // samples left out at both ends of a flight, where feet still slip or already touch
+const LEAST_WINDOWS: usize = 50; // averaged accelerations in flight that identify the centre of mass
+const RIDGE: f64 = 1e-2; // relative to the mean square of all joints' accelerations
 
 /// Rows of an encoder `W_e` before they are chosen, in scaled units.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
-    /// Rows that every encoder has, as columns, `18 x h`.
-    pub held: DMatrix<f64>,
-    /// Orthonormal directions that the other rows combine, `18 x k`.
-    pub free: DMatrix<f64>,
+    pub held: DMatrix<f64>, // rows of every encoder, as columns, 18 x h
+    pub free: DMatrix<f64>, // orthonormal directions that the other rows combine, 18 x k
 }
 
 impl Frame {
-    /// No row held, and the coordinates `active` to combine.
     pub(super) fn plain(active: &[usize]) -> Self {
         Self {
             held: DMatrix::zeros(STATE_DIM, 0),
@@ -315,9 +301,9 @@ impl Frame {
         }
     }
 
-    /// With [`Coordinates::Named`] and two latent coordinates or more, the first two rows are the centre of mass and
-    /// the others combine sums of `active` coordinates that a mirror leaves alone: neither `y`, roll and yaw, nor left
-    /// and right.
+    /// With [`Coordinates::Named`] and two or more latent coordinates, the first two rows are the centre of mass; the
+    /// others combine sums of `active` coordinates that a mirror leaves alone: neither `y`, roll and yaw, nor left and
+    /// right.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],
@@ -373,10 +359,9 @@ fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
 }
 
 /// Rows of the centre of mass forwards and upwards, as columns, `18 x 2`: `x + c_x^T q` and `z + c_z^T q` over the
-/// joints `q`, of the body alone where the recordings have no flight.
-///
-/// In flight it falls freely: `ddx + c_x^T ddq = 0` and `ddz + c_z^T ddq = -g`. The regression of the body's
-/// accelerations on those of the joints (mirrored, ridge) tells `c`, to first order in `q`.
+/// joints `q`, of the body alone where the recordings have no flight. In flight it falls freely: `ddx + c_x^T ddq = 0`
+/// and `ddz + c_z^T ddq = -g`. The regression of the body's accelerations on those of the joints (mirrored, ridge)
+/// gives `c`, to first order in `q`.
 fn centre_of_mass(training: &Dataset, robot: &Robot) -> DMatrix<f64> {
     let all: Vec<usize> = (0..JOINT_DIM).collect();
     let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));

@@ -1,5 +1,4 @@
-//! One training as every method sees it: checked recordings, from learned maps to chosen dynamics and metrics of the
-//! fit, and the model that they make, which carries where it comes from.
+//! A training, whatever its method: checked recordings, fitted maps and dynamics, metrics, the model with its origin.
 
 use std::path::Path;
 
@@ -30,7 +29,6 @@ use crate::model::{
 use crate::recording::Recording;
 use crate::robot::{BODY_X, BODY_Z, Robot};
 
-/// Recordings to learn from and to choose by.
 #[derive(Clone, Copy, Debug)]
 pub struct Recordings<'a> {
     pub training: &'a [Recording],
@@ -49,15 +47,13 @@ impl<'a> Recordings<'a> {
 
 pub(super) struct Task<'a> {
     pub training: Dataset,
-    /// May have no jump.
-    pub validation: Dataset,
+    pub validation: Dataset, // may have no jump
     pub moments: Moments,
     pub library: Library,
     pub features: Features,
     pub active: Vec<usize>,
     pub frame: Frame,
-    /// What is known of the dynamics in its coordinates, one a phase.
-    pub knowledge: Vec<Knowledge>,
+    pub knowledge: Vec<Knowledge>, // of the dynamics in its coordinates, one per phase
     pub options: &'a TrainOptions,
     pub robot: &'static Robot,
 }
@@ -107,18 +103,15 @@ impl<'a> Task<'a> {
 /// Where a training's numbers come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
-    /// The command line that repeats the training.
     pub command: String,
     /// Recordings with their digests, in the order of use.
     pub recordings: Vec<SourceFile>,
 }
 
-/// A recording and what it contained.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SourceFile {
     /// Path as on the command line.
     pub path: String,
-    /// Digest of its bytes, with the name of the algorithm in front.
     pub digest: String,
     /// The sets that its jumps came into, such as `test`, if a training divided them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -242,8 +235,7 @@ pub(super) fn provenance(
 pub(super) struct Maps {
     pub encoder: StateMap,
     pub decoder: StateMap,
-    /// `W_e`, of a nonlinear encoder the mean of its Jacobian over the training samples.
-    pub weights: DMatrix<f64>,
+    pub weights: DMatrix<f64>, // W_e, of a nonlinear encoder the mean Jacobian over the training samples
     pub training: Vec<Latent>,
     pub validation: Vec<Latent>,
 }
@@ -267,8 +259,7 @@ pub(super) struct Fitted {
     pub xi: Vec<Xi>,
     /// The regression, if Xi was chosen among regressions, and how many were tried.
     pub choice: Option<(Choice, usize)>,
-    /// What seeds are compared by, see [`SeedReport::score`].
-    pub score: f64,
+    pub score: f64, // that seeds are compared by, see `SeedReport::score`
 }
 
 impl Fitted {
@@ -320,7 +311,6 @@ impl Task<'_> {
         }
     }
 
-    /// Chosen dynamics for an encoder and its decoder.
     pub(super) fn fit_dynamics(
         &self,
         (encoder, decoder): (StateMap, StateMap),
@@ -386,7 +376,6 @@ impl Task<'_> {
         }
     }
 
-    /// Share of the training input's energy that the latent input cannot carry.
     fn lift_loss(&self, encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
         if let Some(linear) = encoder.as_affine() {
             let (weights, input) = (linear.weights(), &self.moments.input);

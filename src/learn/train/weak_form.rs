@@ -7,10 +7,8 @@ use super::features::{FeatureValues, Features};
 use super::latent::EncodedSet;
 use crate::model::Library;
 
-/// Samples between the starts of two windows.
-const STRIDE: usize = 5;
-/// Largest magnitude of a term: sums of its squares stay finite.
-const LARGEST: f64 = 1e150;
+const STRIDE: usize = 5; // samples between the starts of two windows
+const LARGEST: f64 = 1e150; // magnitude of a term: sums of its squares stay finite
 
 /// Complains about the first term of `library` without a finite value at a sample, or with one whose square overflows.
 pub(super) fn check_terms(
@@ -46,11 +44,10 @@ pub(super) fn check_terms(
     Ok(())
 }
 
-/// Rows of `theta` and `target` of one phase, averaged over windows of `window` samples.
-///
-/// Integrating `ddz = theta Xi` once and twice over a window of length `T` gives `(dz(T) - dz(0)) / T = mean of theta
-/// Xi` and `2 (z(T) - z(0) - T dz(0)) / T^2 = weighted mean of theta Xi` (the integral form of Schaeffer and McCalla
-/// 2017, here of second order). A `window` of 0 gives the smoothed accelerations themselves.
+/// Rows of `theta` and `target` of one phase, averaged over windows of `window` samples. Integrating `ddz = theta Xi`
+/// once and twice over a window of length `T` gives `(dz(T) - dz(0)) / T = mean of theta Xi` and `2 (z(T) - z(0) - T
+/// dz(0)) / T^2 = weighted mean of theta Xi` (the integral form of Schaeffer and McCalla 2017, here of second order). A
+/// `window` of 0 gives the smoothed accelerations themselves.
 pub(super) fn windowed_samples(
     set: EncodedSet<'_>,
     features: &Features,

@@ -13,7 +13,6 @@ pub struct Schedule {
     pub refinement: usize,
     /// Coefficients below this are masked for good.
     pub threshold: f64,
-    /// Epochs between two thresholdings.
     pub threshold_every: usize,
     pub learning_rate: f64,
 }
@@ -27,15 +26,11 @@ impl Schedule {
     }
 }
 
-/// What a transfer step moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Moved {
-    /// Encoder, decoder and the Xi of the phases of the batches.
-    All,
-    /// The decoder, by (16) alone.
-    Decoder,
-    /// The Xi of the phases of the batches.
-    Xi,
+    All,     // encoder, decoder and the Xi of the phases of the batches
+    Decoder, // by (16) alone
+    Xi,      // of the phases of the batches
 }
 
 /// Called after every epoch with its number, the losses and the active terms. Returns whether to go on.
@@ -124,7 +119,6 @@ impl Adam {
         }
     }
 
-    /// Drops the values below `least` for good.
     fn threshold(&mut self, values: &mut [f64], least: f64) {
         for (value, kept) in values.iter_mut().zip(&mut self.kept) {
             *kept &= value.abs() >= least;

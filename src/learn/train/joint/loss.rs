@@ -19,33 +19,22 @@ use crate::train::features::{FeatureValues, Features};
 /// Weights of the terms of the loss (equation 20).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LossWeights {
-    /// Of the latent accelerations (17).
-    pub ddz: f64,
-    /// Of the accelerations in real space (18).
-    pub ddx: f64,
-    /// Of the mean absolute coefficient (19).
-    pub l1: f64,
-    /// Of the share of the input's energy that the latent input cannot carry.
-    pub lift: f64,
-    /// Of predictions over a window (41).
-    pub bptt: f64,
+    pub ddz: f64,  // latent accelerations (17)
+    pub ddx: f64,  // accelerations in real space (18)
+    pub l1: f64,   // mean absolute coefficient (19)
+    pub lift: f64, // share of the input's energy that the latent input cannot carry
+    pub bptt: f64, // predictions over a window (41)
 }
 
-/// Values of the terms, unweighted.
+/// Values of the terms, unweighted; errors are mean squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Losses {
-    /// Mean square of `x - x_dec` (16), with coordinate weights if there are any.
-    pub decoder: f64,
-    /// Mean square of `ddz - ddz_pred` (17).
-    pub ddz: f64,
-    /// Mean square of `ddx - ddx_pred` (18).
-    pub ddx: f64,
-    /// Mean of `|Xi|` (19).
-    pub l1: f64,
-    /// `||u - W_e^T u_lat||^2 / ||u||^2`.
-    pub lift: f64,
-    /// Mean square of `z - z_pred` over a window (41); 0 unless it has a weight.
-    pub bptt: f64,
+    pub decoder: f64, // x - x_dec (16), with coordinate weights if there are any
+    pub ddz: f64,     // ddz - ddz_pred (17)
+    pub ddx: f64,     // ddx - ddx_pred (18)
+    pub l1: f64,      // mean of |Xi| (19)
+    pub lift: f64,    // ||u - W_e^T u_lat||^2 / ||u||^2
+    pub bptt: f64,    // z - z_pred over a window (41); 0 unless it has a weight
 }
 
 impl Losses {
@@ -58,7 +47,6 @@ impl Losses {
             + weights.bptt * self.bptt
     }
 
-    /// Sum of two sets of losses, for averages over batches.
     pub(super) fn plus(&self, other: &Losses, share: f64) -> Losses {
         Losses {
             decoder: self.decoder + share * other.decoder,
@@ -71,7 +59,6 @@ impl Losses {
     }
 }
 
-/// A batch in latent coordinates.
 pub(super) struct Encoded {
     stack: DMatrix<f64>,  // z, dz, ddz: 3n x d
     jacobians: Jacobians, // between x and z
@@ -99,11 +86,9 @@ impl Quadratic {
     }
 }
 
-/// The loss over one library, with its scratch space.
 pub(super) struct JointLoss<'a> {
     pub weights: LossWeights,
-    /// The weights that count in this epoch.
-    pub current: LossWeights,
+    pub current: LossWeights, // in this epoch
     /// Gradient of the last evaluation; of Xi only the phase of that batch has one.
     pub gradient: Parameters,
     features: &'a Features,
@@ -116,7 +101,6 @@ pub(super) struct JointLoss<'a> {
 }
 
 impl<'a> JointLoss<'a> {
-    /// The loss of parameters of the shape of `parameters`; the window of (41) counts only with a weight.
     pub(super) fn new(
         features: &'a Features,
         (frame, coordinate_weights): (Frame, DVector<f64>),
@@ -158,7 +142,6 @@ impl<'a> JointLoss<'a> {
         }
     }
 
-    /// What a step that keeps the encoder needs of a batch.
     pub(super) fn known(&mut self, parameters: &Parameters, batch: &Batch, moved: Moved) -> Known {
         let encoded = self.encode(parameters, batch);
         let [decoder] = &parameters.decoder.layers[..] else {
@@ -200,7 +183,6 @@ impl<'a> JointLoss<'a> {
         })
     }
 
-    /// Sets the gradient of a quadratic loss.
     fn follow(&mut self, parameters: &Parameters, phase: usize, moved: Moved, of: &Quadratic) {
         if moved == Moved::Decoder {
             let layer = &parameters.decoder.layers[0];
@@ -392,8 +374,7 @@ fn l1_subgradient(xi: &DMatrix<f64>, scale: f64, gradient: &mut DMatrix<f64>) ->
 /// Consecutive samples of one phase, rows are samples, scaled units.
 pub(super) struct Batch {
     pub phase: usize,
-    /// States, velocities and accelerations as they enter the encoder, `3n x 18`.
-    entering: DMatrix<f64>,
+    entering: DMatrix<f64>, // x, dx, ddx as they enter the encoder, 3n x 18
     x: DMatrix<f64>,
     ddx: DMatrix<f64>,
     u: DMatrix<f64>,

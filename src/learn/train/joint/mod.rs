@@ -1,8 +1,7 @@
-//! Joint training of encoder, decoder and dynamics by Adam, as published and improved.
-//!
-//! Enters: recordings and [`JointOptions`](super::JointOptions). Leaves: a trained model. Read `loss` first (equations
-//! 9 to 20 and their gradient), then `descent` (Adam, and the transfer steps of section IV-D) and [`joint`] (seeds,
-//! choice, assembly). Linear maps are networks of one layer.
+//! Joint training of encoder, decoder and dynamics by Adam, as published and improved: recordings and
+//! [`JointOptions`](super::JointOptions) in, a trained model out. Read `loss` first (equations 9 to 20 and their
+//! gradient), then `descent` (Adam, transfer steps of section IV-D) and [`joint`] (seeds, choice, assembly). Linear
+//! maps are networks of one layer.
 
 mod descent;
 mod loss;

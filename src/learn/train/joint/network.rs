@@ -1,9 +1,7 @@
-//! Networks on batches of samples, forwards and backwards, with their time derivatives and Jacobians.
-//!
-//! Samples are rows. A layer takes `y` to `phi(a)`, `a = y W + b`, and its time derivatives to `phi' da` and `phi''
-//! da^2 + phi' dda`. The three stand below one another (a *stack* of 3 n rows), so that a layer is one product; rows of
-//! the Jacobian, one for each output, are stacked the same way. Of elu at zero derivatives are those of the negative
-//! side.
+//! Networks on batches of samples, forwards and backwards, with their time derivatives and Jacobians. Samples are rows.
+//! A layer maps `y` to `phi(a)`, `a = y W + b`, and its time derivatives to `phi' da` and `phi'' da^2 + phi' dda`. The
+//! three stand below one another (a *stack* of 3 n rows), so that a layer is one product; rows of the Jacobian, one for
+//! each output, are stacked the same way. Of elu at zero derivatives are those of the negative side.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,13 +11,10 @@ use crate::train::random::Random;
 
 const LANES: usize = 16;
 
-/// One layer: `y -> phi(y W + b)`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Dense {
-    /// `W`, inputs x outputs.
-    pub weights: DMatrix<f64>,
-    /// `b`, one per output.
-    pub bias: DVector<f64>,
+    pub weights: DMatrix<f64>, // W, inputs x outputs
+    pub bias: DVector<f64>,    // b, one per output
     pub activation: Activation,
 }
 
@@ -186,8 +181,7 @@ impl Network {
         }
     }
 
-    /// Adds to `gradient` the share of the layers, given the adjoint of [`Jacobians::rows`]; returns those of every
-    /// `a`.
+    /// Adds the layers' share to `gradient`, given the adjoint of [`Jacobians::rows`]; returns those of every `a`.
     pub(super) fn jacobian_adjoint(
         &self,
         tape: &Tape,

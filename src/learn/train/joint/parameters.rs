@@ -10,12 +10,9 @@ use crate::train::random::Random;
 /// Parameters, or gradients with respect to them; linear maps are networks of one layer.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Parameters {
-    /// From framed states to latent coordinates.
-    pub encoder: Network,
-    /// From latent coordinates to framed states.
-    pub decoder: Network,
-    /// `library_dim x d` for each phase.
-    pub xi: Vec<DMatrix<f64>>,
+    pub encoder: Network,      // from framed states to latent coordinates
+    pub decoder: Network,      // and back
+    pub xi: Vec<DMatrix<f64>>, // library_dim x d for each phase
 }
 
 impl Parameters {
@@ -87,8 +84,7 @@ impl Frame {
 /// Another basis of the latent space: `z_new = turn z + shift`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LatentBasis {
-    /// Invertible, `d x d`.
-    pub turn: DMatrix<f64>,
+    pub turn: DMatrix<f64>, // invertible, d x d
     pub back: DMatrix<f64>,
     pub shift: DVector<f64>,
 }
@@ -155,12 +151,10 @@ fn between(
     StateMap::new(tensor, layers)
 }
 
-/// Added to the diagonal of `J J^T`.
-const DAMPING: f64 = 1e-12;
+const DAMPING: f64 = 1e-12; // on the diagonal of J J^T
 
 pub(super) struct InputProjections {
-    /// `n x d`.
-    pub u_lat: DMatrix<f64>,
+    pub u_lat: DMatrix<f64>, // n x d
     /// Sum over samples of `(J u) . u_lat`: the energy of the inputs that the latent inputs carry.
     pub carried: f64,
     factors: Vec<f64>, // Cholesky factors, d x d per Jacobian, row-major

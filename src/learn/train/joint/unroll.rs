@@ -43,19 +43,15 @@ impl Integrator {
     }
 }
 
-/// Dynamics and samples that predictions are made of.
 #[derive(Clone, Copy)]
 pub(super) struct Window<'a> {
     pub features: &'a Features,
-    /// `n x 3d`: z, dz, u_lat.
-    pub variables: &'a DMatrix<f64>,
-    /// `library_dim x d`.
-    pub xi: &'a DMatrix<f64>,
+    pub variables: &'a DMatrix<f64>, // z, dz, u_lat: n x 3d
+    pub xi: &'a DMatrix<f64>,        // library_dim x d
     pub step_s: f64,
 }
 
-/// Gradients with respect to the variables (`n x 3d`) and Xi.
-type Adjoints<'a> = [&'a mut DMatrix<f64>; 2];
+type Adjoints<'a> = [&'a mut DMatrix<f64>; 2]; // of the variables (n x 3d) and Xi
 
 /// One evaluation of the dynamics for all starts, kept for the reverse sweep.
 struct Stage {

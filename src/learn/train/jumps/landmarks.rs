@@ -1,5 +1,4 @@
 //! Parts of jumps at equal shares of their durations, and how accelerations change about a trajectory of the prior.
-//!
 //! Over one interval between nodes of a jump, with `delta` the difference to the prior at the jump's own goal and a bar
 //! the mean of both ends: `delta (dz_(k+1) - dz_k) / h = Xi^T (bar delta z, bar delta dz, bar delta u_lat)`, the very
 //! equation that a plan is made of. Shifting the robot forwards changes nothing: that direction of `delta z` is left
@@ -17,12 +16,9 @@ use crate::robot::{BODY_Z, ContactFlags, FeetRule};
 
 /// The thrust begins when the body last rises more slowly than this before the feet leave, m/s.
 const THRUST_SPEED_M_S: f64 = 0.1;
-/// A jump that is recorded for less than this after touch-down ends with its flight, s.
-const LEAST_LANDING_S: f64 = 0.1;
-/// Fewest samples of a part.
-const LEAST_SAMPLES: usize = 8;
+const LEAST_LANDING_S: f64 = 0.1; // a jump recorded for less than this after touch-down ends with its flight
+const LEAST_SAMPLES: usize = 8; // of a part
 
-/// A part of every jump of a kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Landmark {
     pub name: String,
@@ -143,10 +139,8 @@ pub(super) fn of_commonest_kind(cuts: &[Option<Cut>]) -> Vec<(usize, &Cut)> {
     all
 }
 
-/// Time between nodes that is aimed at, s.
-const NODE_STEP_S: f64 = 0.014;
-/// Fewest and most intervals of a part.
-const INTERVALS: [usize; 2] = [10, 60];
+const NODE_STEP_S: f64 = 0.014; // between nodes, aimed at
+const INTERVALS: [usize; 2] = [10, 60]; // fewest and most of a part
 
 /// Nodes of one part of one jump; one row per node, scaled units.
 pub(super) struct PartNodes {
@@ -158,13 +152,11 @@ pub(super) struct PartNodes {
 }
 
 impl PartNodes {
-    /// Time between two nodes, s.
     pub(super) fn step_s(&self) -> f64 {
         self.duration_s / (self.z.nrows() - 1) as f64
     }
 }
 
-/// How many intervals a part of this mean duration has.
 pub(super) fn intervals(mean_duration_s: f64) -> usize {
     let [least, most] = INTERVALS;
     ((mean_duration_s / NODE_STEP_S).round() as usize).clamp(least, most)
@@ -218,8 +210,7 @@ const GOAL_RIDGE: f64 = 3.0;
 
 /// The linear map from the values of all jumps to the coefficients of the features.
 pub(super) struct GoalRegression {
-    /// `FEATURE_DIM x jumps`.
-    solution: DMatrix<f64>,
+    solution: DMatrix<f64>, // FEATURE_DIM x jumps
 }
 
 impl GoalRegression {
@@ -261,15 +252,12 @@ impl GoalRegression {
     }
 }
 
-/// Ridge relative to the variance of each column.
-const RIDGE: f64 = 1e-2;
+const RIDGE: f64 = 1e-2; // relative to the variance of each column
 
-/// Fits the deviations of one part.
 pub(super) struct Fit<'a> {
     pub goal: &'a [GoalRange; GOAL_DIM],
     pub part: usize,
-    /// Leaves out the change of `z` by a shift forwards.
-    pub projector: DMatrix<f64>,
+    pub projector: DMatrix<f64>, // leaves out the change of z by a shift forwards
 }
 
 impl Fit<'_> {

@@ -1,7 +1,6 @@
-//! What the training jumps say of jumps that were not recorded: landmarks, prior, deviations.
-//!
-//! In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if fewer than [`LEAST_JUMPS`] of them are of
-//! one kind. `landmarks` cuts jumps into parts and fits what depends on their goals.
+//! Landmarks, prior and deviations of jumps: the training jumps and an encoder in; a [`JumpPrior`] out, or none if
+//! fewer than [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts jumps into parts and fits what depends on their
+//! goals.
 
 mod landmarks;
 
@@ -16,10 +15,8 @@ use crate::model::{
 use crate::robot::{BODY_X, BODY_Z};
 use landmarks::{Cut, Fit, GoalRegression, PartNodes, intervals, of_commonest_kind, sample};
 
-/// Fewest jumps of one kind that say how jumps depend on their goal.
-pub(super) const LEAST_JUMPS: usize = 6;
-/// Significant digits of what is kept: beyond those of any recording.
-const DIGITS: usize = 6;
+pub(super) const LEAST_JUMPS: usize = 6; // of one kind, to show how jumps depend on their goal
+const DIGITS: usize = 6; // significant, of what is kept: beyond those of any recording
 
 struct Sampled {
     goal: [f64; GOAL_DIM],
@@ -195,7 +192,6 @@ fn state_std(latent: &[Latent], chosen: &[(usize, &Cut)]) -> DVector<f64> {
     DVector::from_iterator(deviations.nrows(), rows).map(|std| std.max(f64::EPSILON))
 }
 
-/// The value at [`DIGITS`] significant digits.
 fn rounded(value: f64) -> f64 {
     let text = format!("{value:.*e}", DIGITS - 1);
     text.parse().expect("a printed number")
