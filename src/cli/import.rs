@@ -78,8 +78,7 @@ pub struct Compared {
     pub fault: Option<String>,
 }
 
-/// Imports a model by `read` and compares it with recordings. Where the order of a standard library's terms is not
-/// stated, the recordings decide it.
+/// Imports a model by `read` and compares it with recordings, which decide an unstated order of a standard library.
 ///
 /// # Errors
 /// [`Error::Mismatch`] for a model that misses the recordings, unless `unchecked`; the importer's own.

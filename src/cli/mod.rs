@@ -1,8 +1,7 @@
-//! The command line: arguments come in, text or one JSON object leaves.
-//!
-//! Each command is a file with one function from its arguments to an `Answer`; [`run`] prints the answer and picks
-//! the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go to stdout; progress, warnings and
-//! errors go to stderr. Start with [`args`]. What this file imports is what every command imports with `use super::*`.
+//! The command line. Each command is a file with one function from its arguments to an `Answer`, text or one JSON
+//! object; [`run`] prints it and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
+//! to stdout; progress, warnings, errors to stderr. Start with [`args`]. All commands import what this file imports
+//! (`use super::*`).
 
 pub mod args;
 mod check;

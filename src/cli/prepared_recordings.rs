@@ -26,7 +26,6 @@ pub(super) struct RecordedSets {
 }
 
 impl RecordedSets {
-    /// The recordings that the arguments name, divided by their shares if they have any.
     pub(super) fn new(
         arguments: &TrainArguments,
         settings: &TrainSettings,
@@ -102,7 +101,6 @@ impl RecordedSets {
         Some((text, Value::Object(json)))
     }
 
-    /// The sets that the jumps of a file came into, if they were divided.
     pub(super) fn sets_of(&self, path: &str) -> Vec<&'static str> {
         let sets = SETS.into_iter().zip(self.divided.iter().flatten());
         let is_of = |(file, ..): &DividedJump| file.display().to_string() == path;

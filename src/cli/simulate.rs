@@ -126,7 +126,6 @@ fn add<'a>(
     predicted: [Option<&DVector<f64>>; 2],
 ) {
     for (index, value) in recorded.enumerate() {
-        // Empty behind a divergence.
         let cell = |values: Option<&DVector<f64>>| values.map(|values| values[index].to_string());
         row.push(value.to_string());
         row.extend(predicted.map(|values| cell(values).unwrap_or_default()));

@@ -208,7 +208,6 @@ impl TrainSettings {
         given
     }
 
-    /// The flags that were given, with a space before each.
     pub(super) fn as_flags(&self) -> String {
         let flag = |(name, value): (String, Value)| match value {
             Value::Bool(_) | Value::Null | Value::Object(_) => format!(" --{name}"),

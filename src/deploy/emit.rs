@@ -104,11 +104,9 @@ pub struct EmitOptions {
     pub plan: Option<PlannedJump>,
 }
 
-/// The files of the chosen targets, each with its path below the output folder; a target that is chosen twice gives
-/// them once.
-///
-/// Equal equations and options give equal bytes. Controllers compute in the scaled units of the model's maps, whatever
-/// the units of the equations.
+/// The files of the chosen targets, with paths below the output folder; a target chosen twice gives them once. Equal
+/// equations and options give equal bytes. Controllers compute in the scaled units of the model's maps, whatever the
+/// units of the equations.
 pub fn emit(
     equations: &Equations<'_>,
     targets: &[Target],
@@ -145,7 +143,6 @@ pub fn emit(
     Ok(files)
 }
 
-/// What C and Rust are generated from.
 pub(super) fn compiled(
     equations: &Equations<'_>,
     options: &EmitOptions,

@@ -1,8 +1,6 @@
-//! A model to files: the targets of `romc compile`, and the controller as a crate.
-//!
-//! [`Equations`](crate::equations::Equations) enter [`emit()`]; files in memory leave, which
-//! [`write_files`](crate::files::write_files) puts into a folder. Equations come from `typeset`, code from `codegen`;
-//! `controller` adds the sources of `romc-control` and `romc-robot` and the model's numbers. Read `emit` first.
+//! A model to files: [`Equations`](crate::equations::Equations) enter [`emit()`], files in memory leave, for
+//! [`write_files`](crate::files::write_files). Equations come from `typeset`, code from `codegen`; `controller` adds
+//! the sources of `romc-control` and `romc-robot` and the model's numbers. Read `emit` first.
 
 /// Templates of whole files and their paths, in which `NAME` stands for the model's name, and `texts` of them. The
 /// caller writes the derive: askama looks for files from where it stands.

@@ -21,7 +21,6 @@ const DIGITS: usize = 9;
 /// A reference of a controller: samples in columns, SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedJump {
-    /// Time of each sample, s.
     pub time_s: Vec<f64>,
     /// States, 18 x n.
     pub x: DMatrix<f64>,
@@ -31,7 +30,6 @@ pub struct PlannedJump {
     pub u: DMatrix<f64>,
     /// Torques of the motors, N m, 12 x n.
     pub torque_nm: DMatrix<f64>,
-    /// Feet on the ground.
     pub feet: Vec<ContactFlags>,
 }
 
@@ -71,8 +69,7 @@ impl PlannedJump {
         self.select(&samples)
     }
 
-    /// The longest part for which a model has phases; all of it where there is no such part, which the controller then
-    /// refuses.
+    /// The longest part for which a model has phases; all of it if there is none, which the controller then refuses.
     pub(super) fn within(self, model: &ReducedModel) -> Self {
         let all: Vec<usize> = (0..self.time_s.len()).collect();
         let parts = all.split(|&k| model.phase_for(self.feet[k]).is_none());

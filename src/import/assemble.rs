@@ -216,7 +216,6 @@ impl<'a> Assembly<'a, '_> {
         Ok(terms)
     }
 
-    /// Refuses options that are of use with an encoder or decoder alone.
     fn check_options_of_maps(&self) -> Read<()> {
         const OF_MAPS: [&str; 5] = [
             "--robot",
@@ -421,7 +420,6 @@ impl<'a> Assembly<'a, '_> {
     }
 }
 
-/// A dimension, or a letter for one that is not known.
 fn text_or(dim: Option<usize>, letter: &str) -> String {
     dim.map_or(letter.to_owned(), |dim| dim.to_string())
 }

@@ -182,8 +182,7 @@ fn phases(
     used: &[Assigned<'_>],
 ) -> Read<Vec<PhaseRule>> {
     let mut rules = options.phases.clone();
-    // Sorted by name; the rule `any` takes every pattern with a foot down, so that the order of the two known phases is
-    // free.
+    // Sorted by name: as `any` takes every pattern with a foot down, the order of the two known phases is free.
     for assigned in used {
         if let Role::Xi(name) = &assigned.role
             && options.given(name).is_none()

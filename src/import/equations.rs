@@ -7,8 +7,7 @@
 //! ddz2 = 0
 //! ```
 //!
-//! Each section is a phase and has `ddz1` to `ddzd`; a text without sections is one phase, which `--phase` names. Names
-//! may have underscores (`ddz_1`).
+//! Each section is a phase with `ddz1` to `ddzd`; a text without sections is one phase (`--phase`). `ddz_1` is `ddz1`.
 
 use super::library::tokens;
 use super::{ImportError, Read};

@@ -1,7 +1,6 @@
-//! From equations as text to library and coefficients.
-//!
-//! A coefficient is the number in front of a term, bit for bit as it is written; sums inside a product with a number
-//! are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums stay one term (`z1*(1 + dz1)`).
+//! Equations as text to library and coefficients. A coefficient is the number in front of a term, bit for bit; sums
+//! inside a product with a number are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums stay one term
+//! (`z1*(1 + dz1)`).
 
 use std::collections::HashMap;
 
@@ -248,8 +247,7 @@ pub(super) fn sort(pool: &ExprPool, latent_dim: usize, terms: &mut [ExprId]) {
     terms.sort_by(|a, b| key(a).cmp(&key(b)).then_with(|| pool.compare(*a, *b)));
 }
 
-/// Where a term stands: its kind (constant, monomial, sine, cosine, anything else, input), its degree, and its indices
-/// into (z, dz), each as often as its power.
+/// A term's kind (constant, monomial, sine, cosine, other, input), degree, and indices into (z, dz) by [`monomial`].
 fn place(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> (usize, usize, Vec<usize>) {
     const OTHER: (usize, usize, Vec<usize>) = (4, 0, Vec::new());
     if expr == ExprId::ONE {

@@ -70,17 +70,13 @@ pub(super) fn order(
     Err(ImportError::option("--library-order", found, expected))
 }
 
-/// The shorthands that have this many terms.
 pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String> {
     let fits = |standard: &StandardLibrary| standard.term_count(latent_dim) == Some(term_count);
     let fitting = StandardLibrary::small().filter(fits);
     fitting.map(standard_text).collect()
 }
 
-/// Reads a list of terms: a JSON list, alone or under `library`, or one term per line (`#` starts a comment).
-///
-/// # Errors
-/// [`ImportError`] with line and column.
+/// Reads a list of terms: JSON, alone or under `library`, or one per line (`#` starts a comment); faults have a place.
 pub fn read_terms(path: &Path) -> Read<Vec<String>> {
     let (file, bytes) = read_file(path, MAX_TERMS_BYTES)?;
     check_size(&file, &bytes, MAX_TERMS_BYTES)?;

@@ -1,9 +1,8 @@
 //! Models trained elsewhere: safetensors, NumPy's npz, arrays in memory, equations as text.
 //!
 //! A file enters, with [`ImportOptions`] for what tensors do not carry; a model checked like any other leaves, with an
-//! [`ImportReport`], or an [`ImportError`] that names file, place, what was found and what was expected. Read `run.rs`
-//! first; `assign.rs` decides the use of each tensor, `assemble.rs` turns them into parts of a model, `latent.rs` takes
-//! equations apart.
+//! [`ImportReport`], or an [`ImportError`] with file, place, found and expected. Read `run.rs` first; `assign.rs`
+//! decides the use of each tensor, `assemble.rs` makes parts of a model of them, `latent.rs` takes equations apart.
 //!
 //! ```
 //! use romc::import::{Format, ImportOptions, import_from_bytes};

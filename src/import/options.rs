@@ -18,7 +18,6 @@ use crate::model::{
 };
 use crate::robot::{Actuators, ContactFlags, Robot, WrenchFrame};
 
-/// The kinds of files that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Tensors in a safetensors file, such as a PyTorch state dict
@@ -32,7 +31,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// The kind of a file by its ending.
     pub(crate) fn of_path(path: &Path) -> Read<Self> {
         let ending = (path.extension()).map(|ending| ending.to_string_lossy().to_lowercase());
         let found = match ending.as_deref() {
@@ -86,7 +84,6 @@ pub(super) fn refusal(path: &Path, found: OtherFormat) -> Option<ImportError> {
     (!found.remedy.is_empty()).then(refused)
 }
 
-/// How a file stores the weights of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum WeightVectors {
     /// For `z = x W` (TensorFlow, Keras)
@@ -95,7 +92,6 @@ pub enum WeightVectors {
     Column,
 }
 
-/// How a file stores coefficients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum XiLayout {
     /// One row per candidate term, as in the model file
@@ -104,10 +100,7 @@ pub enum XiLayout {
     LatentByTerms,
 }
 
-/// Reads `degree=2,trigonometric,inputs`.
-///
-/// # Errors
-/// [`ImportError`] of the option.
+/// Reads `degree=2,trigonometric,inputs`; faults name the option.
 pub fn parse_standard(text: &str) -> Read<StandardLibrary> {
     let refused = |part: &str| {
         let expected = "degree=N, then trigonometric and inputs if the library has them, separated \
@@ -195,7 +188,6 @@ pub struct ImportOptions {
     pub mapping: Vec<Mapping>,
     /// How weights are stored: needed for square ones, checked for others.
     pub weights: Option<WeightVectors>,
-    /// What is between the layers of an encoder or decoder that has several.
     pub activation: Option<Activation>,
     /// How coefficients are stored: needed if their shape fits both ways, else checked.
     pub xi_layout: Option<XiLayout>,
@@ -214,13 +206,11 @@ pub struct ImportOptions {
     pub input_scaling: Option<ScaleFactors>,
     /// The order of coordinates in the file, if it is not that of the robot; needs the robot.
     pub order: Option<CoordinateOrder>,
-    /// The robot whose 18 coordinates the encoder takes.
     pub robot: Option<&'static Robot>,
     /// Axes of the force and moment in the inputs that the model was trained with; needs the robot.
     pub wrench_frame: WrenchFrame,
     /// Friction and inertia of the joints, if training subtracted them from the torques; needs the robot.
     pub actuators: Option<Actuators>,
-    /// Sampling period of the training recordings, s.
     pub sample_time_s: Option<f64>,
 }
 
@@ -246,7 +236,6 @@ impl ImportOptions {
         }
     }
 
-    /// The first of some options that is given.
     pub(super) fn first_of(&self, options: &[&'static str]) -> Option<&'static str> {
         let is_given = |option: &&&str| match **option {
             "--map" => !self.mapping.is_empty(),

@@ -37,7 +37,6 @@ pub enum Role {
     Weights(Part, Option<usize>),
     /// `b_e` or `b_d`, or the bias of one of several layers.
     Bias(Part, Option<usize>),
-    /// Coefficients of a phase.
     Xi(String),
     /// 0 for the coefficients of a phase that training switched off, 1 for the others.
     Mask(String),
@@ -197,7 +196,6 @@ impl Role {
     }
 }
 
-/// A name without the ends that TensorFlow gives it.
 pub(super) fn without_tensorflow_end(name: &str) -> &str {
     let name = name.trim_end_matches("/.ATTRIBUTES/VARIABLE_VALUE");
     name.trim_end_matches(":0")

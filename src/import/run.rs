@@ -22,7 +22,6 @@ use crate::symbolic::ExprPool;
 
 const MAX_FILE_BYTES: u64 = 256 << 20;
 
-/// An imported model and what was decided on the way.
 #[derive(Clone, Debug)]
 pub struct Imported {
     pub model: ReducedModel,
@@ -83,10 +82,7 @@ pub fn import_from_bytes(
     finish(parts, report, &Sha256::digest(bytes), options)
 }
 
-/// Imports a model whose tensors are in memory, by their names as those of a file; `source` names them in errors.
-///
-/// # Errors
-/// As [`import`].
+/// Imports tensors in memory, named as those of a file; `source` names them in errors, which are those of [`import`].
 pub fn import_tensors(
     source: &str,
     arrays: &[Tensor<'_>],
@@ -104,7 +100,6 @@ pub(super) fn check_size(file: &str, bytes: &[u8], max: u64) -> Read<()> {
     }
 }
 
-/// A file, or one tensor of it, with more than `max` of `unit`.
 pub(super) fn too_large(file: &str, place: Place, max: u64, unit: &str) -> ImportError {
     let text = format!("found more than {max} {unit}, which no model needs");
     ImportError::text(file, place, text)
@@ -136,9 +131,6 @@ fn sections(
 }
 
 /// Reads the equations of a file in memory; LaTeX has names of variables, and labels that end in `known` phases.
-///
-/// # Errors
-/// [`ImportError`] with the place of what cannot be read.
 pub fn read_equations(
     file: &str,
     format: Format,
@@ -250,7 +242,6 @@ pub struct ImportReport {
     pub notes: Vec<String>,
 }
 
-/// A tensor that became part of the model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct UsedTensor {
     /// What it is used as, such as `encoder.weight`.
@@ -270,7 +261,6 @@ pub enum Chosen {
     Named,
 }
 
-/// How a tensor was stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layout {
@@ -293,7 +283,6 @@ impl fmt::Display for Layout {
     }
 }
 
-/// A tensor that is no part of the model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct UnusedTensor {
     pub tensor: String,

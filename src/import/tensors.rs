@@ -1,8 +1,7 @@
-//! Named arrays of numbers: in a foreign file, whatever its container, or in memory.
-//!
-//! Headers are read first, and later no more bytes than they announce: a small file cannot fill the memory. In an npz,
-//! a zip file, an array is `\x93NUMPY`, two bytes of the version (1 to 3), the length of the rest (2 or 4 bytes, little
-//! endian), and a Python dictionary: `{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }`.
+//! Named arrays of numbers, in a foreign file or in memory. Headers are read first, and later no more bytes than they
+//! announce: a small file cannot fill the memory. In an npz (zip) file, an array is `\x93NUMPY`, two bytes of the
+//! version (1 to 3), the length of the rest (2 or 4 bytes, little endian), and a Python dictionary: `{'descr': '<f8',
+//! 'fortran_order': False, 'shape': (18, 4), }`.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -49,7 +48,6 @@ pub(super) struct TensorInfo {
     pub(super) shape: Vec<usize>,
     /// The type of its numbers, and the bytes of one: 8, 4 (floats) or 1 (truth values), 0 for types that are not read.
     pub(super) element: (String, usize),
-    /// The first index runs fastest (Fortran), not the last (C).
     pub(super) is_column_major: bool,
     pub(super) is_big_endian: bool,
     /// Member of a zip file, or place among the arrays in memory.
@@ -298,8 +296,7 @@ fn numbers(file: &str, bytes: &[u8], info: &TensorInfo, length: usize) -> Read<C
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| damaged(file, "npz", e))?;
     let member = (archive.by_index(info.member)).map_err(|error| refused(error.to_string()))?;
     let mut unpacked = Vec::new();
-    // One byte more than needed reveals an array that is too long; it also reaches the end of the member, where the
-    // checksum is compared.
+    // One byte more than needed reveals too long an array; it also reaches the member's end and its checksum.
     (member.take((info.start + length + 1) as u64))
         .read_to_end(&mut unpacked)
         .map_err(|error| refused(error.to_string()))?;

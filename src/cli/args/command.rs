@@ -1,5 +1,4 @@
-//! The program, its commands, and what each command offers; the families of `compile`, `import` and `train` have files
-//! of their own.
+//! The program, its commands and their options; those of `compile`, `import` and `train` have files of their own.
 
 use std::path::PathBuf;
 

@@ -41,7 +41,6 @@ pub(crate) struct CompileArguments {
     pub force: Overwrite,
 }
 
-/// Units of coordinates and inputs in equations and generated code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum UnitsChoice {
     /// rad, m, N m, N
@@ -54,7 +53,6 @@ pub enum UnitsChoice {
 }
 
 impl UnitsChoice {
-    /// Units at the interface of functions.
     pub fn of_interface(self) -> Units {
         match self {
             Self::Si | Self::Physical => Units::Si,

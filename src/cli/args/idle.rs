@@ -11,7 +11,6 @@ use crate::import::Format;
 use crate::mpc::Lift;
 
 impl Arguments {
-    /// Refuses the first flag that has no effect.
     pub fn refuse_idle(&self) -> Result<(), Error> {
         match &self.command {
             Command::Compile(arguments) => of_compile(arguments),

@@ -13,14 +13,11 @@ use crate::limits::table::{IMPORTED_LATENT_DIM, INPUT_SCALING, SAMPLE_TIME, SCAL
 use crate::model::{Activation, CoordinateOrder, LibraryOrder, StandardLibrary};
 use crate::robot::WrenchFrame;
 
-/// The candidate terms of an imported model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum LibraryArgument {
     /// `degree=1,trigonometric,inputs`
     Shorthand(StandardLibrary),
-    /// A file with the list of terms
     File(PathBuf),
-    /// The terms themselves
     Terms(Vec<String>),
 }
 

@@ -35,7 +35,6 @@ impl FromStr for Widths {
     }
 }
 
-/// A number that is neither infinite nor NaN.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "f64", into = "f64")]
 pub(crate) struct Finite(f64);
@@ -57,7 +56,6 @@ impl From<Finite> for f64 {
     }
 }
 
-/// The phases of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum PhaseSet {

@@ -37,7 +37,6 @@ pub(super) fn choice<T: Copy + Send + Sync>(
     })
 }
 
-/// `--force`, as those who write files take it.
 pub(super) fn overwrite() -> impl TypedValueParser<Value = Overwrite> {
     BoolValueParser::new().map(Overwrite::when_forced)
 }

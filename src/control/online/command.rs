@@ -100,8 +100,7 @@ impl Source {
 pub struct Command {
     /// Feed-forward torques, N m, within the robot's limits whatever happened.
     pub torque_nm: [f64; JOINT_DIM],
-    /// What the planned motion takes of the torques in the joints, N m: `torque_nm` less this reaches the links. Zero
-    /// in a hold and for a model without actuators.
+    /// Joint losses of the plan, N m: `torque_nm` less them reaches the links; zero in a hold or without actuators.
     pub losses_nm: [f64; JOINT_DIM],
     /// Desired joint positions, rad, within the robot's limits: the decoded reference at 0.9 of the stage. The plan
     /// begins at the measurement, so its own posture would leave a joint PD nothing to correct.
@@ -162,7 +161,6 @@ pub(super) struct Memory {
     pub feed_forward_nm: [f64; JOINT_DIM],
     /// Posture of the last plan, or the one to hold.
     pub joint_position: Option<[f64; JOINT_DIM]>,
-    /// Time of the last command.
     pub command_s: Option<f64>,
     /// Measurements in a row that were not believed.
     pub disbelieved: usize,

@@ -1,8 +1,7 @@
-//! The stages as one program over cones, for clarabel, and the choice between it and the structured solver.
-//!
-//! Unknowns are, stage after stage, the input, the state that it leads to and the slack if there are soft rows. Rows
-//! are the dynamics of all stages (zero cone), then rows on the input, rates, soft rows and `t >= 0` stage by stage
-//! (nonnegative), then the friction cones. The pattern is laid out once; a step overwrites values.
+//! The stages as one program over cones, for clarabel, and the choice between it and the structured solver. Unknowns
+//! are, by stage, the input, the state that it leads to and a slack for soft rows. Rows are the dynamics of all stages
+//! (zero cone), then rows on the input, rates, soft rows and `t >= 0` stage by stage (nonnegative), then the friction
+//! cones. The pattern is laid out once; a step overwrites values.
 
 use std::fmt::Debug;
 
@@ -204,8 +203,7 @@ pub(super) struct Start {
 pub(super) trait StageSolver: Debug + Send {
     fn forget(&mut self) {}
 
-    /// Computes ahead what does not depend on the start, after the horizon moved on by `shift` stages and those that
-    /// `is_new` names were written.
+    /// Computes ahead what does not depend on the start, for stages moved by `shift` and those that are new.
     fn prepare(&mut self, _stages: &[StageQp], _shift: usize, _is_new: &[bool]) {}
 
     /// Solves the prepared program; how it ended, and iterations.

@@ -1,7 +1,4 @@
-//! The numbers of one model on one robot, in SI units on the robot's side.
-//!
-//! Everything the controller needs besides the latent dynamics: the affine maps with their scale factors multiplied in,
-//! how torques become inputs, limits, and for each phase the distribution of the training inputs.
+//! The numbers of one model on one robot: all that the controller needs besides the latent dynamics.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -13,8 +10,7 @@ use super::error::ControlError;
 use super::estimate::InputGivenState;
 use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
-/// Maps, limits and input statistics of a model on its robot, with scale factors multiplied in: SI units on the robot's
-/// side.
+/// Maps, limits and input statistics of a model on its robot, scale factors multiplied in: SI units on its side.
 #[derive(Debug, Clone)]
 pub struct ControlModel {
     /// The robot, what its joints take of the motors' torques, and the axes of force and moment.
@@ -58,10 +54,8 @@ pub struct ControlPhase {
     pub torque_precision: SMatrix<f64, JOINT_DIM, JOINT_DIM>,
 }
 
-/// A nonlinear encoder and decoder with their Jacobians, in SI units on the robot's side.
-///
-/// The matrices of a [`ControlModel`] are then those at one state, and `ControlModel::tangent_at` gives the plant of
-/// another.
+/// A nonlinear encoder and decoder with their Jacobians, in SI units on the robot's side. The matrices of a
+/// [`ControlModel`] are then those at one state, and `ControlModel::tangent_at` gives the plant of another.
 pub trait NonlinearMaps: Debug + Send + Sync {
     /// Writes `z = E(s_x x)`.
     fn encode(&self, x: &[f64], z: &mut [f64]);
@@ -75,8 +69,7 @@ pub trait NonlinearMaps: Debug + Send + Sync {
     /// `J_D / s_x` at `z`, `18 × latent_dim`.
     fn decoder_jacobian(&self, z: &[f64]) -> DMatrix<f64>;
 
-    /// Lift `J_Eᵀ / s_u` (`18 × latent_dim`) and projection `pinv(J_Eᵀ) s_u` at `x`; none where the Jacobian does not
-    /// have full row rank.
+    /// Lift `J_Eᵀ / s_u` (`18 × latent_dim`) and projection `pinv(J_Eᵀ) s_u` at `x`; none without full row rank.
     fn inputs(&self, x: &[f64]) -> Option<[DMatrix<f64>; 2]>;
 
     /// The phases with the statistics of the training inputs projected at `x`; none as for [`NonlinearMaps::inputs`].
@@ -88,8 +81,7 @@ impl ControlModel {
         self.nonlinear.is_some()
     }
 
-    /// The plant of affine maps that touch the encoder at `x` (18, SI units) and the decoder at `z`; none for a model
-    /// whose maps are affine anyway, and where the encoder's Jacobian has not full row rank.
+    /// The plant of the maps' tangents at `x` (18, SI units) and `z`; none for affine maps or without full row rank.
     pub(super) fn tangent_at(&self, x: &[f64], z: &[f64]) -> Option<Self> {
         let maps = self.nonlinear.as_ref()?;
         let (encoder, decoder) = (maps.encoder_jacobian(x), maps.decoder_jacobian(z));
@@ -111,8 +103,7 @@ impl ControlModel {
         })
     }
 
-    /// Takes the statistics of the training inputs as they are projected at `x`, if the maps depend on the state and
-    /// have full rank there.
+    /// Takes the statistics of the training inputs projected at `x`, if maps depend on it with full rank there.
     pub(super) fn take_statistics_at(&mut self, x: &[f64]) {
         if let Some(phases) = self.nonlinear.as_ref().and_then(|maps| maps.phases(x)) {
             self.phases = phases;
@@ -179,9 +170,8 @@ impl ControlModel {
         std::array::from_fn(|joint| row_product(decoder, joint, dz))
     }
 
-    /// What the joints take, N m, over a time `step_s` in which the latent state goes from `start` to `end` (both `(z,
-    /// dz)`): at the mean of the decoded velocities, with their difference over the time as acceleration. Zero without
-    /// actuators, and never beyond a joint's torque limit.
+    /// Losses of the joints, N m, over a time `step_s` from latent state `start` to `end` (both `(z, dz)`): at the mean
+    /// decoded velocities, with their difference as acceleration. Zero without actuators, at most the torque limit.
     pub fn planned_losses(&self, start: &[f64], end: &[f64], step_s: f64) -> [f64; JOINT_DIM] {
         if self.input_rule.actuators().is_none() {
             return [0.0; JOINT_DIM];
@@ -262,8 +252,7 @@ fn row_product(matrix: &DMatrix<f64>, row: usize, vector: &[f64]) -> f64 {
 }
 
 impl ControlModel {
-    /// The same, or [`ControlError::Shape`] if a map or a phase's statistics do not have the shape that the encoder's number
-    /// of rows asks for.
+    /// The same, or [`ControlError::Shape`] if a map or a phase's statistics do not fit the encoder's number of rows.
     pub fn checked(self) -> Result<Self, ControlError> {
         let d = self.encoder.nrows();
         let mut shapes = vec![

@@ -25,11 +25,10 @@ use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 /// left out may hide.
 pub(super) const SOFTENED_FROM: Real = 1.05 * ROW_MARGIN;
 
-/// Latent model-predictive controller of one model on its robot.
-///
-/// Built once; [`Controller::set_reference`] gives it a trajectory, [`Controller::step_into`] turns each measurement
-/// into a [`Command`]. A step allocates nothing of its own and never fails: when there is no plan to trust, the last
-/// good one is shifted and used for a few stages, then the posture is held with fading torques and damped joints, and
+/// Latent model-predictive controller of one model on its robot, built once: [`Controller::set_reference`] gives it a
+/// trajectory, [`Controller::step_into`] turns each measurement into a [`Command`]. A step allocates nothing of its own
+/// and never fails: without a trusted plan the last good one is shifted and used for a few stages, then the posture is
+/// held with fading torques and damped joints until measurements make sense again. The status says why.
 /// the status says why. As soon as measurements make sense again, so do commands.
 #[derive(Debug)]
 pub struct Controller {
@@ -104,14 +103,12 @@ impl Controller {
         &self.plant
     }
 
-    /// The same with the maps at the last measured state, where they depend on the state: what inputs are projected and
-    /// lifted by.
+    /// The same with the maps at the last measured state, where they depend on it: inputs are lifted by them.
     pub fn local_plant(&self) -> &ControlModel {
         self.local.as_ref().unwrap_or(&self.plant)
     }
 
-    /// Takes the maps at a state (18, SI units), as each measurement does, if they depend on it; where the encoder's
-    /// Jacobian does not have full row rank the maps stay those of the state before.
+    /// Takes the maps at a state (18, SI units), as each measurement does; without full row rank the last ones stay.
     pub fn stand_at(&mut self, x: &[f64]) {
         if !self.plant.is_nonlinear() {
             return;
@@ -151,9 +148,7 @@ impl Controller {
         self.reference.as_ref()
     }
 
-    /// Takes a new trajectory to follow; a plan for an earlier one is forgotten.
-    ///
-    /// This sets up the solver anew, for the rows that matter near the trajectory.
+    /// Takes a new trajectory and sets up the solver for the rows near it; a plan for an earlier one is forgotten.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), ControlError> {
         let mut reference = Reference::new(&self.plant, samples)?;
         if self.plant.is_nonlinear() {
@@ -180,8 +175,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Torques of the motors, N m, that this controller's lift makes of a latent input on a stance: those at the links
-    /// and the stance's losses; not clamped.
+    /// Torques of the motors, N m, that this lift makes of a latent input on a stance: links plus losses, unclamped.
     pub fn lift(
         &mut self,
         u_lat: &[f64],
@@ -198,8 +192,7 @@ impl Controller {
         Ok(std::array::from_fn(|joint| net[joint] + losses[joint]))
     }
 
-    /// Planned minus reference positions at the end of every stage of the last plan, in standard deviations of the
-    /// reference.
+    /// Last plan minus reference positions at the end of each stage, in standard deviations of the reference.
     pub fn planned_deviations(&self) -> impl Iterator<Item = f64> {
         let d = self.plant.latent_dim();
         let reference = self.reference.as_ref();
@@ -224,10 +217,9 @@ impl Controller {
         self.effectiveness = Effectiveness::full(self.plant.latent_dim());
     }
 
-    /// Prepares the step at a time ahead, for the feet that the reference has on the ground then: its stages are
-    /// linearised and, with the Riccati solver, its gains computed. The step then does not have to; its command is the
-    /// same to the bit either way, to rounding after a refused measurement or a change of feet ahead of time. To be
-    /// called while nothing waits for a command, if at all. Does nothing without a reference, or about the last plan.
+    /// Prepares the step at a time ahead, for the feet of the reference then: stages and, with the Riccati solver,
+    /// gains. The command is the same to the bit either way, to rounding after a refused measurement or an early change
+    /// of feet. For times when nothing waits for a command; does nothing without a reference, or about the last plan.
     pub fn prepare(&mut self, time_s: f64) {
         let Some(reference) = &self.reference else {
             return;

@@ -4,10 +4,8 @@ use thiserror::Error;
 
 use crate::robot::ContactFlags;
 
-/// Why a controller could not be set up or given a reference.
-///
-/// Once it runs, a controller does not fail: each step's command carries a [`Status`](super::Status). Samples and
-/// coordinates count from zero.
+/// Why a controller could not be set up or given a reference; samples and coordinates count from zero. Once it runs, it
+/// does not fail: each step's command carries a [`Status`](super::Status).
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "each variant's message names its fields")]
@@ -30,7 +28,6 @@ pub enum ControlError {
     ReferenceShape {
         name: &'static str,
         found: usize,
-        /// The length that the number of samples asks for.
         expected: usize,
     },
     #[error("reference `{name}`, sample {sample}, coordinate {coordinate}: {found} is not finite")]

@@ -13,7 +13,6 @@ use super::trajectory::{Contact, TIME_TOLERANCE_S, Trajectory};
 
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
-    /// Linearised dynamics.
     pub model: StageModel,
     /// `F̄ + A (x_r − x̄) + B (u_r − ū) + e − x_r⁺`: what is left of the dynamics at the reference.
     defect: Vec<f64>,
@@ -90,8 +89,7 @@ impl Horizon {
         }
     }
 
-    /// Writes what a solve starts from: the measured state, and the input of the command before. Rows are those of every
-    /// stage, as far as they are the same.
+    /// Writes what a solve starts from: the measured state, and the input of the command before.
     pub(super) fn begin(
         &mut self,
         (measured, deviation): (&[f64], &[f64]),

@@ -1,7 +1,6 @@
-//! Torques that can carry a latent input: the lift that obeys the ground.
-//!
-//! `u = W_eᵀ u_lat` returns torques *and* a body force, and nothing ties the two together. The consistent lift looks
-//! for the torques alone and lets the legs make the force:
+//! Torques that can carry a latent input: the lift that obeys the ground. `u = W_eᵀ u_lat` returns torques *and* a body
+//! force, and nothing ties the two together. The consistent lift looks for the torques alone and lets the legs make the
+//! force:
 //!
 //! ```text
 //! minimise   ‖ M τ − u_lat ‖² + w (τ − m)ᵀ S⁻¹ (τ − m),   M = pinv(W_eᵀ) s_u [ I ; G(q, c) ]
@@ -158,8 +157,7 @@ impl ConsistentLift {
         }
     }
 
-    /// Torques at the links, N m, for a latent input on a stance; with the stance's losses added they are within the
-    /// motors' limits.
+    /// Torques at the links, N m, for a latent input on a stance; with the losses within the motors' limits.
     pub fn lift(
         &mut self,
         plant: &ControlModel,

@@ -14,30 +14,25 @@
 //!            q_min − s_k q_half ≤ D z_k + d ≤ q_max + s_k q_half,   s_k ≥ 0   decoded joints, k ≥ 1
 //! ```
 //!
-//! - `σ_i` is the standard deviation of latent `i` over the reference, `w_v` the weight of
-//!   velocities, `w_k = 1` but `w_N` the terminal weight.
-//! - `S_p` is the covariance of the training inputs in the stage's phase, projected into latent
-//!   coordinates. Directions in which the training inputs hardly moved are those in which the model
-//!   knows least about what an input does; a scalar weight would let the controller use them freely.
-//! - `F̄, A, B` are the Runge-Kutta step of the stage's phase and its derivatives
-//!   ([`linearise`](super::linearise)) at `(x̄, ū)`: the reference or the last plan. `e_k` is zero if
-//!   the model is the drift; otherwise `e_k = x_r,k+1 − F(x_r,k, u_r,k)`, so that the reference is
-//!   itself a trajectory and the model answers for deviations only.
-//! - Without a recorded input `u_r` is estimated from the reference's accelerations
-//!   (`estimate`) or, if asked for, the phase's mean training input.
-//! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`; `R` turns a force in the body's axes
-//!   upright by the reference's roll and pitch, and leaves one in the world's as it is. `ℓ_k` is what
-//!   the joints take of the motors' torques along the reference, zero in a model without actuators.
-//!   With the consistent lift the torques are chosen afterwards
-//!   within their limits, so the rows of `T` are left out.
-//! - `ρ` is an exact penalty: above the sum of the multipliers of a stage's joint rows it changes
-//!   nothing where the limits can be kept. One `s_k` serves all joints of a stage. Joint limits are
-//!   the rows that contradict the measurement, hence they alone are soft, and from stage 1 on: `u = 0`
-//!   satisfies all others but those of a limited torque rate.
+//! - `σ_i` is the standard deviation of latent `i` over the reference, `w_v` the weight of velocities, `w_k = 1` but
+//!   `w_N` the terminal weight.
+//! - `S_p` is the covariance of the training inputs in the stage's phase, projected into latent coordinates. Where the
+//!   training inputs hardly moved, the model knows least about an input's effect; a scalar weight would ignore that.
+//! - `F̄, A, B` are the Runge-Kutta step of the stage's phase and its derivatives ([`linearise`](super::linearise)) at
+//!   `(x̄, ū)`: the reference or the last plan. `e_k` is zero if the model is the drift; otherwise `e_k = x_r,k+1 −
+//!   F(x_r,k, u_r,k)`, so that the reference is itself a trajectory and the model answers for deviations only.
+//! - Without a recorded input `u_r` is estimated from the reference's accelerations (`estimate`) or, if asked for, the
+//!   phase's mean training input.
+//! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`; `R` turns a force in the body's axes upright by the
+//!   reference's roll and pitch, not one in the world's. `ℓ_k` are the joints' losses along the reference, zero without
+//!   actuators. With the consistent lift torques are chosen afterwards within their limits: the rows of `T` are left
+//!   out.
+//! - `ρ` is an exact penalty: above the sum of the multipliers of a stage's joint rows it changes nothing where the
+//!   limits can be kept. One `s_k` serves all joints of a stage. Joint limits are the rows that contradict the
+//!   measurement, hence they alone are soft, from stage 1 on: `u = 0` satisfies all others but those of a torque rate.
 //!
-//! All is written in deviations divided by their scale, `x_k = x_r,k + σ x̂_k` and `u_k = u_r,k + C_p û_k` with `C_p
-//! C_pᵀ = S_p`, and each row divided by its limit: then the cost is a constant diagonal and the solver needs no scaling
-//! of its own.
+//! All is written in deviations over their scale, `x_k = x_r,k + σ x̂_k` and `u_k = u_r,k + C_p û_k` with `C_p C_pᵀ =
+//! S_p`, and each row over its limit: the cost is a constant diagonal, the solver needs no scaling of its own.
 //!
 //! A row is superfluous if no point that satisfies the other rows violates it by more than a margin, which a linear
 //! program decides: maximise `row · v` subject to the others, with the row itself relaxed so that the maximum exists. The
@@ -75,8 +70,7 @@ pub struct Row {
     pub row: Vec<f64>,
     /// Right-hand side.
     pub bound: f64,
-    /// By how much a loss of 1 N m in the joint takes from the right-hand side; zero unless the row is that of a torque
-    /// limit.
+    /// What a loss of 1 N m in the joint takes from the right-hand side; zero but for torque limits.
     pub per_loss: f64,
 }
 
@@ -139,10 +133,9 @@ fn turn_force(rotation: &[Real], force: &[Real], coefficient: Real, d: usize, ou
 impl StageRows {
     /// The rows for a model on its robot.
     ///
-    /// Unless all are asked for, two kinds are left out, once: rows that the others imply to within 2 % of the limit,
-    /// and torque rows that in no phase an input within `INPUT_REACH` standard deviations of the training inputs can
-    /// reach. A plan may pass a limit that was left out, by 2 % or by asking for an input unlike any in training, or
-    /// where the joints take much; the command is clamped and does not.
+    /// Unless all are asked for, two kinds are left out: rows that the others imply to within 2 % of the limit, and
+    /// torque rows that no input within `INPUT_REACH` standard deviations of the training inputs reaches in any phase.
+    /// Plans may pass these limits, by 2 %, an input unlike any in training or large losses; clamped commands do not.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Self {
         Self::selected(plant, settings, row_selection(plant, settings))
     }
@@ -219,19 +212,16 @@ pub(super) fn row_selection(plant: &ControlModel, settings: &MpcSettings) -> Row
 }
 
 impl StageRows {
-    /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes there, so that the
-    /// rows are not the same.
+    /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes there.
     pub(super) fn with_maps_of(&self, plant: &ControlModel, of: &MpcSettings) -> Option<Self> {
         let rows = Self::selected(plant, of, RowSelection::All);
         let shape = |rows: &Self| (rows.torque.len(), rows.rate.len(), rows.joint.len());
         (shape(&rows) == shape(self)).then_some(rows)
     }
 
-    /// The same without the joint rows that no state within `STATE_REACH` standard deviations of some state of the
-    /// reference reaches, the deviations being the reference's own.
-    ///
-    /// Joint limits are soft and positions in commands are clamped, so what is given up is only that a plan from far
-    /// away bends around limits that its reference is nowhere near.
+    /// The same without the joint rows that no state within `STATE_REACH` of the reference's own standard deviations of
+    /// some state of it reaches. Limits are soft and commanded positions clamped: all that is given up is that a plan
+    /// from far away bends around limits that its reference is nowhere near.
     pub(crate) fn near(mut self, reference: &Reference) -> Self {
         let deviation = reference.deviation();
         (self.joint).retain(|row| reference.comes_near(&row.row, row.bound, deviation));
@@ -239,8 +229,7 @@ impl StageRows {
     }
 }
 
-/// Whether an input within `INPUT_REACH` standard deviations reaches a row's bound in some phase: the farthest that
-/// such inputs go along the row is `row · m + reach ‖Cᵀ row‖`.
+/// Whether an input within `INPUT_REACH` deviations reaches a row's bound in some phase: `row · m + reach ‖Cᵀ row‖`.
 fn is_reachable(plant: &ControlModel, row: &Row) -> bool {
     let direction = DVector::from_column_slice(&row.row);
     plant.phases().iter().any(|phase| {
@@ -273,8 +262,7 @@ fn joint_rows(plant: &ControlModel) -> Vec<Row> {
     })
 }
 
-/// Both signs of each joint's row of a matrix over what `of` gives first for joint and sign, with bound and share of losses,
-/// but for rows of zeros.
+/// Each joint's row of a matrix over `of`'s first value, with both signs, bound and loss share; no rows of zeros.
 fn rows_of(matrix: &DMatrix<f64>, of: impl Fn(usize, f64) -> (f64, f64, f64)) -> Vec<Row> {
     let sides = (0..JOINT_DIM).flat_map(|joint| [1.0, -1.0].map(|sign| (joint, sign)));
     let rows = sides.map(|(joint, sign)| {
@@ -309,10 +297,8 @@ pub(crate) fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
     ]
 }
 
-/// The rows without those that follow from the others to within `margin`, in the same order.
-///
-/// Rows are tried from the last to the first, so of two equal rows the first stays. As rows leave, earlier decisions
-/// loosen; at the end each dropped row is tried against those that stayed and comes back if they no longer imply it. A
+/// The rows without those that follow from the others to within `margin`, in the same order: tried from the last to the
+/// first, so of two equal rows the first stays. Dropped rows that those left no longer imply come back at the end; a
 /// row also stays whenever its linear program is not solved beyond doubt.
 pub fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
     let mut is_kept = vec![true; rows.len()];

@@ -1,6 +1,4 @@
-//! The one adapter to clarabel, the interior-point solver.
-//!
-//! A [`ConeProgram`] is
+//! The one adapter to clarabel, the interior-point solver. A [`ConeProgram`] is
 //!
 //! ```text
 //! minimise   ½ xᵀ P x + qᵀ x
@@ -8,9 +6,8 @@
 //! ```
 //!
 //! with `K` a product of zero, nonnegative and second-order cones. A [`QpSolver`] is built once for a pattern of `P`
-//! and `A`; afterwards only values change. What a solve returns is a value, [`Outcome`], and it is `Solved` only if the
-//! optimality conditions hold for the returned point by [`QpSolver::residuals`], which is computed here from the
-//! problem's own data.
+//! and `A`; afterwards only values change. An [`Outcome`] is `Solved` only if the returned point meets the optimality
+//! conditions by [`QpSolver::residuals`], computed here from the problem's own data.
 
 use clarabel::algebra::{CscMatrix, VectorMath};
 use clarabel::solver::{
@@ -43,8 +40,7 @@ impl Cone {
 /// A matrix in compressed sparse columns.
 pub type SparseColumns = CscMatrix<f64>;
 
-/// The matrix of `(row, column, value)` in any order, each inside `n_rows` by `n_cols`, zeros among them; values of one
-/// place are added.
+/// The matrix of `(row, column, value)` within its size, in any order, also zeros; values of one place are added.
 pub fn sparse(n_rows: usize, n_cols: usize, entries: &[(usize, usize, f64)]) -> SparseColumns {
     let mut entries = entries.to_vec();
     entries.sort_unstable_by_key(|&(row, col, _)| (col, row));
@@ -85,8 +81,7 @@ pub struct ConeProgram {
 /// How clarabel is set up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SolverProfile {
-    /// For a problem whose rows and variables are already scaled and which is solved over and over: no equilibration,
-    /// no iterative refinement, no presolve.
+    /// For scaled problems solved over and over: no equilibration, no iterative refinement, no presolve.
     Tuned,
     /// For a problem that is solved once: the solver's scaling and refinement, to the given tolerance.
     Scaled,
@@ -226,7 +221,6 @@ impl QpSolver {
         }
     }
 
-    /// The optimality conditions at the returned point, from the program's data alone.
     fn check(&mut self) -> Residuals<f64> {
         let (x, y) = (&self.solver.solution.x, &self.solver.solution.z);
         let ConeProgram { p, q, a, b, cones } = &self.program;

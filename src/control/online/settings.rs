@@ -7,8 +7,7 @@ use super::qp::QpSettings;
 /// How a latent input becomes joint torques, each way with its number for interfaces without enumerations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Lift {
-    /// The paper's `u = W_eᵀ u_lat`: the torques are its leading entries, the body force that it holds as well need not
-    /// be the one that these torques produce.
+    /// The paper's `u = W_eᵀ u_lat`: its leading entries are the torques, which need not produce its body force.
     Transpose = 0,
     /// The torques whose own ground reaction forces come closest to the latent input, within torque limits and the
     /// friction cones of the feet in contact; see [`ConsistentLift`](super::ConsistentLift).
@@ -58,9 +57,8 @@ pub enum RowSelection {
 pub enum Solver {
     /// clarabel, for all rows and cones.
     Clarabel = 0,
-    /// The structured [`solver`](crate::solver): Riccati's recursion where no row is active, else an interior point of
-    /// it; for at most [`MAX_STRUCTURED_DIM`](super::MAX_STRUCTURED_DIM) latent coordinates, with friction pyramids
-    /// inside the cones.
+    /// The structured [`solver`](crate::solver), for at most [`MAX_STRUCTURED_DIM`](super::MAX_STRUCTURED_DIM) latent
+    /// coordinates and with friction pyramids inside the cones.
     Riccati = 1,
 }
 
@@ -73,8 +71,7 @@ pub struct FallbackSettings {
     pub torque_decay_s: f64,
     /// Joint damping of a hold, N m s/rad, on measured joint velocities.
     pub damping_nm_s: f64,
-    /// Deviation from the predicted latent state, in standard deviations of the reference, from which a measurement is
-    /// not believed at first.
+    /// Deviation from the prediction, in standard deviations of the reference, that is not believed at first.
     pub jump_deviations: f64,
     /// How many steps in a row a measurement is disbelieved before it is taken for true.
     pub jump_patience: usize,

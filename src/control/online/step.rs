@@ -60,7 +60,6 @@ impl Controller {
         Ok(())
     }
 
-    /// Solves for a plan and makes the command from it.
     pub(super) fn plan_step(
         &mut self,
         measurement: &Measurement<'_>,
@@ -109,8 +108,7 @@ impl Controller {
         }
     }
 
-    /// Largest violation of a joint limit at the ends of the plan's stages, in half ranges of the joint, whichever rows
-    /// the program has.
+    /// Largest violation of a joint limit at the ends of the plan's stages, in half ranges, whichever rows it has.
     fn largest_violation(&self) -> f64 {
         let d = self.plant.latent_dim();
         let limits = self.plant.robot().joint_limit_rad();

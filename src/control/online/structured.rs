@@ -11,17 +11,15 @@ use crate::solver::{Cost, Links, Outcome, Program, Report, RowMatrices, Settings
 pub const TOLERANCE: f64 = 1e-9;
 /// Gap between primal and dual cost, relative to the cost, at which they end as well.
 const GAP: Real = 1e-8;
-/// Complementarity and violation of rows at which iterations end if torque rates are limited: their rows tie the inputs
-/// of all stages together, so that each is as good as the worst.
+/// [`TOLERANCE`] if torque rates are limited: their rows tie all stages together, each is as good as the worst.
 pub const RATE_TOLERANCE: f64 = 1e-12;
 /// How soft the rows of such a program are within a step, see [`Links`].
 pub const RATE_SOFTNESS: f64 = 1e-8;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
-/// The solver of a horizon, refused above [`MAX_STRUCTURED_DIM`] latent coordinates; that of a lift where there are no
-/// states. Dimensions in between those that are compiled are filled up with inputs and states that nothing moves, which
-/// changes no bit.
+/// The solver of a horizon, or of a lift where there are no states; refused above [`MAX_STRUCTURED_DIM`] coordinates.
+/// Dimensions between those compiled are filled up with inputs and states that nothing moves: same bits.
 pub(super) fn structured(
     horizon: usize,
     shape: StageShape,
@@ -36,8 +34,7 @@ pub(super) fn structured(
         gap: if is_linked || is_lift { 0.0 } else { GAP },
         accepted_residual: settings.accepted_residual,
     };
-    // Programs with rates, which are rare, make do with narrow vectors; without wide ones there are fewer dimensions: each
-    // has to be compiled.
+    // Programs with rates, which are rare, do with narrow vectors; of these fewer dimensions are compiled.
     let is_wide = has_avx2() && !is_linked;
     let multiple = if is_wide || is_linked { 2 } else { 4 };
     let inputs = shape.inputs.next_multiple_of(multiple);
@@ -61,8 +58,7 @@ pub(super) fn structured(
     }
 }
 
-/// Memory of a program with up to `NX` states and `NU` inputs, `WIDE` if it is solved by AVX2, `LINKED` if
-/// torque rates are limited.
+/// Memory of a program of at most `NX` states and `NU` inputs: `WIDE` with AVX2, `LINKED` with torque rates.
 #[derive(Debug)]
 pub(super) struct Structured<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
 {

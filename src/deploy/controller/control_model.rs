@@ -1,6 +1,4 @@
-//! The numbers of a model as `src/control_model.rs`.
-//!
-//! Settings of the controller as generated files have them, from the one table [`SETTINGS`].
+//! The numbers of a model as `src/control_model.rs`, and settings as generated files have them, from [`SETTINGS`].
 
 use askama::Template;
 use nalgebra::storage::RawStorage;

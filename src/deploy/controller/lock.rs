@@ -1,18 +1,14 @@
-//! The versions of the solver and of linear algebra that romc was built with.
-//!
-//! A generated controller gets the part of romc's own `Cargo.lock` that it needs, so that its torques have the same
-//! bits and that it can be built from the same downloads.
+//! The sources of a generated controller, and the part of romc's own `Cargo.lock` that it needs: its torques have the
+//! same bits, and it builds from the same downloads.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-/// What a generated controller depends on, besides its model.
 const DIRECT: [&str; 3] = ["clarabel", "nalgebra", "thiserror"];
 
 struct Package {
     name: &'static str,
     version: &'static str,
-    /// Names, with a version where one name has several.
     dependencies: Vec<&'static str>,
     text: &'static str,
 }
@@ -44,7 +40,6 @@ fn package(spelled: &str) -> &'static Package {
     found.expect("the lock file has all that its entries name")
 }
 
-/// A direct dependency of the crate with the controller, as its own entry spells it.
 fn direct(name: &str) -> &'static str {
     let mut dependencies = package("romc-control").dependencies.iter();
     let found = dependencies.find(|spelled| spelled.split(' ').next() == Some(name));

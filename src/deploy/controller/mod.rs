@@ -1,8 +1,6 @@
-//! The controller as a crate with a C interface: `NAME-controller/`.
-//!
-//! In: a complete linear model. Out: romc's own controller sources ([`sources`]), the model's numbers as
-//! `src/control_model.rs`, its equations as the crate that `--emit rust` makes, a header, examples, and the versions of
-//! the solver that romc was built with ([`lock`]).
+//! The controller as a crate with a C interface, `NAME-controller/`. In: a complete linear model. Out: romc's own
+//! controller sources and the versions of its solver ([`lock`]), the numbers as `src/control_model.rs`, the equations
+//! as the crate that `--emit rust` makes, a header, examples.
 
 mod control_model;
 mod lock;
@@ -33,7 +31,6 @@ pub(super) struct Facts<'a> {
     pub(super) state_names: String,
     pub(super) input_names: String,
     pub(super) joint_names: String,
-    /// How `u` comes from torques, lines of a comment.
     pub(super) input_is: String,
     pub(super) codes: Vec<(String, i32)>,
     pub(super) texts: Vec<(i32, String)>,
@@ -93,8 +90,7 @@ templates! {
     "python/example.py": ExamplePy "controller/example_py.askama",
 }
 
-/// The crate of a model's controller; `provenance` is the text of each file's first line, and `plan` the jump of its C
-/// example.
+/// The crate of a model's controller; `provenance` is the first line of its files, `plan` the jump of its C example.
 pub fn emit(
     equations: &Equations<'_>,
     form: Form,
@@ -135,7 +131,6 @@ pub(super) fn plant(model: &ReducedModel) -> Result<ControlModel, EmitError> {
     }
 }
 
-/// How the controller's inputs come from torques, for the header's first comment.
 fn input_in_words(rule: &InputRule, name: &str) -> String {
     let torques = match rule.actuators() {
         None => "its torques are those of the motors",

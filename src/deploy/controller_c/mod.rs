@@ -1,9 +1,7 @@
-//! The controller in C99 alone: `NAME-controller-c/`.
-//!
-//! In: a complete linear model. Out: the model's equations as `--emit c` makes them, and beside them the controller:
-//! reference, horizon, structured solver, commands and fallbacks in one file. The solver and the steps of the
-//! controller are made from their Rust (`src/translate`), the rest has the operations of `control/online` in their
-//! order, so that both give the same bits. Read `templates/controller_c/source.askama` first.
+//! The controller in C99 alone, `NAME-controller-c/`. In: a complete linear model. Out: its equations as `--emit c`
+//! makes them, and the controller in one file: solver and steps are made from their Rust (`src/translate`), the rest
+//! has the operations of `control/online` in their order, for the same bits. Read
+//! `templates/controller_c/source.askama` first.
 
 mod ros2_control;
 mod selftest;
@@ -29,7 +27,6 @@ use source::{Numbers, Source};
 /// Rows of the friction pyramid and of the slack.
 const OTHER_ROWS: usize = 5;
 
-/// What the C files take besides.
 struct Facts<'a> {
     controller: controller::Facts<'a>,
     banner: String,
@@ -39,9 +36,7 @@ struct Facts<'a> {
     limits: &'a [(f64, f64)],
     f: &'static str,
     max_rows: usize,
-    /// Numbers that the solver keeps per row.
     row_numbers: usize,
-    /// The solver's stage, as C.
     solver_stage: String,
     n_phases: usize,
     /// Whether the model knows what its states say of its inputs, in all phases.

@@ -9,7 +9,6 @@ use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
 use crate::recording::reader::Column;
 use crate::robot::{FOOT_DIM, JOINT_DIM, STATE_DIM};
 
-/// What its files take besides the facts of the controller.
 struct Facts<'a> {
     controller: &'a super::Facts<'a>,
     /// Name of the package, its namespace and its library.

@@ -21,11 +21,9 @@ const STEPS: usize = 200;
 const PUSH: [f64; 3] = [0.05, 0.15, 0.9];
 /// Largest difference of a torque, N m, by precision.
 const TOLERANCE_NM: [f64; 2] = [1e-6, 0.1];
-/// Steps of a run that may have another status, by precision: in single precision a plan's residuals can be on the
-/// other side of what is accepted.
+/// Steps of a run that may have another status, by precision: single precision moves a plan's residuals past bounds.
 const OTHER_STATUSES: [usize; 2] = [0, 3];
 
-/// `NAME_controller_selftest.c`.
 #[derive(Template)]
 #[template(
     path = "controller_c/selftest.askama",
@@ -49,7 +47,6 @@ impl<'a> Deref for SelfTest<'a> {
     }
 }
 
-/// The self-test of a model's controller along a jump.
 pub(super) fn text(
     facts: &Facts<'_>,
     model: &ReducedModel,
@@ -97,7 +94,6 @@ pub(super) fn text(
     Ok(text.render()?)
 }
 
-/// Commands along a jump for measurements that are pushed off it.
 fn commands(
     model: &ReducedModel,
     jump: &PlannedJump,
@@ -132,8 +128,7 @@ fn commands(
         .collect())
 }
 
-/// Inputs of all samples as `set_reference_torque` makes them: the motors' accelerations by differences of the samples
-/// on both sides.
+/// Inputs of all samples as `set_reference_torque` makes them; motor accelerations by differences of both neighbours.
 fn inputs(rule: &InputRule, jump: &PlannedJump) -> Result<Vec<f64>, EmitError> {
     let mut u = Vec::with_capacity(jump.time_s.len() * STATE_DIM);
     for k in 0..jump.time_s.len() {

@@ -1,5 +1,4 @@
-//! `NAME_controller.c`: a model's numbers as initialisers of C, and the texts that are made from the controller's Rust,
-//! under the names and sizes of each instance.
+//! `NAME_controller.c`: a model's numbers as initialisers of C, and the texts made from Rust, renamed for an instance.
 
 use std::borrow::Borrow;
 use std::ops::Deref;
@@ -18,7 +17,6 @@ use crate::mpc::{
 };
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, WrenchFrame};
 
-/// `NAME_controller.c`.
 #[derive(Template)]
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
 pub(super) struct Source<'a> {
@@ -109,7 +107,6 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Maps, rows and limits as arrays of C.
 fn constants(plant: &ControlModel, rows: &StageRows, numbers: Numbers) -> String {
     let (robot, phases) = (plant.robot(), plant.phases());
     let (d, limits) = (plant.latent_dim(), robot.joint_limit_rad());
@@ -278,7 +275,6 @@ pub(in crate::deploy) fn list(values: impl Iterator<Item = String>) -> String {
     format!("{{{}}}", lines.join(",\n     "))
 }
 
-/// A stage of the solver, and all else.
 const STAGE: &str = include_str!("../../../templates/controller_c/solver_stage.h");
 const FUNCTIONS: &str = include_str!("../../../templates/controller_c/solver.c");
 const STATE: &str = include_str!("../../../templates/controller_c/online_state.h");

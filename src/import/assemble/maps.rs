@@ -220,7 +220,6 @@ fn shape_of(part: Part, assigned: &Assigned<'_>) -> Option<(usize, usize)> {
 
 /// Latent and state dimension if the layers, stored in this way, are a chain that fits.
 fn dims(part: Part, shapes: &[(usize, usize)], layout: Layout, known: Known) -> Option<Known> {
-    // Numbers of inputs and outputs.
     let widths = shapes.iter().map(|&(rows, columns)| match layout {
         Layout::Row => (rows, columns),
         _ => (columns, rows),

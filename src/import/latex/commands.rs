@@ -43,7 +43,6 @@ impl Expander<'_> {
         Ok(Some(token.with(printed)))
     }
 
-    /// Obeys a command that prints nothing.
     fn silent(&mut self, token: Token) -> Printed {
         match token.name() {
             "begingroup" | "endgroup" => self.pass(&token)?,

@@ -22,7 +22,6 @@ pub(super) struct Macro {
 /// Why something is not read, behind its name, and what would be.
 pub(super) type Refusal = (&'static str, &'static str);
 
-/// What a command means that the document defines.
 #[derive(Clone, Debug)]
 pub(super) enum Meaning {
     Macro(Rc<Macro>),

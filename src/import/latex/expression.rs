@@ -1,7 +1,6 @@
-//! One right side: from LaTeX to the grammar of candidate terms, each piece with its place.
-//!
-//! What is ambiguous in print is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash
-//! (`2/3z_1`, `z_1/2u_1`), a number after a variable. Nesting is limited, so the machine's stack is safe.
+//! One right side: from LaTeX to the grammar of candidate terms, each piece with its place. What is ambiguous in print
+//! is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash (`2/3z_1`, `z_1/2u_1`), a number
+//! after a variable. Nesting is limited, so the machine's stack is safe.
 
 use super::super::Read;
 use super::super::equations::{Equation, Position};

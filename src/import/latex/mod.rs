@@ -1,12 +1,10 @@
-//! Equations of latent accelerations as LaTeX prints them, in `.tex` and Markdown files.
+//! Equations of latent accelerations from `.tex` and Markdown files to sections in the grammar of candidate terms, each
+//! piece with its place. Displays without a left side `\ddot z_k =` are skipped, as is the text, unless the only
+//! equations are in its lines; in a display that is read, what has no meaning here is an error.
 //!
-//! A document enters; sections of equations in the grammar of candidate terms leave, each piece with its place. Displays
-//! without a left side `\ddot z_k =` are skipped, as is the text, unless the only equations are in its lines; in a
-//! display that is read, whatever has no meaning here is an error.
-//!
-//! Read `token.rs` and `markdown.rs` (text to tokens), `expander.rs` with `commands.rs` and `definitions.rs` (what of
-//! them is printed), `sections.rs` (displays, equations and phases), `derivatives.rs`, `reader.rs`, `expression.rs`,
-//! `variables.rs` and `numbers.rs` (one right side) in this order. `words.txt` has the words of LaTeX by their classes.
+//! Read `token`, `markdown` (text to tokens), `expander`, `commands`, `definitions` (what is printed), `sections`, then
+//! for a right side `derivatives`, `reader`, `expression`, `variables`, `numbers`. `words.txt` has LaTeX's words by
+//! class.
 
 mod commands;
 mod definitions;

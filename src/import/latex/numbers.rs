@@ -1,7 +1,6 @@
-//! Numbers (literals, powers of ten, `\num`) and roots (`\sqrt{z_1}`, `\sqrt[3]{z_1}`).
-//!
-//! Braces, fonts and the ends of macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single
-//! digit as an argument (`x^12`, `\frac12`), the reader ends behind it, and so does the number.
+//! Numbers (literals, powers of ten, `\num`) and roots (`\sqrt{z_1}`, `\sqrt[3]{z_1}`). Braces, fonts and the ends of
+//! macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single digit as an argument (`x^12`,
+//! `\frac12`), the number ends behind it.
 
 use std::ops::Range;
 
@@ -316,7 +315,6 @@ impl Reader<'_> {
         digits.take(4).count()
     }
 
-    /// The place behind `{,}`.
     fn behind_comma(&self, at: usize) -> Option<usize> {
         let comma = [Kind::Open, Kind::Character(','), Kind::Close];
         let next = self.tokens[..self.end].get(at..at + 3)?;

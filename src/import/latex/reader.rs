@@ -14,9 +14,7 @@ const MAX_DEPTH: usize = 60;
 /// How integers of a document's coefficients were rounded, where it says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Digits {
-    /// Places after the point.
     Decimals(usize),
-    /// Significant digits.
     Significant(usize),
 }
 
@@ -40,7 +38,6 @@ pub(super) struct Reader<'a> {
     pub(super) tokens: Vec<Token>,
     /// For each opening brace, where it closes.
     pub(super) closing: Vec<usize>,
-    /// Of each token whether it is a brace or font around digits.
     pub(super) is_around: Vec<bool>,
     pub(super) at: usize,
     pub(super) end: usize,
@@ -62,7 +59,6 @@ pub(super) fn is_blank(kind: &Kind) -> bool {
 }
 
 impl<'a> Reader<'a> {
-    /// A reader of one display's tokens.
     pub(super) fn new(file: &'a str, names: &'a SymbolNames, tokens: &[Token]) -> Read<Self> {
         let tokens = without_split_delimiters(tokens);
         let end = tokens.len();
@@ -133,7 +129,6 @@ impl<'a> Reader<'a> {
         self.tokens[..self.end].get(at).map(|token| &token.kind)
     }
 
-    /// The place behind the group or token at `at`.
     pub(super) fn after_argument(&self, at: usize) -> usize {
         match self.kind(at) {
             Some(Kind::Open) => self.closing[at] + 1,
@@ -142,7 +137,6 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Takes `wanted` if it comes next; whether it does.
     pub(super) fn takes(&mut self, wanted: &Kind) -> bool {
         let found = self.is_next(wanted);
         self.at += usize::from(found);

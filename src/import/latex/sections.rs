@@ -11,8 +11,7 @@ use super::reader::{Digits, Reader};
 use super::token::{Kind, Token, group_length, is_in};
 use super::variables::SymbolNames;
 
-/// Reads the equations of a document. Labels may end in `known` names of phases; comments `Phase NAME` and headings go
-/// before them.
+/// Reads a document's equations; comments `Phase NAME` and headings rank before labels that end in `known` phases.
 pub(in crate::import) fn read(
     file: &str,
     bytes: &[u8],
@@ -332,7 +331,6 @@ impl Document<'_> {
     }
 }
 
-/// What of a document matters, in its order.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Item {
     /// A comment, or a heading in Markdown.
@@ -396,7 +394,6 @@ fn begin_document(file: &str, items: &mut Vec<Item>) -> Read<()> {
     Ok(())
 }
 
-/// The tokens of the formula that `start` opened, up to its end, which is passed.
 fn display(expander: &mut Expander, start: &Token) -> Read<Item> {
     let Some(tokens) = expander.formula(|_| false)? else {
         return expander.refuse(start, " without its end", "the end of the display");

@@ -121,7 +121,6 @@ impl Token {
     }
 }
 
-/// The classes of words that are known of LaTeX.
 static CLASSES: LazyLock<HashMap<&str, HashSet<&str>>> = LazyLock::new(|| {
     let lines = include_str!("words.txt").lines();
     let mut classes: HashMap<&str, HashSet<&str>> = HashMap::new();
@@ -140,7 +139,6 @@ pub(super) fn is_in(class: &str, word: &str) -> bool {
     CLASSES[class].contains(word)
 }
 
-/// Whether a word is one of a list.
 pub(super) fn has(list: &str, word: &str) -> bool {
     list.split_whitespace().any(|known| known == word)
 }
@@ -339,7 +337,6 @@ impl<'t> Lexer<'t> {
         }
     }
 
-    /// The tokens of a letter with dots above it.
     fn dotted(&mut self) -> Option<Vec<Kind>> {
         let first = self.peek(0)?;
         let whole = DOTTED.iter().find(|(dotted, ..)| *dotted == first);

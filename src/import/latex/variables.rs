@@ -389,7 +389,6 @@ impl SymbolNames {
         Some(format!("{variable}={name}"))
     }
 
-    /// What can stand in an expression, for messages.
     pub(super) fn expected(&self) -> String {
         let renamed: Vec<&str> = self.names.keys().map(String::as_str).collect();
         match renamed.is_empty() {

@@ -130,7 +130,6 @@ impl Writer<'_> {
         self.value_as(here, expression, None)
     }
 
-    /// The value of an expression, where a type is expected or not.
     pub(crate) fn value_as(
         &mut self,
         here: &mut Instance<'_>,
@@ -382,7 +381,6 @@ impl Writer<'_> {
         })
     }
 
-    /// The elements of an array in braces.
     fn array(
         &mut self,
         here: &mut Instance<'_>,
@@ -400,7 +398,6 @@ impl Writer<'_> {
         Ok(Value::new(format!("{{{}}}", texts.join(", ")), ty, 16))
     }
 
-    /// The fields of a struct in braces.
     fn struct_literal(&mut self, here: &mut Instance<'_>, literal: &syn::ExprStruct) -> Found {
         if literal.rest.is_some() {
             return Err(self.outside(here, literal, "the rest of another struct"));

@@ -49,7 +49,6 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Writes a function that the C is for.
     pub(crate) fn root(&mut self, path: &str) -> Found<()> {
         let (owner, name) = path.split_once("::").unwrap_or(("", path));
         let items = self.items;

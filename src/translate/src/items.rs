@@ -1,6 +1,4 @@
-//! What the sources define: structs, enums, constants and functions, by name.
-//!
-//! Structs, enums and constants that the functions need, before the functions' text.
+//! Structs, enums, constants and functions of the sources by name; needed types and constants come before functions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -50,7 +48,6 @@ pub(crate) struct Function {
     pub(crate) source: usize,
     /// Const parameters of its own, which [`SIZES`] are not.
     pub(crate) sizes: Vec<String>,
-    /// All of its const parameters in their order.
     pub(crate) const_parameters: Vec<String>,
     /// Name, type, and whether the function changes its copy.
     pub(crate) parameters: Vec<(String, Type, bool)>,
@@ -59,7 +56,6 @@ pub(crate) struct Function {
     pub(crate) body: Option<syn::Block>,
 }
 
-/// The lines of documentation among attributes.
 fn docs(attributes: &[syn::Attribute]) -> Vec<String> {
     let line = |attribute: &syn::Attribute| match &attribute.meta {
         syn::Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {
@@ -139,7 +135,6 @@ impl<'a> Items<'a> {
         format!("{}_{}", self.unit.prefix, words.join("_"))
     }
 
-    /// A name of C for a constant or the value of an enum.
     pub(crate) fn constant_name(&self, name: &str) -> String {
         match name.chars().any(|letter| letter.is_ascii_lowercase()) {
             true => self.name(&[name]).to_ascii_uppercase(),
@@ -328,7 +323,6 @@ impl<'a> Items<'a> {
         }
     }
 
-    /// A length, with the names that it has in Rust.
     pub(crate) fn length(&self, source: usize, length: &Expr) -> Found<String> {
         Ok(match length {
             Expr::Lit(syn::ExprLit {

@@ -1,8 +1,7 @@
-//! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in.
-//!
-//! In: sources, a prefix for names, the functions that the C is for. Out: the text of these functions, of all that they
-//! call, and of the types and constants that they need, with their comments. `cargo run -p romc-translate` writes the C
-//! under `templates/controller_c/`; a test of `tests/controller_c.rs` compares it byte for byte. Read `function` first.
+//! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in. In: sources, a
+//! prefix for names, the functions that the C is for. Out: these, what they call, the types and constants that they
+//! need, with comments. `cargo run -p romc-translate` writes `templates/controller_c/`; `tests/controller_c.rs`
+//! compares it byte for byte. Read `function` first.
 //!
 //! | Rust | C |
 //! |---|---|
@@ -52,7 +51,6 @@ pub struct Fault {
     pub message: String,
 }
 
-/// What a piece of Rust is in C.
 pub(crate) type Found<T = expression::Value> = Result<T, Fault>;
 
 impl fmt::Display for Fault {

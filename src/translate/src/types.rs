@@ -35,7 +35,6 @@ impl Type {
         }
     }
 
-    /// The same with other lengths of arrays.
     pub(crate) fn with_lengths(&self, change: &mut dyn FnMut(&str) -> String) -> Self {
         match self {
             Self::Array(of, length) => {
@@ -110,8 +109,7 @@ impl Type {
     }
 }
 
-/// A pointer to elements: those that are numbers are `const` unless they change. C99 has no conversion to a pointer to
-/// constant arrays.
+/// A pointer to elements: numbers are `const` unless they change; C99 converts no pointer to one to constant arrays.
 fn pointer(
     element: &Type,
     is_mutable: bool,
