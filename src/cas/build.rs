@@ -4,8 +4,7 @@ use super::number::exact_sum;
 use super::power::half_integer;
 use crate::{Exponent, ExprId, ExprPool, Node, Number};
 
-/// Passes over operands that become flat only after collecting (each pass removes a level, so two or three suffice in
-/// practice; the bound keeps termination obvious).
+/// Bound on passes over operands that become flat only after collecting: each removes a level, two or three suffice.
 const MAX_PASSES: usize = 64;
 
 impl ExprPool {
@@ -69,10 +68,8 @@ impl ExprPool {
         self.product(&[a, reciprocal])
     }
 
-    /// The sum of all operands: flat, like terms collected, sorted.
-    ///
-    /// Coefficients of like terms are added exactly and rounded once, so the result does not depend on the order of
-    /// `operands`. Other coefficients keep their bits.
+    /// The sum of all operands: flat, like terms collected, sorted. Coefficients of like terms are added exactly and
+    /// rounded once, so the result does not depend on the order of `operands`. Other coefficients keep their bits.
     pub fn sum(&mut self, operands: &[ExprId]) -> ExprId {
         let mut terms = Vec::with_capacity(operands.len());
         for &operand in operands {
@@ -180,13 +177,11 @@ impl ExprPool {
         }
     }
 
-    /// Whether the canonical text of `expr` starts with a minus.
     pub(super) fn starts_negative(&self, expr: ExprId) -> bool {
         self.split(self.summands_of(expr)[0]).0.is_negative()
     }
 
-    /// Splits an expression into a number and the rest, which is the same for all its multiples: that of `2*x - 4*y` is
-    /// `x - 2*y`.
+    /// An expression as a number times the rest that all its multiples share: `x - 2*y` for `2*x - 4*y`.
     pub(super) fn content(&mut self, expr: ExprId) -> (Number, ExprId) {
         let (mut number, mut rest) = self.split(expr);
         loop {
@@ -205,9 +200,7 @@ impl ExprPool {
         }
     }
 
-    /// The product of all operands: flat, powers of like bases collected, sorted.
-    ///
-    /// Sums are not multiplied out.
+    /// The product of all operands: flat, powers of like bases collected, sorted. Sums are not multiplied out.
     pub fn product(&mut self, operands: &[ExprId]) -> ExprId {
         if let &[a, b] = operands {
             // Scaling is by far the most frequent product and needs no sorting.
@@ -342,9 +335,7 @@ impl ExprPool {
 }
 
 /// Folds numbers in an order that depends on their values alone: exact ones first, then floats from both ends, against
-/// the side the result so far is on, which avoids needless overflow.
-///
-/// Numbers whose combination would overflow all the same are left beside each other.
+/// the side the result so far is on, to avoid overflow. Numbers that overflow all the same stay separate.
 fn fold(
     mut numbers: Vec<Number>,
     combine: impl Fn(Number, Number) -> Option<Number>,

@@ -1,4 +1,4 @@
-//! How long an expression is to a reader.
+//! How long an expression is to a reader; a shared part counts as often as it is written.
 //!
 //! | counts | |
 //! |---|---|
@@ -9,8 +9,6 @@
 //! | 2 | a fraction below the bar of another |
 //! | 1 | a whole number before a term of an argument |
 //! | 1 | a symbol, a power, a fraction bar, a digit of a coefficient (at most three) |
-//!
-//! A shared part counts as often as it is written.
 
 use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number};
 
@@ -62,8 +60,7 @@ impl Costs {
 }
 
 impl ExprPool {
-    /// The length of `expr` in weighted characters; the weights stand in the module's table.
-    /// Saturates.
+    /// The length of `expr` in weighted characters, by the module's table; saturates.
     pub fn cost(&self, expr: ExprId) -> u64 {
         Costs::default().of(self, expr)
     }

@@ -1,7 +1,5 @@
-//! Whether what is read has a value.
-//!
-//! A logarithm or root of a number below zero and a quotient by zero have none, whatever they are multiplied with;
-//! canonical forms would forget them, as `0*log(z)` is 0 wherever it has a value. So each is looked at when it is read.
+//! Whether what is read has a value: logarithms and roots of numbers below zero and quotients by zero have none.
+//! Canonical forms would forget them (`0*log(z)` is 0 wherever it has a value), so each is checked when it is read.
 //! `0^0` is 1, as in floating point; powers that are not integers have values for bases from zero on only.
 
 use crate::{CanonicalForms, ExprId, ExprPool, Function, IdMap, Interval, SymbolId};

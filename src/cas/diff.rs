@@ -3,10 +3,8 @@
 use crate::{Exponent, ExprId, ExprPool, Function, IdSet, Node, SymbolId};
 
 impl ExprPool {
-    /// The derivative of `expr` by `symbol`.
-    ///
-    /// `d|x| = sign(x) dx` and `d sign(x) = 0`, which hold except at zero. Results are kept in the pool: asking again,
-    /// or for an expression with common parts, costs little.
+    /// The derivative of `expr` by `symbol`, where `d|x| = sign(x) dx` and `d sign(x) = 0`, which hold except at zero.
+    /// Results are kept in the pool: asking again, or for an expression with common parts, costs little.
     pub fn derivative(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
         if let Some(known) = self.known_derivative(expr, symbol) {
             return known;
@@ -18,8 +16,7 @@ impl ExprPool {
         self.derivatives[&(expr, symbol)]
     }
 
-    /// What has to be differentiated before and with `expr`, operands first. A product with a numeric factor needs only
-    /// the rest, which other terms share.
+    /// What to differentiate before and with `expr`, operands first; products without the number, for others to share.
     fn to_differentiate(&self, expr: ExprId, symbol: SymbolId) -> Vec<ExprId> {
         let mut seen = IdSet::default();
         let mut stack = vec![expr];

@@ -11,15 +11,13 @@ pub struct Display<'p> {
 }
 
 impl ExprPool {
-    /// The text of `expr` in the grammar of [`parse`](ExprPool::parse), which reads it back to the same id: terms and
-    /// factors in canonical order, signs folded, floats in full.
+    /// The text of `expr`, terms in canonical order, floats in full: [`parse`](ExprPool::parse) reads back the same id.
     pub fn display(&self, expr: ExprId) -> Display<'_> {
         Display { pool: self, expr }
     }
 }
 
-/// A piece of text still to be written. The printer keeps its own stack of these, so that deep expressions need no deep
-/// recursion.
+/// A piece of text still to be written; the printer keeps a stack of these, so that it need not recurse deeply.
 enum Piece<'p> {
     Text(&'p str),
     Number(Number),

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use crate::{ExprId, ExprPool, Function, Node, Number, SymbolId};
 
-/// Where an identity is applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
     /// On the way to the normal form.

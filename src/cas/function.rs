@@ -33,7 +33,6 @@ pub(super) struct Row {
     /// Names in the term grammar; the first is printed.
     names: &'static [&'static str],
     pub(super) parity: Parity,
-    /// Whether the argument is an angle.
     is_circular: bool,
     value: fn(f64) -> f64,
     pub(super) image: fn(Interval) -> Interval,
@@ -176,7 +175,6 @@ impl Function {
         self.row().is_circular
     }
 
-    /// `f'(argument)`, where `value` is `f(argument)`.
     pub(super) fn derivative(self, pool: &mut ExprPool, argument: ExprId, value: ExprId) -> ExprId {
         (self.row().derivative)(pool, argument, value)
     }

@@ -1,8 +1,6 @@
-//! Series of expressions beside a point, where roots, magnitudes and signs may have kinks.
-//!
-//! With one variable at `p + t` or `p - t`, an expression is a sum of terms `c t^r` for small positive `t`, with
-//! coefficients that are expressions at the point and real exponents (a Puiseux series): `sqrt(abs(x))*sin(x)` at `x =
-//! 0` is `t^(3/2) - ...`. Expressions that are smooth at the point have Taylor series.
+//! Series of expressions beside a point, where roots, magnitudes and signs may have kinks: with one variable at `p + t`
+//! or `p - t`, sums of terms `c t^r` for small positive `t`, with expressions at the point as coefficients and real
+//! exponents (Puiseux series). `sqrt(abs(x))*sin(x)` at 0 is `t^(3/2) - ...`; smooth expressions have Taylor series.
 
 use std::cmp::Ordering;
 

@@ -1,8 +1,6 @@
-//! Intervals of reals with outward rounding.
-//!
-//! Every operation returns an interval that contains the exact results for all points of its operands. Sums, products,
-//! quotients and square roots err outward by a unit in the last place at most; elementary functions by a few, more than
-//! the error of any current mathematical library.
+//! Intervals of reals with outward rounding: each result contains the exact results for all points of the operands.
+//! Sums, products, quotients and square roots err outward by a unit in the last place at most; elementary functions by
+//! a few, more than the error of any current mathematical library.
 
 use std::fmt;
 
@@ -329,8 +327,7 @@ impl std::ops::Div for Interval {
 /// Steps by which the value of an elementary function is widened.
 const FUNCTION_ULPS: usize = 4;
 
-/// A float that was rounded to the nearest, or the next one if the exact result is above it. A finite result that
-/// overflows downward is still above the largest negative float.
+/// The float rounded to nearest, or the next if the exact result is above it, as one that overflows downward is.
 fn up(nearest: f64, is_above: bool, operands: [f64; 2]) -> f64 {
     match nearest.is_finite() {
         true if is_above => nearest.next_up(),

@@ -1,9 +1,7 @@
-//! The computer algebra system: hash-consed expressions and what can be asked of them.
-//!
-//! Texts and coefficients enter, canonical expressions ([`ExprId`]) live in an [`ExprPool`], and derivatives, rewritten
-//! forms, values, bounds and texts leave. Nothing of the crate is imported here. Read the docs of [`ExprPool`] first
-//! for the invariants, then `build.rs` and `power.rs`, the constructors that keep them; `order.rs` says why equal sums
-//! print alike.
+//! The computer algebra system: texts and coefficients enter, hash-consed canonical expressions ([`ExprId`]) live in an
+//! [`ExprPool`], and derivatives, rewritten forms, values, bounds and texts leave. Read [`ExprPool`] first for the
+//! invariants, then `build.rs` and `power.rs`, the constructors that keep them; `order.rs` says why equal sums print
+//! alike. Only the parser recurses on the machine's stack, to a limited depth; no hash map is iterated for a result.
 //!
 //! | files | |
 //! |---|---|
@@ -16,9 +14,6 @@
 //! | `region`, `polynomial`, `trig`, `rules`, `factors` | substitution and rewriting, each way when asked |
 //! | `simplify`, `shorten`, `cost` | choosing the shortest of equal forms |
 //! | `canonical/` | a normal form with exact coefficients, to decide equality |
-//!
-//! No algorithm but the parser, whose depth is limited, recurses on the machine's stack, and none iterates a hash map
-//! towards a result.
 //!
 //! ```
 //! use romc::symbolic::ExprPool;

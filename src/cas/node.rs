@@ -5,11 +5,8 @@ use std::sync::Arc;
 
 use crate::{Function, Number};
 
-/// A canonical expression of one [`ExprPool`](super::ExprPool).
-///
-/// Two expressions of a pool are structurally equal exactly if their ids are equal. Children always have smaller ids
-/// than their parents. The order of ids is the order of creation and means nothing else: use
-/// [`ExprPool::compare`](super::ExprPool::compare) to sort.
+/// A canonical expression of one [`ExprPool`](super::ExprPool): structurally equal exactly if the ids are equal.
+/// Children have smaller ids than parents; sort by [`ExprPool::compare`](super::ExprPool::compare), not by ids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ExprId(pub(super) u32);
 
@@ -19,7 +16,6 @@ impl ExprId {
     /// The exact `1`, present in every pool.
     pub const ONE: ExprId = ExprId(1);
 
-    /// Position in the pool, for tables indexed by expression.
     pub(crate) fn index(self) -> usize {
         self.0 as usize
     }

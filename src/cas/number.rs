@@ -1,12 +1,9 @@
-//! Numbers of the algebra: exact rationals, and floats where exactness has ended.
-//!
-//! A learned coefficient is a float and keeps its bits; an integer exponent or the `1/2` of a derivative is exact. One
-//! float makes a sum or product a float, and so does a rational that outgrows `i64`. A float of at most 15 digits
-//! stands for the decimal fraction that is written for it, so that `0.1 + 0.2` is `0.3`.
-//!
-//! Only correctly rounded operations are folded (`+ - * /`, square roots, integer powers as multiplication chains), so
-//! that results are the same on every machine. An operation whose result would be infinite, undefined or denormal is
-//! refused ([`None`]) and stays symbolic.
+//! Numbers of the algebra: exact rationals, and floats where exactness has ended. A learned coefficient is a float and
+//! keeps its bits; an integer exponent or the `1/2` of a derivative is exact. One float makes a sum or product a float,
+//! and so does a rational that outgrows `i64`. A float of at most 15 digits stands for the decimal fraction that is
+//! written for it, so that `0.1 + 0.2` is `0.3`. Only correctly rounded operations are folded (`+ - * /`, square roots,
+//! integer powers as multiplication chains), so that results are the same on every machine. An operation whose result
+//! would be infinite, undefined or denormal is refused ([`None`]) and stays symbolic.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -18,10 +15,8 @@ const EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 /// Most digits of a decimal fraction that is taken as exact.
 const MAX_DECIMALS: usize = 15;
 
-/// A finite real constant: exact, or a float with its bits.
-///
-/// Integral floats up to `2^53` are stored as exact integers, and there is no negative zero: equal values of that range
-/// have one representation.
+/// A finite real constant: exact, or a float with its bits. Integral floats up to `2^53` are stored as exact integers,
+/// and there is no negative zero: equal values of that range have one representation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Number(Repr);
 
@@ -80,8 +75,7 @@ impl Number {
         }
     }
 
-    /// The value as a float: the nearest one for an exact integer, the quotient of numerator and denominator for an
-    /// exact fraction.
+    /// The nearest float for an exact integer, the quotient of numerator and denominator for an exact fraction.
     pub fn to_f64(self) -> f64 {
         match self.0 {
             Repr::Rational(numerator, denominator) => numerator as f64 / denominator as f64,
@@ -170,8 +164,7 @@ impl Number {
         (exact.is_exact() && exact.to_f64() == self.to_f64()).then_some(exact)
     }
 
-    /// An operation on two exact numbers or on the decimal fractions of floats, the latter rounded once; on the floats
-    /// themselves where one is no short decimal, or the result is too long.
+    /// An operation on exact numbers or decimals of floats, rounded once; on floats if a decimal or result is too long.
     fn combined(
         self,
         other: Number,
@@ -209,8 +202,7 @@ impl Number {
         self.combined(other, quotient, |a, b| normal(a / b))
     }
 
-    /// `self ^ exponent` as a multiplication chain (`0^0 = 1`); `None` for zero to a negative power, overflow or
-    /// underflow.
+    /// `self ^ exponent` by multiplications (`0^0 = 1`); `None` for zero to a negative power, overflow and underflow.
     pub(crate) fn checked_powi(self, exponent: i64) -> Option<Number> {
         if self.abs().is_one() {
             return Some(if exponent % 2 == 0 { Number::ONE } else { self });
@@ -239,8 +231,7 @@ impl Number {
     }
 }
 
-/// The sum of numbers, rounded once: a small one between large ones that cancel is not lost. `None` for sums of fewer
-/// than three, which need no such care, and on overflow.
+/// The sum, rounded once: none is lost between large ones that cancel; `None` for fewer than three and overflow.
 pub(super) fn exact_sum(numbers: &[Number]) -> Option<Number> {
     if numbers.len() < 3 || numbers.iter().all(|number| number.is_exact()) {
         return None;
@@ -255,8 +246,7 @@ pub(super) fn exact_sum(numbers: &[Number]) -> Option<Number> {
     })
 }
 
-/// The sum of floats, rounded once (Shewchuk, Adaptive precision floating-point arithmetic, 1997): what is lost by each
-/// addition is kept.
+/// The sum of floats, rounded once, keeping all parts (Shewchuk, Adaptive precision floating-point arithmetic, 1997).
 pub fn sum_of_floats(values: &[f64]) -> f64 {
     let plain = values.iter().fold(0.0, |sum, value| sum + value);
     if values.len() < 3 || !plain.is_finite() {

@@ -1,8 +1,6 @@
-//! The structural order that makes canonical forms independent of how they were built.
-//!
-//! Sums list the constant first, then polynomial terms by degree (`z1`, `z2`, `dz1`, `z1^2`, `z1*z2`, ...), then
-//! everything else (`sin(z1)`, ...), as a library of candidate terms does. Coefficients do not matter, so that a term
-//! keeps its place when its sign changes.
+//! The structural order that makes canonical forms independent of how they were built: the constant first, then
+//! polynomial terms by degree (`z1`, `z2`, `dz1`, `z1^2`, `z1*z2`, ...), then everything else (`sin(z1)`, ...), as in a
+//! library of candidate terms. Coefficients do not matter, so that a term keeps its place when its sign changes.
 
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
@@ -43,13 +41,10 @@ pub(super) enum Exponent {
 type Step = ControlFlow<Ordering, (ExprId, ExprId)>;
 
 impl ExprPool {
-    /// The canonical order of two expressions; equal only for the same expression.
-    ///
-    /// It depends on structure and symbol names, never on the order of creation.
+    /// The canonical order, by structure and symbol names, never by creation; equal only for the same expression.
     pub fn compare(&self, a: ExprId, b: ExprId) -> Ordering {
         let (mut a, mut b) = (a, b);
-        // Distinct ids are distinct structures: the first differing pair of operands decides, so the comparison walks
-        // down one path and needs no stack.
+        // Distinct ids are distinct structures: the first differing pair of operands decides, so no stack is needed.
         loop {
             if a == b {
                 return Ordering::Equal;

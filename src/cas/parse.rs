@@ -90,9 +90,8 @@ fn short(token: &str) -> String {
 }
 
 impl ExprPool {
-    /// Reads an expression over the names that `allowed` accepts.
-    ///
-    /// Function names are never variables. What [`display`](ExprPool::display) prints reads back to the same id.
+    /// Reads an expression over the names that `allowed` accepts; function names are never variables. What
+    /// [`display`](ExprPool::display) prints reads back to the same id.
     ///
     /// # Errors
     /// [`ParseError`] with the position, what was found and what was expected.
@@ -104,9 +103,8 @@ impl ExprPool {
         Parser::of(self, text, allowed, &|_, _| None)?.expression(TokenKind::End)
     }
 
-    /// As [`parse`](ExprPool::parse), for texts that users write: constant parts that have no value, such as `0/0` or
-    /// `0*log(0)`, are refused. `literal` gives expressions for the texts of numbers, such as their
-    /// [`decimal`](ExprPool::decimal).
+    /// As [`parse`](ExprPool::parse), but refuses constant parts without a value, such as `0/0` or `0*log(0)`.
+    /// `literal` gives expressions for the texts of numbers, such as their [`decimal`](ExprPool::decimal).
     ///
     /// # Errors
     /// As [`parse`](ExprPool::parse), and [`ParseErrorKind::NoValue`].
@@ -346,8 +344,7 @@ enum TokenKind {
     End,
 }
 
-/// All tokens of `text`, with [`TokenKind::End`] last. Characters outside the grammar are found here, before anything
-/// is built.
+/// All tokens, [`TokenKind::End`] last. Characters outside the grammar are found here, before anything is built.
 fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
     let mut tokens = Vec::new();
     let mut start = 0;
@@ -420,8 +417,7 @@ fn name_length(text: &str) -> usize {
     end
 }
 
-/// The value of a number token: exact if it is written as an integer that fits; nothing for what floats hold as
-/// infinity, or as zero although it is none.
+/// A number token's value, exact if a fitting integer; nothing for what floats hold as infinity, or wrongly as zero.
 fn read_number(token: &str) -> Option<Number> {
     if token.bytes().all(|byte| byte.is_ascii_digit())
         && let Ok(integer) = token.parse::<i64>()

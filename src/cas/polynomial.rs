@@ -39,10 +39,8 @@ impl Bases {
 
 impl ExprPool {
     /// The terms of a sum over one common denominator, with the numerator multiplied out and divided by parts of the
-    /// denominator where that leaves no remainder: `x/(x + y) + y/(x + y)` becomes `1`, `(x^2 - 1)/(x - 1)` becomes `1
-    /// + x`.
-    ///
-    /// Nothing changes unless a sum or a function occurs in a denominator, or if there are too many different ones.
+    /// denominator where no remainder is left: `x/(x + y) + y/(x + y)` is `1`, `(x^2 - 1)/(x - 1)` is `1 + x`. Nothing
+    /// changes unless a denominator has a sum or function, or if there are too many different ones.
     pub(super) fn together(&mut self, expr: ExprId) -> ExprId {
         let terms = self.terms_of(expr);
         let mut denominators: Vec<(ExprId, Number)> = Vec::new();
@@ -118,8 +116,7 @@ impl ExprPool {
         self.product(&factors)
     }
 
-    /// Both sums divided by their greatest common divisor, if that is not a number: found by exact division of the
-    /// lower one, or by Euclid's algorithm if both are in one base.
+    /// Both sums over their greatest common divisor: by exact division of the lower, or Euclid's algorithm in one base.
     fn without_common_divisor(&mut self, above: ExprId, below: ExprId) -> Option<(ExprId, ExprId)> {
         let is_sum = |expr| matches!(self.node(expr), Node::Sum(_));
         if !is_sum(above) || !is_sum(below) {
@@ -153,8 +150,7 @@ impl ExprPool {
         ))
     }
 
-    /// `dividend / divisor` if both are sums of products of powers with exact or decimal coefficients, and the division
-    /// leaves no remainder.
+    /// `dividend / divisor` of sums of products of powers, with exact or decimal coefficients, if nothing remains.
     fn divide_exactly(&mut self, dividend: ExprId, divisor: ExprId) -> Option<ExprId> {
         let (dividend, divisor) = (self.terms_of(dividend), self.terms_of(divisor));
         let bases = self.bases_of(dividend.iter().chain(&divisor))?;
@@ -208,8 +204,7 @@ impl ExprPool {
         Some(Bases { units, has_floats })
     }
 
-    /// The factors of a term as powers with constant exponents, where `exp(2*a - b)` is `exp(a)^2*exp(b)^-1`; `None`
-    /// for roots of numbers.
+    /// A term's factors as powers, with `exp(2*a - b)` as `exp(a)^2*exp(b)^-1`; `None` for roots of numbers.
     fn powers_of(&mut self, rest: ExprId) -> Option<Vec<(ExprId, Number)>> {
         let mut powers = Vec::new();
         for factor in self.factors_of(rest).to_vec() {
@@ -300,8 +295,7 @@ impl ExprPool {
     }
 }
 
-/// A polynomial divided by the highest product of powers that leaves no negative exponent, and the exponents of that
-/// product.
+/// A polynomial over the highest product of powers that leaves no negative exponent, and that product's exponents.
 fn lowered(polynomial: Monomials) -> (Monomials, Vec<i64>) {
     let least = (polynomial.keys().cloned())
         .reduce(|a, b| a.iter().zip(&b).map(|(a, b)| *a.min(b)).collect());
@@ -311,8 +305,7 @@ fn lowered(polynomial: Monomials) -> (Monomials, Vec<i64>) {
     (lowered.collect(), least)
 }
 
-/// The quotient of two polynomials, and what is left once the highest monomial of the divisor is no part of that of the
-/// dividend; nothing if a coefficient is no longer exact.
+/// Quotient and remainder of two polynomials by highest monomials; nothing if a coefficient is no longer exact.
 fn divided(dividend: Monomials, divisor: &Monomials) -> Option<(Monomials, Monomials)> {
     let (lowest, leading) = divisor.last_key_value()?;
     let (mut quotient, mut left) = (Monomials::new(), dividend);
@@ -334,9 +327,8 @@ fn divided(dividend: Monomials, divisor: &Monomials) -> Option<(Monomials, Monom
     None
 }
 
-/// `content` and `root` of a polynomial `content * root^power`, the root's coefficients being whole.
-///
-/// Each next term of the root is what is left over, divided by the derivative of the power.
+/// `content` and `root` of a polynomial `content * root^power`, the root's coefficients being whole. Each next term of
+/// the root is what is left over, divided by the derivative of the power.
 fn root_of(polynomial: &Monomials, power: i64) -> Option<(Number, Monomials)> {
     let (highest, leading) = polynomial.last_key_value()?;
     let halved = |exponent: &i64| (exponent % power == 0).then_some(exponent / power);

@@ -9,10 +9,9 @@ use super::order::SymbolKey;
 use super::slope::Slope;
 use crate::{Coefficient, ExprId, Function, IdSet, Node, Number, SymbolId};
 
-/// Owner of hash-consed, canonical expressions.
-///
-/// Expressions are made only by constructors ([`sum`](ExprPool::sum), [`product`](ExprPool::product),
-/// [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and what is built on them), which keep these invariants:
+/// Owner of hash-consed, canonical expressions, made only by constructors ([`sum`](ExprPool::sum),
+/// [`product`](ExprPool::product), [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and what is built on them) with
+/// these invariants:
 ///
 /// - sums and products are flat and sorted by [`compare`](ExprPool::compare), whatever the order
 ///   of the operands given; constants are folded, like terms and like factors collected;
@@ -23,10 +22,9 @@ use crate::{Coefficient, ExprId, Function, IdSet, Node, Number, SymbolId};
 ///
 /// # Which rewritings are allowed
 ///
-/// Wherever the expression as written has a finite real value, the canonical one has the same value up to rounding. The
-/// reverse need not hold: a rewriting may remove singularities, as in `x/x = 1`, `0 * log(x) = 0`, `sqrt(x)^2 = x` or
-/// `exp(log(x)) = x`, but never adds one. Constants without a value (`1/0`, `log(0)`, `sqrt(-1)`) are kept as they are;
-/// folding never produces an infinity or NaN.
+/// Wherever the expression as written has a finite real value, the canonical one has the same up to rounding. A
+/// rewriting may remove singularities, as in `x/x = 1`, `0 * log(x) = 0`, `sqrt(x)^2 = x` or `exp(log(x)) = x`, but
+/// never adds one. Constants without a value (`1/0`, `log(0)`, `sqrt(-1)`) stay; folding gives no infinity or NaN.
 #[derive(Clone, Debug)]
 pub struct ExprPool {
     nodes: Vec<Node>,
@@ -100,8 +98,7 @@ impl ExprPool {
         pool
     }
 
-    /// An empty pool that folds numbers only where the result is exact, so that equal expressions are equal to the last
-    /// digit: `10^20 + 1` stays a sum.
+    /// An empty pool that folds only exact results (`10^20 + 1` stays): equal expressions are equal to the last digit.
     pub fn exact() -> ExprPool {
         ExprPool {
             is_exact: true,
@@ -113,8 +110,7 @@ impl ExprPool {
         self.is_exact
     }
 
-    /// Does something within so much work, and within what is left of a limit around it: rewriting that would exceed it
-    /// leaves expressions as they are.
+    /// Does `step` within so much work and within the limit around it; what would exceed that is left as it is.
     pub(super) fn limited<T>(&mut self, work: u64, step: impl FnOnce(&mut Self) -> T) -> T {
         let outer = self.limit_work(work);
         let result = step(self);
@@ -161,8 +157,7 @@ impl ExprPool {
         self.symbol_id(&format!(" {kind} {number}"))
     }
 
-    /// A number as it is written, which is never rounded or folded; see [`Coefficient::parse`]. It prints as its text
-    /// behind `~` if it is rounded, else `#`.
+    /// A number as written, never rounded or folded, see [`Coefficient::parse`]; prints behind `~` if rounded or `#`.
     pub fn decimal(&mut self, text: &str, is_rounded: bool) -> Option<ExprId> {
         let coefficient = Coefficient::parse(text, is_rounded)?;
         let value = coefficient.to_f64();
@@ -177,8 +172,7 @@ impl ExprPool {
         decimal.map(|(coefficient, value)| (coefficient, *value))
     }
 
-    /// The parts of a symbol that stands for a selection of [`ExprPool::slope`]: test, value where the test is zero,
-    /// value elsewhere.
+    /// The parts of a selection of [`ExprPool::slope`]: test, value where the test is zero, value elsewhere.
     pub fn selection(&self, symbol: SymbolId) -> Option<[ExprId; 3]> {
         self.symbols[symbol.index()].selection
     }
@@ -252,9 +246,7 @@ impl ExprPool {
         }
     }
 
-    /// Splits `expr` into `coefficient * rest`, where `rest` has no numeric factor.
-    ///
-    /// A number is `number * 1`. The product of two numbers too large to fold is left whole.
+    /// Splits `expr` into `coefficient * rest`; `rest` (1 of a number) has a number only where folding would overflow.
     pub fn split(&self, expr: ExprId) -> (Number, ExprId) {
         match self.node(expr) {
             Node::Number(number) => (*number, ExprId::ONE),
@@ -271,8 +263,7 @@ impl ExprPool {
         }
     }
 
-    /// The terms of a sum in canonical order, each as `(coefficient, rest)`; anything else is a sum of one term, and
-    /// zero of none.
+    /// The terms of a sum in canonical order, as `(coefficient, rest)`; anything else is one term, zero none.
     pub fn terms_of(&self, expr: ExprId) -> Vec<(Number, ExprId)> {
         if expr == ExprId::ZERO {
             return Vec::new();
@@ -310,9 +301,8 @@ impl ExprPool {
         self.walk(roots, |_| true, |_| true)
     }
 
-    /// As [`reachable`](ExprPool::reachable), but what fails `wanted` is left out with all that is reached through it
-    /// alone, and what does not pass `opened` is not looked into. Ids rise from operands to users, so sorting them is a
-    /// topological order.
+    /// As [`reachable`](ExprPool::reachable), without what fails `wanted` and all that is reached through it alone, and
+    /// not looking into what fails `opened`. Ids rise from operands to users, so sorting them is a topological order.
     pub(super) fn walk(
         &self,
         roots: &[ExprId],

@@ -144,8 +144,7 @@ impl ExprPool {
         Some((roots.collect(), common))
     }
 
-    /// A power of a constant: folded where that is exact or correctly rounded; otherwise the whole part of the exponent
-    /// is folded and a root remains, as in `2^(3/2) = 2*sqrt(2)`.
+    /// A power of a constant, folded where exact or correctly rounded; else a root remains: `2^(3/2) = 2*sqrt(2)`.
     fn pow_of_number(&mut self, base: Number, exponent: Number) -> ExprId {
         if base.is_one() {
             return ExprId::ONE;
@@ -195,10 +194,8 @@ impl ExprPool {
         Some(self.scale(outside, root))
     }
 
-    /// `function(argument)`, with the values and symmetries that need no rounding: `sin(0) = 0`, `cos(-x) = cos(abs(x))
-    /// = cos(x)`, `log(exp(x)) = x`, `abs(-2) = 2`.
-    ///
-    /// `sin(1)` and `sin(0.5)` stay symbolic: sines are not the same to the last bit everywhere.
+    /// `function(argument)`, with the values and symmetries that need no rounding: `sin(0) = 0`, `log(exp(x)) = x`,
+    /// `cos(-x) = cos(abs(x)) = cos(x)`, `abs(-2) = 2`. `sin(1)` stays: the last bit of sines varies by machine.
     pub fn apply(&mut self, function: Function, argument: ExprId) -> ExprId {
         if function == Function::Sqrt {
             return self.pow_number(argument, Number::HALF);
@@ -264,8 +261,7 @@ fn exact_power(base: Number, exponent: Number) -> Option<Number> {
     root.checked_powi(numerator)
 }
 
-/// `sqrt(base) = factor * sqrt(radicand)` with an integer radicand freed of small squares; `None` if the numbers grow
-/// too large.
+/// `sqrt(base) = factor * sqrt(radicand)`, an integer radicand without small squares; `None` if numbers grow too large.
 fn square_free(base: Number) -> Option<(Number, Number)> {
     let (numerator, denominator) = base.as_rational()?;
     let mut radicand = numerator.checked_mul(denominator)?;

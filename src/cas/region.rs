@@ -1,8 +1,6 @@
-//! Substitution, multiplying out within limits, and rewriting level by level: sums, products and integer powers on one
-//! side, what is inside functions and other powers on the other.
-//!
-//! A *region* is what can be reached from an expression through sums, products and integer powers. Function calls and
-//! other powers are its atoms; their arguments are regions of their own.
+//! Substitution, multiplying out within limits, and rewriting level by level. A *region* is what can be reached from an
+//! expression through sums, products and integer powers. Function calls and other powers are its atoms; their arguments
+//! are regions of their own.
 
 use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number, SymbolId};
 
@@ -136,8 +134,7 @@ impl ExprPool {
         self.pow_number(value, Number::integer(exponent))
     }
 
-    /// `expr` with every symbol of `replacements` replaced, all at once: replacements are not searched for symbols
-    /// again, so `x` and `y` can be exchanged. The first entry of a symbol counts.
+    /// `expr` with symbols replaced all at once, so that `x` and `y` can be exchanged; the first entry of each counts.
     pub fn substitute(&mut self, expr: ExprId, replacements: &[(SymbolId, ExprId)]) -> ExprId {
         self.substitute_all(&[expr], replacements)[0]
     }
@@ -161,8 +158,7 @@ impl ExprPool {
         self.replace(exprs, order, new)
     }
 
-    /// The expressions with every part that has no variable but a finite value as a number: `exp(3)*x` is
-    /// `20.085536923187668*x`.
+    /// The expressions with finite parts that have no variable as numbers: `exp(3)*x` is `20.085536923187668*x`.
     pub fn fold_constants(&mut self, exprs: &[ExprId]) -> Vec<ExprId> {
         let order = self.reachable(exprs);
         let mut folded: IdMap<ExprId> = IdMap::default();
@@ -176,8 +172,7 @@ impl ExprPool {
         self.replace(exprs, order, folded)
     }
 
-    /// The expressions with the parts that `replaced` has, and what is made of these, built again; `order` lists their
-    /// parts, operands first.
+    /// The expressions, built again with the parts in `replaced`; `order` lists their parts, operands first.
     pub(super) fn replace(
         &mut self,
         exprs: &[ExprId],
@@ -195,7 +190,6 @@ impl ExprPool {
             .collect()
     }
 
-    /// The node of `expr` with other operands.
     pub(super) fn rebuild(&mut self, expr: ExprId, operand: impl Fn(ExprId) -> ExprId) -> ExprId {
         let all = |operands: &[ExprId]| operands.iter().map(|of| operand(*of)).collect::<Vec<_>>();
         match self.node(expr).clone() {

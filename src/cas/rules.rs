@@ -1,7 +1,5 @@
 //! Identities of exponentials, logarithms and roots, and where each is applied; those of tangents, magnitudes and signs
-//! are in `factors`.
-//!
-//! Rules come in two directions: towards a normal form in which equal expressions coincide, and towards fewer function
+//! are in `factors`. Rules lead towards a normal form in which equal expressions coincide, or towards fewer function
 //! calls. Each is an identity wherever its left side has a value:
 //!
 //! | normal form | |

@@ -16,7 +16,6 @@ const MOST_TERMS: i64 = 24;
 pub(super) struct Series {
     /// Exponent and coefficient; exponents are distinct as expressions.
     pub(super) terms: Vec<(ExprId, ExprId)>,
-    /// Exponents from which on terms are left out.
     pub(super) rest: Vec<ExprId>,
 }
 

@@ -1,12 +1,10 @@
-//! Simplification: the shortest of several equal forms.
-//!
-//! A region (see `region.rs`) is brought to a normal form, in which equal expressions tend to coincide: multiplied out,
-//! angles expanded, sines reduced to cosines, exponentials and logarithms merged, over a common denominator. From it a
-//! few shorter forms are derived. The one with the least [`cost`](ExprPool::cost) replaces the region if it is shorter.
-//!
-//! Every accepted step lowers the cost, a natural number, until none does: simplifying a result returns it. The work on
-//! one expression is bounded, counted in constructors; what exceeds that is left as it is. All rewritings keep the
-//! value wherever the expression has one, up to rounding (see [`ExprPool`]); no term is dropped for being small.
+//! Simplification: the shortest of several equal forms. A region (see `region.rs`) is brought to a normal form, in
+//! which equal expressions tend to coincide: multiplied out, angles expanded, sines reduced to cosines, exponentials
+//! and logarithms merged, over a common denominator. Of a few shorter forms derived from it, the one with the least
+//! [`cost`](ExprPool::cost) replaces the region if it is shorter. Every accepted step lowers the cost, a natural
+//! number, until none does: simplifying a result returns it. The work on one expression is bounded, counted in
+//! constructors; what exceeds that stays. All rewritings keep the value wherever there is one, up to rounding (see
+//! [`ExprPool`]); no term is dropped for being small.
 
 use super::cost::Costs;
 use crate::{CanonicalForms, Exponent, ExprId, ExprPool, Function, Node};
@@ -151,7 +149,6 @@ impl ExprPool {
         forms
     }
 
-    /// The normal form of one region, after a bounded number of rounds.
     pub(super) fn normal_form(&mut self, region: ExprId) -> ExprId {
         let mut form = region;
         for _ in 0..MAX_ROUNDS {

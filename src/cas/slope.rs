@@ -1,9 +1,6 @@
-//! Derivatives that have values wherever the function has slopes.
-//!
-//! The rules of differentiation give `g'/(2 sqrt(g))` for a root, which is `0/0` where `g` and `g'` vanish. The slope
-//! of an expression is the derivative, where it exists; otherwise the limit of slopes from above, or from below where
-//! there are no values above, which may be infinite. A jump itself adds nothing.
-//!
+//! Derivatives that have values wherever the function has slopes: the rules give `g'/(2 sqrt(g))` for a root, which is
+//! `0/0` where `g` and `g'` vanish. The slope of an expression is the derivative, where it exists; otherwise the limit
+//! of slopes from above, or from below if there are no values above, which may be infinite. A jump itself adds nothing.
 //! Selections decide at run time which applies: the derivative by the rules where no argument of a root, magnitude,
 //! sign or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a
 //! difference of values replaces a derivative that is not a number.
@@ -57,8 +54,7 @@ impl Facts {
         }
     }
 
-    /// A symbol of a test that makes it zero by being zero, or the test: what is known of symbols is known of all
-    /// expressions.
+    /// A symbol that makes the test zero by being zero, or the test: facts about symbols hold in all expressions.
     fn simplest(&self, pool: &mut ExprPool, test: ExprId) -> ExprId {
         for symbol in pool.symbols_of(test) {
             let variable = pool.symbol_expr(symbol);
@@ -198,8 +194,7 @@ enum Outcome {
 }
 
 impl ExprPool {
-    /// The slope of `expr` by `symbol`: its derivative, with selections where that has no value although `expr` has;
-    /// see the module. To be evaluated, not to be differentiated or rewritten.
+    /// The slope of `expr` by `symbol` (see the module): to be evaluated, not to be differentiated or rewritten.
     pub fn slope(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
         self.full_slope(expr, symbol).expr
     }
@@ -369,8 +364,7 @@ impl ExprPool {
         Ok(Outcome::Finite(ExprId::ZERO))
     }
 
-    /// `zero` where `test` is zero, `other` elsewhere (also where it is not a number): for programs, behind a symbol
-    /// that only values look into.
+    /// `zero` where `test` is zero, else `other` (also for NaN), behind a symbol that only values look into.
     fn select(&mut self, test: ExprId, zero: ExprId, other: ExprId) -> ExprId {
         if zero == other {
             return zero;

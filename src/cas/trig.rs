@@ -1,5 +1,4 @@
-//! Trigonometric identities, each in the direction it is asked for, on the outermost level (sums, products and integer
-//! powers), not inside arguments.
+//! Trigonometric identities, each in the direction asked for, in sums, products and integer powers, not in arguments.
 
 use std::collections::BTreeMap;
 
@@ -17,14 +16,12 @@ const MAX_TRIG_DEGREE: i64 = 8;
 type Units = BTreeMap<ExprId, Number>;
 
 impl ExprPool {
-    /// `expr` with sines, cosines and tangents of sums and of exact multiples of a common angle written with those of
-    /// the single angles. Results are not multiplied out further.
+    /// `expr` with sines, cosines, tangents of sums and exact multiples by those of single angles, not multiplied out.
     pub fn expand_angles(&mut self, expr: ExprId) -> ExprId {
         self.expand_angles_like(expr, ExprId::ZERO)
     }
 
-    /// As [`expand_angles`](ExprPool::expand_angles), with multiples of the units that `other` and `expr` have in
-    /// common.
+    /// As [`expand_angles`](ExprPool::expand_angles), with multiples of the units common to `other` and `expr`.
     pub(super) fn expand_angles_like(&mut self, expr: ExprId, other: ExprId) -> ExprId {
         let expr = self.rewrite_region(expr, |pool, node| match *pool.node(node) {
             Node::Apply(Function::Tan, argument) => {
@@ -102,8 +99,7 @@ impl ExprPool {
         self.expand_node(product, NARROW)
     }
 
-    /// `expr` with every power of a sine reduced to the first by `sin(x)^2 = 1 - cos(x)^2`, also in denominators
-    /// (`1/sin(x) = sin(x)/(1 - cos(x)^2)`). Not multiplied out.
+    /// `expr` with powers of sines reduced to the first by `sin(x)^2 = 1 - cos(x)^2`, also below; not multiplied out.
     pub fn sines_to_cosines(&mut self, expr: ExprId) -> ExprId {
         self.reduce_powers(expr, Function::Sin, Function::Cos, |_| true)
     }
@@ -156,8 +152,7 @@ impl ExprPool {
         })
     }
 
-    /// `expr` with the products of sines and cosines in each term of the outermost sum written as sums: `sin(x)^2`
-    /// becomes `1/2 - 1/2*cos(2*x)`.
+    /// `expr` with products of sines and cosines in outermost terms as sums: `sin(x)^2` is `1/2 - 1/2*cos(2*x)`.
     pub fn combine_angles(&mut self, expr: ExprId) -> ExprId {
         let terms = self.terms_of(expr);
         let mut combined = Vec::with_capacity(terms.len());
@@ -277,8 +272,7 @@ impl ExprPool {
     }
 }
 
-/// Notes that multiples of `rest` occur with this coefficient: the unit is the largest exact number of which all exact
-/// coefficients are multiples.
+/// Notes a coefficient of `rest`; its unit is the largest exact number of which all exact ones are multiples.
 fn note_unit(units: &mut Units, coefficient: Number, rest: ExprId) {
     let Some((numerator, denominator)) = coefficient.abs().as_rational() else {
         return;

@@ -6,10 +6,8 @@ use super::interval::power_by;
 use crate::{ExprId, ExprPool, Interval, Node, Number, SymbolId};
 
 impl ExprPool {
-    /// The value of `expr` where variables have the values that `value_of` gives.
-    ///
-    /// NaN or an infinity where the expression has no value. Every distinct subexpression is computed once, sums and
-    /// products from left to right, integer powers as multiplication chains.
+    /// The value of `expr` for values of variables by `value_of`; NaN or infinite where it has none. Each subexpression
+    /// is computed once, sums and products from left to right, integer powers as multiplication chains.
     pub fn evaluate(&self, expr: ExprId, value_of: &dyn Fn(SymbolId) -> f64) -> f64 {
         self.evaluate_all(&[expr], value_of)[0]
     }
@@ -34,8 +32,7 @@ impl ExprPool {
         })
     }
 
-    /// Computes something for every expression that `roots` are made of, operands first, and gives the results for
-    /// `roots`. `step` receives the results of operands.
+    /// Computes `step` for all that `roots` are made of, from the results of operands; the results for `roots`.
     pub fn fold_up<T: Clone>(
         &self,
         roots: &[ExprId],
@@ -52,10 +49,8 @@ impl ExprPool {
         roots.iter().map(of_root).collect()
     }
 
-    /// For each expression an interval that contains every value which it takes where symbols lie in the intervals that
-    /// `range_of` gives, at the points where it is defined.
-    ///
-    /// Sound but not tight: occurrences of a symbol in different terms count as independent.
+    /// For each expression an interval that contains its values for symbols in the intervals of `range_of`, at points
+    /// where it is defined. Sound but not tight: occurrences of a symbol in different terms count as independent.
     pub fn evaluate_intervals(
         &self,
         exprs: &[ExprId],
@@ -96,13 +91,11 @@ impl ExprPool {
         }
     }
 
-    /// An interval that contains every value of `expr` where symbols lie in the given intervals (others may be
-    /// anything), at the points where it is defined; `slopes` are the derivatives of `expr` by the symbols of `domain`.
-    ///
-    /// Where the expression is defined and Lipschitz continuous on the whole box, they sharpen what
-    /// [`evaluate_intervals`](ExprPool::evaluate_intervals) gives: a symbol of which it is monotone goes to its ends,
-    /// and for the others the mean value form `f(c) + sum D_i (X_i - c_i)` around the centre is used. `sin(x) - x` on
-    /// `[-0.1, 0.1]` is bounded by 1.7e-4 this way, instead of by 0.2.
+    /// An interval that contains every value of `expr` for symbols in the given intervals (others may be anything),
+    /// where it is defined; `slopes` are its derivatives by the symbols of `domain`. Where it is Lipschitz continuous
+    /// on the whole box, they sharpen [`evaluate_intervals`](ExprPool::evaluate_intervals): a symbol of which it is
+    /// monotone goes to its ends, for others the mean value form `f(c) + sum D_i (X_i - c_i)` around the centre is
+    /// used. `sin(x) - x` on `[-0.1, 0.1]` is bounded by 1.7e-4 this way, instead of by 0.2.
     pub fn bound_by_slopes(
         &self,
         expr: ExprId,
@@ -126,8 +119,7 @@ impl ExprPool {
         self.evaluate_intervals(&[expr], &|symbol| range_of(domain, symbol))[0]
     }
 
-    /// Bounds of `expr` where every symbol of which it is monotone is at the end from which `expr` goes up, where
-    /// `away` keeps slopes, or down, where it negates them.
+    /// Bounds of `expr` with monotone symbols at the ends from which it goes up, or down if `away` negates slopes.
     fn bound_from_side(
         &self,
         expr: ExprId,
@@ -155,8 +147,7 @@ impl ExprPool {
         natural.intersection(self.bound_naturally(expr, &centred) + spread)
     }
 
-    /// Whether `expr` is surely defined on the whole box and has bounded slopes: no jump, and no argument that leaves
-    /// the inside of a function's domain.
+    /// Whether `expr` is surely defined with bounded slopes on the whole box: no jump, arguments inside of domains.
     fn is_lipschitz_on(&self, expr: ExprId, domain: &[(SymbolId, Interval)]) -> bool {
         let nodes = self.reachable(&[expr]);
         let ranges = self.evaluate_intervals(&nodes, &|symbol| range_of(domain, symbol));

@@ -1,13 +1,10 @@
-//! Whether two sets of equations say the same.
+//! Whether two sets of equations say the same. Two files enter, each a model, equations as text, LaTeX or Markdown; a
+//! [`Comparison`] leaves: for each phase and acceleration a proof that the two sides are equal, or a point where they
+//! differ, by how much, and in which terms. Numbers count as the decimals that they are written as; those of LaTeX and
+//! Markdown as rounded in their last digit, unless [`CheckOptions::exact`].
 //!
-//! Two files enter, each a model, equations as text, LaTeX or Markdown; a [`Comparison`] leaves: for each phase and
-//! acceleration a proof that the two sides are equal, or a point where they differ, by how much, and in which terms.
-//! Numbers count as the decimals that they are written as; those of LaTeX and Markdown as rounded in their last digit,
-//! unless [`CheckOptions::exact`].
-//!
-//! `side.rs` reads a file, `compare.rs` pairs phases and equations and proves equality with the normal form of
-//! [`CanonicalForms`](crate::symbolic::CanonicalForms), `point.rs` searches for a point of difference in interval
-//! arithmetic. Read `compare.rs` first.
+//! Read `compare.rs` first: it pairs phases and equations and proves equality by normal forms. `side.rs` reads a file,
+//! `point.rs` searches for a point of difference in interval arithmetic.
 //!
 //! ```
 //! use romc::check::{CheckOptions, Side, compare};

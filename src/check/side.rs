@@ -163,8 +163,7 @@ impl Side {
         pool.parse_defined(text, &known, &literal)
     }
 
-    /// Integers, and halves of exact files, are numbers of the pool; of 17 digits or more the shortest of the float
-    /// counts.
+    /// Integers, and halves of exact files, are numbers of the pool; from 17 digits the shortest of the float counts.
     fn decimal(&self, pool: &mut ExprPool, number: &str) -> Option<ExprId> {
         if number.bytes().all(|byte| byte.is_ascii_digit()) && number.parse::<i64>().is_ok() {
             return None;
@@ -184,8 +183,7 @@ impl Side {
         pool.decimal(&text, is_rounded)
     }
 
-    /// With symbols for decimals; where a model's `floats` are rounded, those of many digits stand for all numbers
-    /// near.
+    /// With symbols for decimals; where a model's `floats` are rounded, long ones stand for all numbers near.
     pub(super) fn build(
         &self,
         right_side: &RightSide,

@@ -1,6 +1,4 @@
 //! The changes of a simplification and the bounds of their effect on `ddz`.
-//!
-//! How large the error of a simplified `ddz` may be.
 
 use std::fmt;
 use std::str::FromStr;
@@ -89,8 +87,7 @@ pub struct EquationCertificate {
     /// Root mean square of the model's `ddz` over the recorded samples.
     pub rms: Option<f64>,
     pub allowed: f64,
-    /// Contains `ddz` of the model minus `ddz` of the simplified model at every point of the domain; found from the two
-    /// models, not from the list of changes.
+    /// Contains the model's `ddz` minus the simplified one over the domain; found from both models, not the changes.
     #[serde(serialize_with = "ends")]
     pub bound: Interval,
     /// The sum of the changes' bounds, which contains the same difference.
@@ -107,8 +104,7 @@ pub struct EquationCertificate {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseCertificate {
     pub name: String,
-    /// The box: each variable's name and range. `None` if there is no sample of the phase, so that its equations were
-    /// kept.
+    /// The box: each variable's name and range. `None` without samples of the phase, whose equations were kept.
     #[serde(serialize_with = "ranges")]
     pub domain: Option<Vec<(String, Interval)>>,
     /// Recorded samples in the box, at which errors were measured.
@@ -118,18 +114,15 @@ pub struct PhaseCertificate {
     pub samples_outside: usize,
     /// Operations of the straight-line code of `ddz`; a sine with its cosine counts as two.
     pub operations: BeforeAfter,
-    /// Variables that some `ddz` of the phase depended on, and none does any more: inputs among them can no longer be
-    /// used for control.
+    /// Variables that no `ddz` of the phase depends on any more: inputs among them can not be used for control.
     #[serde(rename = "no_longer_depends_on")]
     pub lost: Vec<LatentVariable>,
     pub equations: Vec<EquationCertificate>,
 }
 
-/// How far a simplified model can differ from the model it was made from, and why.
-///
-/// For every phase with a domain, every point `(z, dz, u_lat)` of it at which the model is defined, and every latent
-/// coordinate `i`, in real numbers: `ddz_i - ddz_i,simplified` lies in `EquationCertificate::bound`. The rounding of
-/// the floating-point evaluation, about 1e-16 of the largest summand, comes on top for both models.
+/// How far a simplified model can differ from its original, and why: at every point `(z, dz, u_lat)` of a phase's
+/// domain at which the model is defined, `ddz_i - ddz_i,simplified` lies in `EquationCertificate::bound`, in real
+/// numbers. Floating-point rounding, about 1e-16 of the largest summand, comes on top for both models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
     /// The requested tolerance.
@@ -173,12 +166,10 @@ impl Certificate {
         self.largest_share(|equation| Some(equation.bound.magnitude()))
     }
 
-    /// The largest error at a recorded sample as a share of the root mean square of its `ddz`.
     pub(crate) fn largest_measured_share(&self) -> Option<f64> {
         self.largest_share(|equation| equation.measured.map(|measured| measured.max))
     }
 
-    /// The largest root mean square error as a share of the root mean square of its `ddz`.
     pub(crate) fn largest_rms_share(&self) -> Option<f64> {
         self.largest_share(|equation| equation.measured.map(|measured| measured.rms))
     }
@@ -229,8 +220,7 @@ fn ranges<S: Serializer>(
     to.collect_map((ranges.iter()).map(|(name, range)| (name, [range.lo(), range.hi()])))
 }
 
-/// The largest |ddz of the model - ddz of the simplified model| at any point of the domain, each latent coordinate for
-/// itself.
+/// The largest |ddz of the model - ddz of the simplified model| over the domain, for each latent coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tolerance {
     /// A share of the root mean square of that `ddz` over the recorded samples of the phase: 0.01 for `1%`.

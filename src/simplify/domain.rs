@@ -52,8 +52,7 @@ pub enum SimplifyError {
 /// Recorded samples, sorted by the model's phases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Samples {
-    /// One matrix per phase of the model, `3 latent_dim x n`: a column a sample, `z`, then `dz`, then `u_lat` (scaled
-    /// units).
+    /// One matrix per phase, `3 latent_dim x n`: one column per sample, `z`, then `dz`, then `u_lat` (scaled units).
     pub phases: Vec<DMatrix<f64>>,
 }
 
@@ -138,8 +137,7 @@ impl Domain {
     /// Reads boxes from TOML: one table per phase, with a range per variable, such as `z1 = [-0.2, 0.4]`.
     ///
     /// # Errors
-    /// [`SimplifyError::DomainFile`] for a phase or variable that the model does not have or that has no range, and as
-    /// `Domain::new`.
+    /// [`SimplifyError::DomainFile`] for an unknown phase or variable, one without a range, and as `Domain::new`.
     pub fn from_toml(model: &ReducedModel, path: &Path, text: &str) -> Result<Self, SimplifyError> {
         let refused = |message: String| SimplifyError::DomainFile {
             path: path.to_owned(),
@@ -201,8 +199,7 @@ impl Domain {
         self.phase(phase).is_some_and(is_inside)
     }
 
-    /// Values of the terms of `library` at the samples of a phase that lie in its box: one row per sample, none without
-    /// samples.
+    /// Values of the terms of `library` at the samples of a phase that lie in its box: one row per sample.
     pub(super) fn theta(
         &self,
         phase: usize,

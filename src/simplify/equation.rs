@@ -1,7 +1,5 @@
-//! Replacements of a term (nothing, a constant, a straight line), and which changes are made to one equation.
-//!
-//! Each change is made to the equation as the changes before it left it, and its error is enclosed over the box. The
-//! errors add, as intervals, to what all changes together may cost.
+//! Replacements of a term (nothing, a constant, a straight line), and which changes are made to one equation. Each is
+//! made to the equation as earlier ones left it; its error, enclosed over the box, adds as an interval to the total.
 
 use super::certificate::{Change, ChangeKind, Effect};
 use super::ranges::{Ranges, has_function};
@@ -274,7 +272,6 @@ impl Equation {
         changes
     }
 
-    /// The change that `rewrite` makes to the term in `row`.
     fn change(&self, terms: &mut Ranges<'_>, row: usize, rewrite: &Rewrite) -> Change {
         let before = self.xi[row];
         let mut bound = Interval::point(before) * rewrite.error;

@@ -1,7 +1,5 @@
-//! Differences of equations, also of those in print, whose coefficients are rounded: bounds over a box, size at
-//! samples.
-//!
-//! The effect of simplification on rollouts over recordings.
+//! Differences of equations, also as printed with rounded coefficients: bounds over a box, size at samples, and the
+//! effect on rollouts over recordings.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -75,8 +73,7 @@ pub struct PrintedEquation {
     pub phase: String,
     /// Index of the latent coordinate.
     pub output: usize,
-    /// Contains `ddz` of the model minus `ddz` as printed at every point of the domain; `None` where the phase has
-    /// none.
+    /// Contains the model's `ddz` minus `ddz` as printed over the domain; `None` where the phase has none.
     pub bound: Option<Interval>,
     /// The same at the recorded samples in the domain.
     pub measured: Option<Measured>,

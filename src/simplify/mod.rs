@@ -1,10 +1,8 @@
-//! Simplification with a certificate: fewer terms and digits, and how far `ddz` can be off for it.
-//!
-//! A model, a [`Domain`] (a box of latent states and inputs per phase, from recordings or given) and a [`Tolerance`]
-//! enter; a simpler model leaves with a [`Certificate`] that lists every change with the interval in which its error
-//! lies over the whole box, and with its error at the recorded samples. `docs/simplification.md` has the mathematics.
-//! Read `run.rs` first, then `equation.rs` (what may take a term's place, and which changes are made) and `ranges.rs`
-//! (the intervals).
+//! Simplification with a certificate: fewer terms and digits, and bounds of the error of `ddz`. A model, a [`Domain`]
+//! (a box of latent states and inputs per phase, from recordings or given) and a [`Tolerance`] enter; a simpler model
+//! leaves with a [`Certificate`] that lists every change with the interval in which its error lies over the whole box,
+//! and with its error at the recorded samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then
+//! `equation.rs` (the changes made to one equation) and `ranges.rs` (the intervals).
 
 mod certificate;
 mod domain;

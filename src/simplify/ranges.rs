@@ -10,8 +10,7 @@ use crate::equations::Equations;
 use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 
-/// Share of a coefficient's size by which constants of the algebra may be off, with room to spare: a merged or halved
-/// float is off by 2^-53.
+/// Relative error of the algebra's constants, with room to spare: a merged or halved float has an error of 2^-53.
 const CONSTANT_ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
 /// A range counts as sharp when its ends are this close to values of the function, as a share of its width.
 const SHARP: f64 = 1e-3;
@@ -30,8 +29,7 @@ pub(super) struct Workspace {
 }
 
 impl Workspace {
-    /// The terms of `equations`, extended by `1` and by every variable of those summands that are not affine. Where
-    /// these would be too many for a library, nothing is appended.
+    /// The terms of `equations`, with `1` and the variables of summands that are not affine if a library holds them.
     pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, ModelError> {
         let own = equations.terms();
         let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
@@ -73,8 +71,7 @@ impl Workspace {
         own.insert_rows(self.original, added, 0.0)
     }
 
-    /// A model of these coefficients, one matrix per phase. Appended terms that no phase uses are left out, so that a
-    /// model keeps its library where it can.
+    /// A model of these coefficients, one matrix per phase; appended terms that no phase uses are left out.
     pub(crate) fn finish(
         &self,
         model: ReducedModel,
@@ -166,11 +163,9 @@ impl<'a> Ranges<'a> {
         range
     }
 
-    /// All values of `sum delta_j theta_j`, for every choice of the `delta_j` in their intervals.
-    ///
-    /// Terms without common variables are independent: their ranges add. Those with common variables are bounded
-    /// together, with the middles of the intervals as coefficients. Where those are many, it is sharper to bound
-    /// together only what has the very same variables; both are done.
+    /// All values of `sum delta_j theta_j`, for every choice of the `delta_j` in their intervals. Terms without common
+    /// variables are independent: their ranges add. Others are bounded together, with the middles of the intervals as
+    /// coefficients. Where these are many, bounding only those of the very same variables is sharper: both are done.
     pub(crate) fn combination(&mut self, parts: &[Part]) -> Interval {
         let connected = self.sum_of_groups(self.connected(parts));
         let alike = self.sum_of_groups(self.alike(parts));
@@ -226,7 +221,6 @@ impl<'a> Ranges<'a> {
         groups.into_iter().map(|(_, members)| members).collect()
     }
 
-    /// The ranges of the symbols that an expression has.
     pub(crate) fn restricted(&self, expr: ExprId) -> Vec<(SymbolId, Interval)> {
         let symbols = self.pool.symbols_of(expr);
         let mut sides = self.domain.clone();
@@ -234,8 +228,7 @@ impl<'a> Ranges<'a> {
         sides
     }
 
-    /// All values of an expression over the box: bounded over ever smaller parts of the box, the parts that reach
-    /// furthest first, until values of the function come close to the bounds.
+    /// All values of an expression over the box, cut where bounds reach furthest until values come close to them.
     pub(crate) fn range(&mut self, expr: ExprId) -> Interval {
         let domain = self.restricted(expr);
         if self.is_single_use(expr) {
@@ -304,8 +297,7 @@ impl<'a> Ranges<'a> {
             {
                 return false;
             }
-            // shared parts are walked again, which is what counts occurrences; a repeated symbol ends the walk before
-            // that can grow
+            // shared parts are walked again, to count occurrences; a repeated symbol ends the walk before that can grow
             open.extend(self.pool.children(part));
         }
         true

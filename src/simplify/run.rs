@@ -29,8 +29,7 @@ const EVALUATION: f64 = 1e-9;
 /// A simplified model and what is known about it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simplified {
-    /// The model; equal to the one it was made from if nothing was changed. Its provenance tells the tolerance, the
-    /// digest of the original and the bounds.
+    /// The model, equal to its original if nothing was changed. Provenance: tolerance, digest of the original, bounds.
     pub model: ReducedModel,
     /// What was changed and how far that can make `ddz` differ.
     pub certificate: Certificate,
@@ -122,7 +121,7 @@ struct PhaseProblem<'a> {
     workspace: &'a Workspace,
     xi: DMatrix<f64>,
     domain: Option<&'a [Interval]>,
-    /// A row a sample in the box, a column a term.
+    /// One row per sample in the box, one column per term.
     theta: DMatrix<f64>,
     /// `-g` in the scaled units of a model with a robot's coordinates: known before any learning.
     gravity: Option<f64>,

@@ -113,8 +113,6 @@ pub(crate) fn lost_words(certificate: &Certificate) -> Vec<String> {
     phases.map(sentence).collect()
 }
 
-/// The certificate of a model and its simplification as a page: totals, changes, effect on rollouts, what printing
-/// rounds, domain.
 #[derive(Template)]
 #[template(path = "simplify/certificate.askama", config = "templates/askama.toml")]
 struct Page<'a> {
@@ -125,7 +123,7 @@ struct Page<'a> {
     printed: &'a [PrintedEquation],
 }
 
-/// The certificate of a model and its simplification as a page of Markdown.
+/// The certificate and its effect on rollouts, with what printing rounds, as a page of Markdown.
 pub fn markdown(
     models: [&ReducedModel; 2],
     certificate: &Certificate,

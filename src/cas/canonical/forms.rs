@@ -34,8 +34,7 @@ pub struct CanonicalForms<'p> {
 }
 
 impl<'p> CanonicalForms<'p> {
-    /// Forms of expressions that are compared where all of `exprs` have values: what stands under a logarithm or root
-    /// of one of these is taken as positive in all others.
+    /// Forms to compare where all of `exprs` have values: arguments of their logarithms and roots count as positive.
     pub fn new(pool: &'p ExprPool, exprs: &[ExprId]) -> Self {
         let mut forms = Self {
             pool,
@@ -87,8 +86,7 @@ impl<'p> CanonicalForms<'p> {
         forms
     }
 
-    /// Whether no numbers round to all decimals whose arguments were taken for each other: equal forms prove nothing
-    /// then.
+    /// Whether no numbers round to all decimals whose arguments were taken as equal: then equal forms prove nothing.
     pub fn is_contradictory(&self) -> bool {
         self.is_contradictory
     }
@@ -279,8 +277,7 @@ impl<'p> CanonicalForms<'p> {
         Some(self.call(function, argument).scaled(&sign))
     }
 
-    /// An argument of a function without its radii: one from before, if there are numbers that round to the decimals of
-    /// both and of all others that were taken for it.
+    /// An argument of a function without radii: an earlier one, if there are numbers that round to the decimals of all.
     pub(super) fn argument(&mut self, form: CanonicalForm) -> CanonicalForm {
         let exact = form.exact();
         self.is_rounded |= form.has_radius();
@@ -353,8 +350,7 @@ pub(super) struct Argument {
 }
 
 impl Argument {
-    /// Takes another form for this one if their numbers can be the same, and narrows them to those; the largest
-    /// distance of their coefficients.
+    /// Takes another form as this one if numbers can be the same, and narrows them; the coefficients' largest distance.
     fn take(&mut self, other: &CanonicalForm) -> Option<f64> {
         let radius = |form: &CanonicalForm, monomial: &Monomial| {
             form.terms.get(monomial).map_or(0.0, |c| c.radius())

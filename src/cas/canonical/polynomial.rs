@@ -1,6 +1,4 @@
-//! Sums of coefficients times products of atoms and one exponential.
-//!
-//! Complex rational coefficients with a radius.
+//! Sums of complex rational coefficients, known to a radius, times products of atoms and one exponential.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +9,6 @@ pub(super) use num_rational::BigRational as Rational;
 
 use crate::{ExprId, Function, Number, SymbolId};
 
-/// Most terms of a form.
 const MAX_TERMS: usize = 2_000;
 
 /// A factor that is not taken apart.
@@ -166,8 +163,7 @@ impl CanonicalForm {
         (self.terms.len() == 1).then_some((coefficient, monomial))
     }
 
-    /// The form divided by size and sign of its leading coefficient, and these; nothing for zero, or where the size is
-    /// beyond the range of floats.
+    /// The form divided by size and sign of its leading coefficient, and these; nothing for zero or infinite sizes.
     pub(super) fn normed(&self) -> Option<(Self, Coefficient, Coefficient)> {
         let leading = self.leading()?;
         let (size, sign) = (Coefficient::from(leading.size()), leading.sign());
@@ -175,7 +171,6 @@ impl CanonicalForm {
         Some((self.scaled(&factor), size, sign))
     }
 
-    /// The monomials in the exponents of its terms.
     pub(super) fn exponents(&self) -> BTreeSet<&Monomial> {
         let monomials = self.terms.keys();
         monomials
@@ -267,10 +262,8 @@ impl From<Number> for Coefficient {
 }
 
 impl Coefficient {
-    /// Reads a decimal as it is written: digits with at most one point and an exponent, such as `0.36` or `1.2e-3`.
-    /// Where it stands for a rounded number its radius is half a unit of its last digit.
-    ///
-    /// `None` for other texts and for exponents beyond 400.
+    /// Reads a decimal as written, such as `0.36` or `1.2e-3`; the radius of a rounded one is half a unit of its last
+    /// digit. `None` for other texts and for exponents beyond 400.
     pub fn parse(text: &str, is_rounded: bool) -> Option<Self> {
         let (digits, exponent) = match text.split_once(['e', 'E']) {
             Some((digits, exponent)) => (digits, exponent.parse::<i32>().ok()?),

@@ -55,8 +55,7 @@ impl CanonicalForms<'_> {
         Some(form)
     }
 
-    /// A monomial with one atom out of range, as a monomial without it times a form, or nothing for one that is too
-    /// large.
+    /// A monomial with one atom out of range, as one without it times a form, or nothing if that is too large.
     fn rewritten(&mut self, monomial: &Monomial) -> Option<(Monomial, Option<CanonicalForm>)> {
         for &(atom, power) in &monomial.powers {
             let with_power = |power: i32| match power {

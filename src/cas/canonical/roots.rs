@@ -8,8 +8,7 @@ use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, ra
 use crate::Function;
 
 impl CanonicalForms<'_> {
-    /// `scale * prod base^power * exp(E)` of a form that is positive where it is used: a positive number, forms that
-    /// are positive there, and the exponential.
+    /// A form that is positive where it is used, as `scale * prod base^power * exp(E)` with positive scale and bases.
     pub(super) fn split(&mut self, form: &CanonicalForm) -> Option<Split> {
         let form = self.argument(form.clone());
         let scale = form.leading()?.size();
@@ -130,8 +129,7 @@ impl CanonicalForms<'_> {
         }
     }
 
-    /// The powers that all terms of a sum have in common and that are not negative: those of positive atoms, and even
-    /// ones.
+    /// Powers that all terms of a sum share and that are not negative: those of positive atoms, and even ones.
     fn shared_powers(&self, form: &CanonicalForm) -> Monomial {
         let smaller = |a: i32, b: i32| match a.signum() == b.signum() {
             true => a.signum() * a.abs().min(b.abs()),

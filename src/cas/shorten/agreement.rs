@@ -1,9 +1,7 @@
-//! Whether a shorter form may take the place of a sum: it has its values, also far out.
-//!
-//! Far out the sum is enclosed in intervals over inputs that reach a few units in the last place around a point. Where
-//! this is narrow and generated code of the sum, in 64 or 32 bits, would hit it, code of the form has to hit it as
-//! well, and its derivatives are numbers where those of the sum are accurate. Sums and products of variables and
-//! bounded functions need no such test, because equal ones have the same degrees.
+//! Whether a shorter form may replace a sum: it has its values, also far out. There the sum is enclosed over inputs
+//! that reach a few units in the last place around a point. Where this is narrow and code of the sum, in 64 or 32 bits,
+//! would hit it, code of the form has to hit it too, and its derivatives are numbers where those of the sum are
+//! accurate. Sums and products of variables and bounded functions need no test: equal ones have the same degrees.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -40,11 +38,9 @@ struct Precision {
     rounding: f64,
     /// Least number with all its digits.
     least: f64,
-    /// Powers of ten of the variables: one at which squares are about to overflow, the others far from all at which a
-    /// power of a variable does.
+    /// Powers of ten of variables: one where squares nearly overflow, the others far from where any power of one does.
     powers: [f64; 7],
-    /// Magnitudes at which exponentials of one, two, three and four times a variable overflow, and at which those of
-    /// one overflow that did not underflow yet.
+    /// Magnitudes at which `exp` of 1 to 4 times a variable overflows; at the last, `exp(-x)` does not underflow yet.
     exponents: [f64; 5],
 }
 
@@ -211,8 +207,7 @@ fn scales(pool: &ExprPool, sum: &Summands, precision: &Precision) -> Vec<f64> {
         .collect()
 }
 
-/// Points with all pairs of scales of two variables, for each pair of the first four; the others are ordinary at about
-/// half of them, and have scales as they fall.
+/// Points with all pairs of scales for each pair of the first four variables; others are about 1 at half of them.
 fn points(symbols: &[SymbolId], scales: &[f64], precision: &Precision) -> Points {
     let n_scales = scales.len();
     let first = symbols.len().min(4);
@@ -270,8 +265,7 @@ fn sum_by_code(
     (values, sizes)
 }
 
-/// One expression in the order of operations that generated code has: factors with negative exponents form one divisor,
-/// powers are chains of products or exponentials of logarithms.
+/// In the order of generated code: negative powers in one divisor, powers as chains or exponentials of logarithms.
 fn by_code(
     pool: &ExprPool,
     expr: ExprId,

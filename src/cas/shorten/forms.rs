@@ -187,8 +187,7 @@ impl Shortener<'_> {
         with_factors.collect()
     }
 
-    /// Sums in which two waves are a product: `cos(a + b) + cos(a - b) = 2*cos(a)*cos(b)` and the like, for angles `a`
-    /// and `b` of any length.
+    /// Sums in which two waves are a product, of angles of any length: `cos(a + b) + cos(a - b) = 2*cos(a)*cos(b)`.
     fn waves_as_products(&mut self, singles: &Scaled) -> Vec<Scaled> {
         let mut found = Vec::new();
         if singles.len() > MAX_CHOSEN {
@@ -329,8 +328,7 @@ pub(super) enum NestedSums {
     Split,
 }
 
-/// Summands with the numbers of their terms in the coefficients and like terms added, in the order of their first
-/// appearance.
+/// Summands with the numbers of their terms in the coefficients and like terms added, by first appearance.
 pub(super) fn collected(
     pool: &ExprPool,
     summands: &[(Number, ExprId)],
@@ -388,7 +386,6 @@ fn small_ratio(a: f64, b: f64) -> Option<Number> {
     })
 }
 
-/// The decimal fraction that is written for a float, if it is short; the float itself otherwise.
 fn decimal(value: f64) -> Number {
     let number = Number::from_f64(value).expect("coefficients are finite");
     number.decimal().unwrap_or(number)

@@ -57,8 +57,7 @@ impl Shortener<'_> {
         groups.into_values().filter(is_worth).collect()
     }
 
-    /// Pairs of summands that belong to one power of a sum: of `p*a^n`, `q*a^(n-1)*b` and `r*b^n` with `q^n =
-    /// n^n*p^(n-1)*r`.
+    /// Pairs of summands of one power of a sum: of `p*a^n`, `q*a^(n-1)*b` and `r*b^n` with `q^n = n^n*p^(n-1)*r`.
     pub(super) fn parts_of_powers(&mut self, summands: &[(f64, ExprId)]) -> Vec<[usize; 2]> {
         let mut pairs = Vec::new();
         if summands.len() < 3 {

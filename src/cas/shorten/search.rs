@@ -42,7 +42,6 @@ pub(super) enum Distance {
 /// Summands with variables for parts, and these parts.
 type Seen = (Summands, Vec<(SymbolId, ExprId)>);
 
-/// Summands with variables in the place of some parts; nothing if there are none of these.
 type View<'a> = fn(&mut Shortener<'a>, &[(f64, ExprId)]) -> Option<Seen>;
 
 fn blocks_of(summands: &[(f64, ExprId)]) -> Vec<Block> {
@@ -92,8 +91,7 @@ impl<'a> Shortener<'a> {
         self.pool
     }
 
-    /// The replacements that make `sum coefficient * expr` shortest, in the order of the first positions they replace;
-    /// none if it is short already.
+    /// The replacements that make `sum coefficient * expr` shortest, ordered by first position; none if it is short.
     pub fn shorten(&mut self, summands: &[(f64, ExprId)]) -> Vec<Shortened> {
         let mut seen = IdSet::default();
         let is_plain = |&(_, expr): &(f64, ExprId)| seen.insert(expr) && self.is_plain(expr);
@@ -201,8 +199,7 @@ impl<'a> Shortener<'a> {
         }
     }
 
-    /// The summands with a variable of its own in the place of each sum that is an angle, and these sums; nothing if no
-    /// angle is one. So what is true of one angle is found before angles are taken apart.
+    /// The summands with variables for sums that are angles, and these sums: finds what is true of an angle as a whole.
     fn whole_angles(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let exprs: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
         let order = self.pool.reachable(&exprs);
@@ -289,8 +286,7 @@ impl<'a> Shortener<'a> {
         (!parts.is_empty()).then_some((whole, parts))
     }
 
-    /// Whether a term is a product of variables to integer powers and at most one function of a variable, without a
-    /// number.
+    /// Whether a term is integer powers of variables times at most one function of a variable, without a number.
     pub(super) fn is_plain(&mut self, expr: ExprId) -> bool {
         let pool = &self.pool;
         *self.plain.entry(expr).or_insert_with(|| {
