@@ -1,6 +1,4 @@
-//! Recordings of legged robots, and what is identified from them.
-//!
-//! `romc` re-exports every module; depend on that.
+//! Recordings of legged robots, and what is identified from them. `romc` re-exports every module; depend on that.
 
 use romc_model::{files, robot_file};
 use romc_robot as robot;

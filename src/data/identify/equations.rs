@@ -1,4 +1,7 @@
-//! The linear equations between motion and torques at every sample of a segment.
+//! The linear equations between motion and torques at every sample of a segment, from directions of trunk and legs in
+//! the world: axes of the recorded body position, z up, attitudes roll, pitch, yaw with `R = Rz Ry Rx`. Velocities of
+//! directions follow from the recorded rates; accelerations are differences of velocities, those of the recording
+//! included, so that all carry the same errors.
 //!
 //! With `m` the mass, `p` the trunk's origin, `e` directions of trunk and links (second derivatives `e''`) and `s_e`
 //! their first moments, Newton's law for the whole robot is `p'' = -g e_z + 1/m (sum_k F_k - sum_e s_e e'')`. A foot on
@@ -6,12 +9,6 @@
 //! leg's own links (first and second moments `pi`, linear), and contact is the torque of a foot of radius `r` that
 //! rolls with resistance `rho`. A leg in the air obeys `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter
 //! linearly; torques are taken a delay later, and a column of their rates tells by how much that delay is wrong.
-//!
-//! Directions of trunk and legs in the world along a segment, and their accelerations.
-//!
-//! World axes are those of the recorded body position: z up. Attitudes are roll, pitch, yaw with `R = Rz Ry Rx`.
-//! Velocities of directions follow from the recorded rates; accelerations are differences of velocities, those of the
-//! recording included, so that all carry the same errors.
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
@@ -39,10 +36,8 @@ pub fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
 /// The equations of a segment; one column a sample.
 #[derive(Debug, Clone)]
 pub struct SampleEquations {
-    /// Axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2.
-    pub body: DMatrix<f64>,
-    /// The twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m. They hold in the air.
-    pub joints: DMatrix<f64>,
+    pub body: DMatrix<f64>, // axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2
+    pub joints: DMatrix<f64>, // twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m; hold in the air
     pub singular: Vec<bool>,
     pub clipped_torques: usize,
 }
@@ -141,8 +136,7 @@ impl BodyEquation {
         for (unknown, torque) in OWN.into_iter().zip(&state.own) {
             self.subtract(unknown, &(map * torque));
         }
-        // The force acts below the centre of the foot, and the foot rolls.
-        let below = (-Vector3::z()).cross(&force);
+        let below = (-Vector3::z()).cross(&force); // the force acts below the centre of the foot, and the foot rolls
         self.add(FOOT_RADIUS, map * state.about_joints(&below));
         let mut rolling = state.calf_rate();
         rolling.z = 0.0;
@@ -152,8 +146,7 @@ impl BodyEquation {
     }
 }
 
-/// In the order of [`Directions`].
-const MOMENTS: [usize; 5] = [LEG_SIDE, THIGH, CALF, THIGH_FRONT, CALF_FRONT];
+const MOMENTS: [usize; 5] = [LEG_SIDE, THIGH, CALF, THIGH_FRONT, CALF_FRONT]; // in the order of [`Directions`]
 
 const OWN: [usize; 7] = [
     LEG_SIDE,
@@ -272,15 +265,11 @@ pub struct LegFrame {
 
 #[derive(Debug, Clone)]
 pub struct Motion {
-    /// Trunk to world, one a sample.
-    pub attitude: Vec<Matrix3<f64>>,
-    /// Angular velocity of the trunk in the world, rad/s.
-    pub trunk_rate: Vec<Vector3<f64>>,
+    pub attitude: Vec<Matrix3<f64>>,   // trunk to world, one a sample
+    pub trunk_rate: Vec<Vector3<f64>>, // angular velocity of the trunk in the world, rad/s
     pub legs: Vec<[LegFrame; 4]>,
-    /// Accelerations of the recorded coordinates, 18 x n, per s^2.
-    pub coordinates: DMatrix<f64>,
-    /// Of trunk axes (9 rows), then of each leg's five directions, 69 x n.
-    directions: DMatrix<f64>,
+    pub coordinates: DMatrix<f64>, // accelerations of the recorded coordinates, 18 x n, per s^2
+    directions: DMatrix<f64>, // of trunk axes (9 rows), then of each leg's five directions, 69 x n
 }
 
 const TRUNK_ROWS: usize = 9;

@@ -353,7 +353,6 @@ fn masses(windows: &Windows, estimate: &Estimate) -> Vec<(usize, f64, f64)> {
     (0..segments).filter_map(of_segment).collect()
 }
 
-/// Why recordings do not say what the robot is, or a file does not.
 #[derive(Debug, Error)]
 pub enum IdentifyError {
     #[error(transparent)]

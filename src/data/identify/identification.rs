@@ -85,19 +85,16 @@ pub struct Samples {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identification {
-    /// Name of the robot whose geometry was used.
-    pub robot: String,
+    pub robot: String, // whose geometry was used
     pub gravity_m_s2: f64,
     pub mass_kg: f64,
-    /// Time from a recorded torque to its effect on the motion, s.
-    pub delay_s: f64,
+    pub delay_s: f64, // time from a recorded torque to its effect on the motion, s
     pub actuators: Actuators,
     pub legs: Legs,
     pub standard_error: StandardError,
     pub r2: Fit,
     pub force_alone: ForceAlone,
     pub samples: Samples,
-    /// What a reader of the values should know of the recordings.
     #[serde(default)]
     pub notes: Vec<String>,
 }

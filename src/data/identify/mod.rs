@@ -1,9 +1,8 @@
-//! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia.
-//!
-//! Enters: recordings and the robot's geometry. Leaves: an [`Identification`], each value with its standard error, and
-//! the file that keeps it. [`equations`] has the linear equations of every sample, `windows` their averages, `fit` the
-//! weighted least squares, `estimate` the loop around it and the refusal of recordings that contradict each other. Read
-//! `estimate` first; `docs/identify.md` has the method and measured figures.
+//! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia. Enters: recordings and
+//! the robot's geometry. Leaves: an [`Identification`], each value with its standard error, and the file that keeps it.
+//! Read `estimate` first, the loop around the fit and the refusal of recordings that contradict each other;
+//! [`equations`] has the linear equations of every sample, `windows` their averages, `fit` the weighted least squares.
+//! `docs/identify.md` has the method and measured figures.
 //!
 //! ```
 //! use std::path::Path;

@@ -9,21 +9,17 @@ const WINDOW_S: f64 = 0.03; // length of a window, s
 const MARGIN_S: f64 = 0.02; // distance of windows from a change of the feet on the ground, s
 pub(crate) const OVERLAP: usize = 4; // windows a window's length: neighbours overlap
 const BLOCK_S: f64 = 0.1; // length of the blocks that are left out in turn for standard errors, s
-/// Fewest jumps that are left out in turn, and the largest share of the equations that one may have.
-const LEAST_JUMPS: usize = 6;
-const LARGEST_SHARE: f64 = 1.0 / 3.0;
-/// Mean speed of the bearing joints from which their dry friction has a direction, rad/s.
-const MOVING_RAD_S: f64 = 0.1;
+const LEAST_JUMPS: usize = 6; // fewest jumps that are left out in turn
+const LARGEST_SHARE: f64 = 1.0 / 3.0; // of the equations that one of them may have
+const MOVING_RAD_S: f64 = 0.1; // mean speed of the bearing joints from which their dry friction has a direction, rad/s
 const SIDEWAYS: usize = 1; // axis along which abductions push
 const TURNING_RAD_S: f64 = 0.15;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Group {
-    /// Trunk's acceleration along an axis (x, y, z) with feet on the ground.
-    Contact(usize),
+    Contact(usize), // trunk's acceleration along an axis (x, y, z) with feet on the ground
     Flight(usize),
-    /// Torque of a joint (hx, hy, kn) of a leg in the air.
-    Joint(usize),
+    Joint(usize), // torque of a joint (hx, hy, kn) of a leg in the air
 }
 
 impl Group {
@@ -102,7 +98,6 @@ impl Windows {
         Ok(())
     }
 
-    /// Blocks that are left out in turn for standard errors: single ones, and whole jumps where there are enough.
     pub(crate) fn groupings(&self) -> Vec<Vec<usize>> {
         let mut groupings = vec![(0..self.blocks.len()).collect()];
         let mut counts = vec![0; self.segments];
@@ -187,8 +182,7 @@ struct Averaged<'a> {
     equations: &'a SampleEquations,
     filter: &'a SavitzkyGolay,
     span: Range<usize>,
-    /// Centre of each window, counted from the start, and its block.
-    blocks: Vec<(usize, usize)>,
+    blocks: Vec<(usize, usize)>, // centre of each window, counted from the start, and its block
 }
 
 impl Averaged<'_> {
@@ -202,7 +196,6 @@ impl Averaged<'_> {
 mod tests {
     use super::*;
 
-    /// Windows of segments with so many blocks of one equation each.
     fn windows(blocks: &[usize]) -> Windows {
         let mut windows = Windows::default();
         for (segment, count) in blocks.iter().enumerate() {

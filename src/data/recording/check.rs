@@ -1,7 +1,5 @@
-//! Plausibility: what a recording says that a robot cannot have done.
-//!
-//! Numbers that are not finite never get here: reading refuses them. What is found is reported with row and column;
-//! samples are left out only by [`without`], when asked.
+//! Plausibility: what a recording says that a robot cannot have done, with row and column; samples are left out only by
+//! [`without`], when asked. Numbers that are not finite never get here: reading refuses them.
 
 use std::fmt;
 use std::ops::Range;
@@ -21,10 +19,8 @@ pub const JOINT_MARGIN_RAD: f64 = 0.05;
 /// Largest speed of the body along an axis, in m/s.
 pub const BODY_SPEED_M_S: f64 = 10.0;
 const BODY_RATE_RAD_S: f64 = 30.0; // largest rate of a body angle, in rad/s
-/// Disagreement of a rate with differences that is accepted, as a share of the 95th percentile of that rate.
-const CONSISTENCY_SHARE: f64 = 0.3;
-/// Floor of that disagreement for velocities: joints, body linear, body angular.
-const VELOCITY_FLOOR: [f64; 3] = [1.0, 0.2, 0.5];
+const CONSISTENCY_SHARE: f64 = 0.3; // accepted disagreement of a rate with differences over that rate's 95th percentile
+const VELOCITY_FLOOR: [f64; 3] = [1.0, 0.2, 0.5]; // floor of that disagreement: joints, body linear, body angular
 const RATE_FLOOR: [f64; 3] = [100.0, 10.0, 50.0]; // the same for accelerations
 const BODY_XY: Range<usize> = JOINT_DIM..JOINT_DIM + 2; // coordinates of the body along the floor
 const CLIPPED_SAMPLES: usize = 5; // equal consecutive velocities at an extreme that count as clipped
@@ -38,8 +34,7 @@ pub enum Implausible {
     JointAngle,
     Speed,
     Jump,
-    /// `bound` is the nearer slope of the position; so for the acceleration.
-    Velocity,
+    Velocity, // `bound` is the nearer slope of the position; so for the acceleration
     Acceleration,
     Clipped,
     TimeStep,
@@ -160,7 +155,6 @@ struct Scan<'a> {
 pub(super) type Breach = Option<(f64, f64)>;
 
 impl Scan<'_> {
-    /// Joins neighbouring breaches of a column into findings.
     fn column(&mut self, kind: Implausible, column: Column, breach: impl Fn(usize) -> Breach) {
         let mut last_end = None;
         for sample in 0..self.segment.len() {

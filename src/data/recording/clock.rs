@@ -1,8 +1,6 @@
-//! Segments whose time stamps disagree with their motion, mended.
-//!
-//! A logger that counts its samples says that time passes evenly even where samples came late or were lost; between two
-//! samples the robot moved by velocity times elapsed time. A clock is wrong for all coordinates alike: where they
-//! disagree, a coordinate is wrong. Also times of clocks that count from an epoch, kept to the nanosecond.
+//! Segments whose time stamps disagree with their motion, mended; and times since an epoch, kept to the nanosecond. A
+//! logger that counts samples says that time passes evenly even where samples came late or were lost; between two the
+//! robot moved by velocity times elapsed time. Coordinates that disagree on the clock are themselves wrong.
 
 use super::error::RecordingError;
 use super::preprocess::{differences, median, resampled};
@@ -12,14 +10,11 @@ use crate::robot::{BODY_DIM, JOINT_DIM};
 const LEAST_DISAGREEMENT: f64 = 0.03; // elapsed over stamped time from which a segment's clock is replaced
 const JOINT_WEIGHT: f64 = 0.01; // weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2
 const STANDSTILL: f64 = 1e-3; // motion that counts as evidence of either clock, (m/s)^2
-/// Largest difference of a coordinate's ratio of elapsed to stamped time from the median that agrees with it, relative.
-const AGREES: f64 = 0.25;
-/// Joints and position of the body: angles of the body are mended by themselves.
-const COORDINATES: usize = JOINT_DIM + BODY_DIM / 2;
+const AGREES: f64 = 0.25; // largest deviation of a coordinate's elapsed over stamped time from the median, relative
+const COORDINATES: usize = JOINT_DIM + BODY_DIM / 2; // joints, body position: body angles are mended by themselves
 const SAME_SAMPLE: f64 = 0.4; // samples closer than this share of a step are the same sample, logged again
 const LOST_STEPS: f64 = 5.0; // steps between two samples from which what lies between them is lost rather than late
-/// Disagreement of the trunk's angular rates with its angles from which they are replaced.
-const RATE_DISAGREEMENT: f64 = 0.2;
+const RATE_DISAGREEMENT: f64 = 0.2; // of the trunk's angular rates with its angles, from which they are replaced
 const EVEN: f64 = 0.01; // unevenness of time steps, relative, from which a segment is resampled
 
 /// A segment at even time steps, and what its own clock said.
@@ -46,8 +41,7 @@ pub struct Mended {
     pub rates_replaced: bool,
 }
 
-/// The segment at even time steps; its times are rebuilt where they disagree with the motion, its angular rates where
-/// they disagree with the angles.
+/// The segment at even time steps, with the repairs of [`Clocks::Repaired`](crate::recording::Clocks::Repaired).
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
@@ -153,22 +147,19 @@ fn by_motion(segment: &Segment, elapsed: &[Interval]) -> Segment {
     }
 }
 
-/// Replaces the trunk's angular rates by differences of its angles if the two disagree; whether so.
 fn replace_angular_rates(segment: &mut Segment) -> bool {
     const FIRST: usize = JOINT_DIM + BODY_DIM / 2;
     let angles = segment.x.rows(FIRST, BODY_DIM / 2).into_owned();
     let rates = differences(&segment.time_s, &angles);
     let recorded = segment.dx.rows(FIRST, BODY_DIM / 2);
     let ratio = recorded.dot(&rates) / recorded.norm_squared();
-    // No motion at all is no disagreement.
-    let disagree = (ratio - 1.0).abs() > RATE_DISAGREEMENT;
+    let disagree = (ratio - 1.0).abs() > RATE_DISAGREEMENT; // no motion is no disagreement
     if disagree {
         segment.dx.rows_mut(FIRST, BODY_DIM / 2).copy_from(&rates);
     }
     disagree
 }
 
-/// From one sample to the next: time by the stamps, and by the motion.
 struct Interval {
     stamped_s: f64,
     speed: f64, // weighted square of the velocity
@@ -210,7 +201,6 @@ pub(crate) struct Instant {
 }
 
 impl Instant {
-    /// A time of a clock whose values need no care.
     pub(crate) fn of(value: f64) -> Option<Self> {
         let (whole, rest) = (value.floor() as i64, value - value.floor());
         (value.floor().abs() < 9e18).then_some(Instant { whole, rest })
@@ -278,7 +268,6 @@ fn whole(text: &str) -> Option<i64> {
     text.parse().ok().filter(|_| is_number)
 }
 
-/// Days from 1970-01-01 to a date of the Gregorian calendar, `2026-03-01`.
 fn days_since_1970(date: &str) -> Option<i64> {
     let parts = date.trim().split(['-', '/']).map(whole);
     let [year, month, day] = parts.collect::<Option<Vec<_>>>()?[..] else {
@@ -287,8 +276,7 @@ fn days_since_1970(date: &str) -> Option<i64> {
     if !(1..=12).contains(&month) || !(1..=31).contains(&day) || year >= 10_000 {
         return None;
     }
-    // Years that begin in March end with the leap day.
-    let year = year - i64::from(month < 3);
+    let year = year - i64::from(month < 3); // years that begin in March end with the leap day
     let leap_days = year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
     let day_of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
     Some(365 * year + leap_days + day_of_year - 719_468)

@@ -28,9 +28,8 @@ pub enum RecordingFault {
         expected: usize,
         hint: &'static str,
     },
-    /// A fault without alternative, or in the words of a parser.
     #[error("{0}")]
-    Text(String),
+    Text(String), // without alternative, or in the words of a parser
     #[error("cannot {action}")]
     Io {
         action: &'static str,
@@ -38,9 +37,8 @@ pub enum RecordingFault {
     },
     #[error("damaged gzip stream")]
     Gzip(#[source] io::Error),
-    /// The robot's kinematics refuse a sample.
     #[error("no body wrench")]
-    Wrench(#[source] Box<RobotError>),
+    Wrench(#[source] Box<RobotError>), // the robot's kinematics refuse a sample
 }
 
 pub(super) fn unexpected(found: impl Into<String>, expected: impl Into<String>) -> RecordingFault {
@@ -52,7 +50,6 @@ pub(super) fn text(words: impl Into<String>) -> RecordingFault {
     RecordingFault::Text(words.into())
 }
 
-/// A file that cannot be opened, read or written; there may be none.
 pub(super) fn io_fault(action: &'static str, source: io::Error) -> RecordingFault {
     match source.kind() {
         io::ErrorKind::NotFound if action != "write" => text("no such file"),
@@ -130,7 +127,6 @@ pub(super) fn listed(names: &[String], most: usize) -> String {
     }
 }
 
-/// The text, cut after 40 characters and without control characters.
 pub(super) fn shortened(text: &str) -> String {
     const MOST: usize = 40;
     let rest = text.chars().nth(MOST).map(|_| '…');

@@ -34,8 +34,7 @@ pub struct RecordingSet {
     pub recordings: Vec<Recording>,
     pub findings: Vec<(PathBuf, Finding)>,
     pub mismatches: Vec<(PathBuf, Mismatch)>,
-    /// Number of samples that were left out.
-    pub left_out: usize,
+    pub left_out: usize, // samples
     pub reading: ReadingNotes,
     balances: Vec<(PathBuf, Balance)>,
 }
@@ -83,10 +82,7 @@ impl RecordingSet {
     }
 }
 
-/// The recordings of the first files as recorded: neither checked nor conditioned nor mended.
-///
-/// # Errors
-/// As [`Reader::read`].
+/// The recordings of the first files as recorded: not checked, conditioned or mended; errors as [`Reader::read`].
 pub fn as_recorded(
     files: &[RecordingFile],
     robot: &'static Robot,
@@ -149,7 +145,6 @@ fn options_for(reading: &mut Reading, options: &ConditionOptions) -> Outcome<Con
     Ok(options)
 }
 
-/// The whole recording of a file, or a recording for each segment that is asked for.
 fn chosen(file: &RecordingFile, mut recording: Recording) -> Vec<Recording> {
     let Some(chosen) = &file.segments else {
         return vec![recording];

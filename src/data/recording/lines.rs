@@ -10,10 +10,8 @@ use super::error::{Outcome, RecordingError, RecordingFault, io_fault, unexpected
 use crate::files::magic::{MAGIC_BYTES, recognised};
 use crate::files::size::{Capped, Format};
 
-/// Most samples read from a file: half an hour at 2 ms.
-pub(super) const MAX_ROWS: usize = 1_000_000;
-/// Longest line accepted, in bytes: some thirty times a row of 71 columns.
-pub(super) const MAX_LINE_BYTES: usize = 1 << 16;
+pub(super) const MAX_ROWS: usize = 1_000_000; // most samples read from a file: half an hour at 2 ms
+pub(super) const MAX_LINE_BYTES: usize = 1 << 16; // longest line accepted: some thirty times a row of 71 columns
 
 const MAX_BLANK_ROWS: usize = 10_000; // most empty lines in a row, and in all beyond one for each that is not
 
@@ -184,8 +182,7 @@ impl NumberReader {
         if self.mark.is_some_and(|mark| mark != found) {
             return None;
         }
-        // A second mark of either kind fails to parse.
-        let mut pointed = cell;
+        let mut pointed = cell; // a second mark of either kind fails to parse
         if found == b',' {
             self.pointed.clear();
             (self.pointed).extend([&cell[..place], ".", &cell[place + 1..]]);

@@ -1,8 +1,7 @@
-//! Mismatches: what whole jumps say that cannot be true of this robot.
-//!
-//! A recording in which every sample is possible can still be of another robot, in other units, or have legs, signs or
-//! columns exchanged. The robot's geometry shows it: a foot on the ground stays where it is, the feet carry the weight,
-//! a body in flight falls. Figures over a whole recording are compared with the bounds of `docs/recordings.md`.
+//! Mismatches: what whole jumps say that cannot be true of this robot. A recording of possible samples can still be of
+//! another robot, in other units, or have legs, signs or columns exchanged. The robot's geometry shows it: a foot on
+//! the ground stays where it is, the feet carry the weight, a body in flight falls. Figures over a whole recording are
+//! compared with the bounds of `docs/recordings.md`.
 
 mod feet;
 mod stance;
@@ -22,28 +21,21 @@ use stance::{Slip, best_other_place, best_other_reading};
 pub(super) use stance::{foot_place, hip_torque, median_place, stances};
 
 const SLIP_M: f64 = 0.025; // largest root mean square of the places of feet on the ground about their medians, m
-/// How many times better feet have to stay in place under another reading of the columns.
-const READING_FACTOR: f64 = 1.4;
+const READING_FACTOR: f64 = 1.4; // times that feet have to stay better in place under another reading of the columns
 const READING_LEAST_M: f64 = 3e-4; // by how much they have to stay better in place, m
-/// How many times, and by how much, m, feet stay better where they are with the body's place read otherwise.
-const PLACE: (f64, f64) = (2.0, 0.004);
+const PLACE: (f64, f64) = (2.0, 0.004); // the same two with the body's place read otherwise, factor and m
 const FALL_M_S2: (f64, f64) = (-16.0, -6.5); // vertical acceleration of the body in flight, m/s^2
 const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7); // force of the feet over what weight and acceleration need
-/// Least share of the hips' torques that hold the feet on their own side: 1 for vertical forces.
-const HIP_SHARE: f64 = -0.3;
+const HIP_SHARE: f64 = -0.3; // least share of hips' torques that hold the feet on their own side: 1 for vertical forces
 const HIP_SHARE_OF_PAIR: f64 = -0.5; // the same where both legs of one end alone are below that
-/// Largest median difference of the body's acceleration and the slope of its velocity, m/s^2.
-const ACCELERATION_M_S2: f64 = 2.0;
+const ACCELERATION_M_S2: f64 = 2.0; // largest median difference of body acceleration and slope of velocity, m/s^2
 const NOTHING_CARRIED: f64 = 0.02; // share of the weight below which torques carry nothing
-/// How many times more or less of the weight the torques of one recording may carry than those of most.
-const OTHER_SHARE: f64 = 2.0;
+const OTHER_SHARE: f64 = 2.0; // times more or less weight that the torques of a recording may carry than those of most
 /// Logarithm of the share of the weight from which another robot may explain it, and up to which it does.
 const OTHER_WEIGHT: (f64, f64) = (0.17, 0.1);
-/// How much worse feet may stay in place with the geometry of a robot that explains the weight.
-const OTHER_SLIP: f64 = 1.15;
+const OTHER_SLIP: f64 = 1.15; // times worse that feet may stay in place with a robot that explains the weight
 
-/// Distance from the origin, m, and turn about the vertical, rad, at which a segment may begin.
-const ORIGIN: (f64, f64) = (1.0, 0.5);
+const ORIGIN: (f64, f64) = (1.0, 0.5); // m from the origin and rad about the vertical at which a segment may begin
 
 /// Something about a whole recording that cannot be true of the robot, its figure and the bound that it breaks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -62,8 +54,7 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// A mismatch, if a figure breaks a bound.
-type Found = Option<Mismatch>;
+type Found = Option<Mismatch>; // a mismatch, if a figure breaks a bound
 
 fn mismatch(kind: &'static str, breach: Breach, words: String) -> Found {
     let (value, bound) = breach?;
@@ -106,11 +97,9 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
 /// The figures that [`mismatches`] compares with its bounds; none where a recording has too little of what they need.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figures {
-    /// Root mean square of the places of feet on the ground about the medians of their stances.
-    foot_slip_m: Option<f64>,
+    foot_slip_m: Option<f64>, // root mean square of the places of feet on the ground about the medians of their stances
     relative_foot_slip_m: Option<f64>,
-    /// That for the best other order of the legs or sign of an angle.
-    other_reading_m: Option<f64>,
+    other_reading_m: Option<f64>, // that for the best other order of the legs or sign of an angle
     #[serde(flatten)]
     balance: Balance,
 }
@@ -203,8 +192,7 @@ fn foot_slip(slip: &Slip) -> Found {
 
 /// The body's place or attitude read otherwise, and whether it is the attitude.
 fn place(recording: &Recording, robot: &Robot, slip: &Slip) -> Option<(Mismatch, bool)> {
-    // The bound is at least this.
-    let value = slip.rms_m().filter(|value| *value > PLACE.1)?;
+    let value = slip.rms_m().filter(|value| *value > PLACE.1)?; // the bound is at least this
     let (best, (reading, .., elements)) = best_other_place(recording, robot)?;
     let breach = outside(value, 0.0, PLACE.0 * best + PLACE.1);
     let [value_mm, best_mm] = [1e3 * value, 1e3 * best];
@@ -251,8 +239,7 @@ fn hip_torques(balance: &Balance) -> Found {
     let known = shares.filter_map(|(leg, share)| Some((leg, share?)));
     let wrong: Vec<(Leg, f64)> = known.filter(|(_, share)| *share < HIP_SHARE).collect();
     let value = (wrong.iter().map(|(_, share)| *share)).min_by(f64::total_cmp)?;
-    // Both legs of one end alone pull inwards where feet stick and positions are controlled, and less than exchanged
-    // ones.
+    // Both legs of one end alone pull inwards, less than exchanged ones, where feet stick and positions are controlled.
     let is_of_end = |end: &[Leg]| wrong.iter().all(|(leg, _)| end.contains(leg));
     let is_pair = wrong.len() == 2 && Leg::ALL.chunks(2).any(is_of_end);
     if is_pair && wrong.iter().any(|(_, share)| *share > HIP_SHARE_OF_PAIR) {
@@ -286,7 +273,6 @@ const RATES: [(usize, usize, &str); 3] = [
     (JOINT_DIM + 3, STATE_DIM, "roll, pitch and yaw"),
 ];
 
-/// Velocities that are a multiple of the changes of their positions.
 fn rates(recording: &Recording) -> Found {
     RATES.into_iter().find_map(|(first, end, what)| {
         let (mut product, mut squares, mut own) = (0.0, 0.0, 0.0);

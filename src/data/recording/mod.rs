@@ -1,9 +1,8 @@
-//! Recorded jumps: reading, checking, phases, preprocessing, writing.
-//!
-//! Enters: CSV files of one or several jumps, plain or gzip. Leaves: segments of consecutive samples in SI units,
-//! samples as columns; the spans of each contact phase; a report of what is implausible, and of what is not this robot.
-//! Read [`segment`] for the data first, then [`columns`] for the format, [`check`], [`mismatch`], [`condition()`],
-//! [`phases`] and [`preprocess`] for what is done with it, and [`mod@write`].
+//! Recorded jumps: reading, checking, phases, preprocessing, writing. Enters: CSV files of one or several jumps, plain
+//! or gzip, or logs of other programs. Leaves: segments of consecutive samples in SI units, samples as columns; spans
+//! of contact phases; reports of what is implausible, or not this robot. Read [`segment`] for the data first, then
+//! [`reader`] for the format, [`check`], [`mismatch`], [`condition()`], [`phases`] and [`preprocess`] for what is done
+//! with it, and [`mod@write`].
 //!
 //! ```
 //! use romc::recording::{self, phases::PhaseRule};

@@ -1,8 +1,6 @@
-//! Contact phases: which feet are down, and for how long.
-//!
-//! A rule is a list of named foot patterns, the first match wins, as in the model file. With the paper's two phases,
-//! samples with one to three feet down count as contact and so join the launch or the landing they border (section
-//! IV-C4). Three phases describe an asynchronous jump.
+//! Contact phases: which feet are down, and for how long. A rule is a list of named foot patterns, the first match
+//! wins, as in the model file. With the paper's two phases, samples with one to three feet down count as contact and so
+//! join the launch or the landing they border (section IV-C4). Three phases describe an asynchronous jump.
 
 use std::ops::Range;
 
@@ -103,10 +101,8 @@ impl PhaseRule {
         self.patterns.iter().position(|p| p.feet.matches(feet))
     }
 
-    /// The spans of a segment, in order and without gaps.
-    ///
-    /// A run of samples that matches no pattern (transitional, under a rule that lists exact patterns) joins the
-    /// neighbour with more feet down, on a tie the one before it.
+    /// The spans of a segment, in order and without gaps. A run that matches no pattern (transitional, under a rule of
+    /// exact patterns) joins the neighbour with more feet down, on a tie the one before it.
     ///
     /// # Errors
     /// [`RecordingError`] if no sample matches any pattern.
@@ -173,8 +169,7 @@ fn merge_short(runs: impl Iterator<Item = Run>, min_samples: usize) -> Vec<Run> 
 fn with_stance(runs: Vec<Run>, feet: &[ContactFlags]) -> Vec<PhaseSpan> {
     let mut flown = false;
     let span = |(phase, range): Run| {
-        // Most samples decide: a span may have swallowed chatter.
-        let own = feet[range.clone()].iter();
+        let own = feet[range.clone()].iter(); // most samples decide: a span may have swallowed chatter
         let airborne = own.filter(|feet| feet_down(**feet) == 0).count();
         let flies = 2 * airborne > range.len();
         flown |= flies;

@@ -1,12 +1,8 @@
-//! From segments to phases ready for training: accelerations by differences, resampling of each phase to whole batches
-//! (section IV-C4).
+//! From segments to phases ready for training: accelerations by differences, smoothing, resampling of each phase to
+//! whole batches (section IV-C4). Nothing crosses the border of a segment. Scaling belongs to the model.
 //!
-//! Nothing crosses the border of a segment. Scaling belongs to the model.
-//!
-//! Savitzky-Golay smoothing takes a polynomial through each window by least squares.
-//! Inside, each sample takes the value of the polynomial fitted to the window centred on it; at the ends, the first and
-//! last window's polynomial is evaluated off centre, so no sample is lost and polynomials up to the order pass
-//! unchanged everywhere. Samples count as equally spaced.
+//! Savitzky-Golay smoothing fits a polynomial to each window of equally spaced samples by least squares; its value at
+//! the centre, at the ends off centre, replaces a sample: none is lost, polynomials up to the order pass unchanged.
 
 use std::ops::Range;
 use std::path::Path;
@@ -123,8 +119,7 @@ pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
 pub struct SavitzkyGolay {
     pub(crate) window: usize,
     order: usize,
-    /// Row `r`: weights of the window's samples for the value at its place `r`.
-    values: DMatrix<f64>,
+    values: DMatrix<f64>, // row `r`: weights of the window's samples for the value at its place `r`
 }
 
 impl SavitzkyGolay {
@@ -143,8 +138,7 @@ impl SavitzkyGolay {
             return Err(text(words).of(Path::new("")));
         }
         let half = (window / 2) as f64;
-        // Places scaled to -1..1 keep the powers well conditioned.
-        let place = |r: usize| (r as f64 - half) / half.max(1.0);
+        let place = |r: usize| (r as f64 - half) / half.max(1.0); // scaled to -1..1: keeps the powers well conditioned
         let powers = DMatrix::from_fn(window, order + 1, |r, k| place(r).powi(k as i32));
         let q = powers.qr().q();
         let values = &q * q.transpose();

@@ -1,7 +1,6 @@
-//! How files become recordings: by romc's own names or a map of columns, with clocks as stamped or mended.
-//!
-//! romc's own text: `;` or tabs with decimal comma or point, or `,` with decimal point, found from the header; columns
-//! by name in any order; gzip found from the first two bytes. Memory is bounded by the samples kept.
+//! How files become recordings: by romc's own names or a map of columns, with clocks as stamped or mended. romc's own
+//! text: `;` or tabs with decimal comma or point, or `,` with decimal point, found from the header; columns by name in
+//! any order; gzip found from the first two bytes. Memory is bounded by the samples kept.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -64,10 +63,7 @@ impl Reader {
         Self { robot, ..self }
     }
 
-    /// Reads a file, or with a map a folder of files that are one recording.
-    ///
-    /// # Errors
-    /// [`RecordingError`] with file, row and column, or with the map's key.
+    /// Reads a file, or with a map a folder of files that are one recording; errors name row and column or map's key.
     pub fn read(&self, path: &Path) -> Result<Reading, RecordingError> {
         let mut reading = match &self.map {
             Some(map) if is_mcap(path) => assemble(path, &read_mcap(path)?, map)?,
@@ -93,18 +89,12 @@ impl Reader {
     }
 }
 
-/// Reads a recording, plain or gzip.
-///
-/// # Errors
-/// [`RecordingError`], which names file, row and column.
+/// Reads a recording, plain or gzip; errors name file, row and column.
 pub fn read(path: &Path) -> Result<Recording, RecordingError> {
     read_noted(path, Lines::open(path)?).map(|reading| reading.recording)
 }
 
-/// Reads a recording from memory; `name` stands for the file in messages.
-///
-/// # Errors
-/// As [`read`]. No bytes make it panic.
+/// [`read`] from memory; `name` stands for the file in messages. No bytes make it panic.
 pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Result<Recording, RecordingError> {
     let path = Path::new(name);
     read_noted(path, Lines::of(path, bytes, u64::MAX)?).map(|reading| reading.recording)
@@ -144,7 +134,6 @@ fn read_noted(path: &Path, lines: Lines<'_>) -> Outcome<Reading> {
 const TO_COMPLETE: &str =
     "; `romc inspect --guess LOG` writes a map for --columns, to be completed";
 
-/// An MCAP file by the names of its topics and fields.
 fn by_guess(path: &Path, robot: &Robot) -> Outcome<Reading> {
     let logs = read_mcap(path)?;
     let guess = guess_of(path, &logs, robot)?;
@@ -239,8 +228,7 @@ pub enum Column {
     Velocity(usize),
     Acceleration(usize),
     Torque(usize),
-    /// Entry of the body wrench.
-    Force(usize),
+    Force(usize), // entry of the body wrench
     Foot(usize),
 }
 
@@ -294,7 +282,6 @@ impl Column {
         let expected = Column::all(acceleration, force).into_iter();
         let missing = expected.filter(|c| !columns.contains(&Some(*c)));
         let missing: Vec<String> = missing.map(Column::name).collect();
-        // Hardly a name of the format.
         let hint = match missing.len() {
             0 => return Ok(columns),
             1..30 => "",

@@ -10,11 +10,9 @@ use super::preprocess::{differences, moving_average};
 use super::reader::Column;
 use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
-/// Time over which accelerations of joints are averaged before the inertia of the motors counts, in s.
-const ACCELERATION_WINDOW_S: f64 = 0.02;
+const ACCELERATION_WINDOW_S: f64 = 0.02; // joint accelerations are averaged over it before motor inertia counts
 
-/// Quantities by row, one column a sample.
-pub(crate) type Rows = DMatrix<f64>;
+pub(crate) type Rows = DMatrix<f64>; // quantities by row, one column a sample
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +41,6 @@ impl Recording {
 }
 
 impl From<Segment> for Recording {
-    /// A recording of this segment alone, under its path.
     fn from(segment: Segment) -> Self {
         Self {
             path: segment.path.clone(),
@@ -260,9 +257,8 @@ impl Segment {
 
     /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model: `tau` are the torques at
     /// the links, recorded ones less [`Segment::losses`], `F` and `M` what they and the contacts do to the body
-    /// (equation 22); under the published rule the file's own, if it carries them.
-    ///
-    /// Near a singularity of a leg in contact its force is damped ([`Robot::damped_force_map`]).
+    /// (equation 22); under the published rule the file's own, if it carries them. Near a singularity of a leg in
+    /// contact its force is damped ([`Robot::damped_force_map`]).
     ///
     /// # Errors
     /// [`RecordingFault::Wrench`] with the row of an angle or torque that is not finite.
@@ -275,7 +271,6 @@ impl Segment {
         self.input_of(rule, &self.torque_within_limits(rule.robot()))
     }
 
-    /// The recorded torques, N m; those beyond a limit of the robot count as the limit.
     pub(crate) fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
         let mut torque_nm = self.torque_nm.clone();
         for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
@@ -319,8 +314,7 @@ impl Segment {
 
 pub(super) const DERIVED_DDX: &str = "accelerations are differences of velocities";
 const GAP_STEPS: f64 = 20.0; // a step this many times the one before it starts a new segment, as a jump back does
-/// A first time beyond this is that of a clock that counts from an epoch: times count from it then.
-pub(super) const EPOCH_S: f64 = 1e7;
+pub(super) const EPOCH_S: f64 = 1e7; // first times beyond it are since an epoch: times then count from them
 const LARGEST_STEP_S: f64 = 0.1; // largest mean distance between samples: a jump lasts less than a second
 
 /// The segments of all samples of a file, which get differences for accelerations that they do not have.

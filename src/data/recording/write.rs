@@ -1,7 +1,5 @@
-//! Writer of the recordings' CSV format.
-//!
-//! Numbers are written with the fewest digits that read back to the same bits. Files appear whole or not at all: they
-//! are written beside their place and then renamed.
+//! Writer of the recordings' CSV format. Numbers have the fewest digits that read back to the same bits. Files appear
+//! whole or not at all: they are written beside their place and then renamed.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -46,20 +44,14 @@ impl Default for WriteOptions {
     }
 }
 
-/// Writes a recording as published files are; gzip if the name ends in `.gz`.
-///
-/// # Errors
-/// [`RecordingError`]. An existing file is replaced.
+/// Writes a recording as published files are, gzip if the name ends in `.gz`; an existing file is replaced.
 pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
     let options = WriteOptions::default();
     write_as(path, recording, None, &options, Overwrite::Replace)
 }
 
 /// [`write()`] with a choice of notation and columns, and, if given, the inputs of each segment (18 x samples), as
-/// columns `Input fr.hx` and so on, which reading ignores.
-///
-/// # Errors
-/// As [`write()`], and for a file that is there and may not be replaced.
+/// columns `Input fr.hx` and so on, which reading ignores. A file that may not be replaced is an error.
 pub fn write_as(
     path: &Path,
     recording: &Recording,
@@ -80,9 +72,6 @@ pub fn write_as(
 }
 
 /// Writes a segment as an MCAP file: joint states, odometry, contact, and if given the inputs (18 x samples).
-///
-/// # Errors
-/// As [`write_as`].
 pub fn write_mcap(
     path: &Path,
     segment: &Segment,
@@ -97,9 +86,6 @@ pub fn write_mcap(
 }
 
 /// Writes a recording as text, its inputs as [`write_as`], the wrench if every segment carries one.
-///
-/// # Errors
-/// Those of the destination.
 pub fn write_to(
     destination: &mut impl Write,
     recording: &Recording,

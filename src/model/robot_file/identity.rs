@@ -1,6 +1,4 @@
-//! Which robot a file describes, and whether its numbers can be true.
-//!
-//! The grammar of a robot: of the TOML file, and of `robot` in a model file.
+//! Grammar of a robot in the TOML file and in a model file's `robot`; its name, and whether its numbers can be true.
 
 use std::fmt::Write as _;
 
@@ -13,22 +11,17 @@ use crate::files::{Located, Place};
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, LegGeometry, Robot};
 
-/// Largest angle of a joint or frame, rad: two turns either way.
-pub(super) const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI;
-/// Angle that joints which are built do not exceed, rad: one and a half turns either way, as ANYmal's.
-const USUAL_ANGLE_RAD: f64 = 9.5;
-/// Range of a leg's largest torque as a part of the robot's weight times the length of thigh and calf; robots that are
-/// built have 0.2 to 1.
+pub(super) const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI; // of a joint or frame: two turns either way
+const USUAL_ANGLE_RAD: f64 = 9.5; // built joints do not exceed it: one and a half turns either way, as ANYmal's
+/// Range of a leg's largest torque over the robot's weight times the length of thigh and calf; built ones: 0.2 to 1.
 const TORQUE_SHARE: std::ops::RangeInclusive<f64> = 0.02..=3.0;
 const LARGEST_SPEED_RAD_S: f64 = 100.0;
 const N_LISTED: usize = 4;
 
-/// A robot of a file, and notes for the user.
 #[derive(Clone, Debug)]
 pub struct RobotReading {
     pub robot: &'static Robot,
-    /// One sentence each: the frame of the body, numbers that can hardly be true, another name.
-    pub notes: Vec<String>,
+    pub notes: Vec<String>, // one sentence each: the frame of the body, numbers that can hardly be true, another name
 }
 
 /// How a robot that has the name of one of romc's own differs from it; nothing, if it does not.
@@ -37,8 +30,7 @@ pub(super) fn namesake(robot: &Robot) -> Option<String> {
     (known != robot).then(|| differences(robot, known))
 }
 
-/// The robot of an entry from a file. Numbers other than those of romc's robot of that name make it another robot, with
-/// the kind of the file in its name.
+/// The robot of an entry; numbers other than those of romc's robot of that name add the file's kind to its name.
 pub(super) fn identified(
     mut entry: RobotEntry,
     places: &Places<'_>,
@@ -183,25 +175,20 @@ pub struct RobotEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LegEntry {
-    /// Its three joints, from the trunk to the foot.
-    pub(crate) joint: Vec<JointEntry>,
-    /// From the last joint to the foot at the zero posture, m, along the body's axes.
-    pub(crate) foot: [f64; 3],
+    pub(crate) joint: Vec<JointEntry>, // from the trunk to the foot
+    pub(crate) foot: [f64; 3], // from the last joint to the foot at the zero posture, m, along the body's axes
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JointEntry {
     pub(crate) name: String,
-    /// From the joint before, the first from the body's origin, at the zero posture, m.
-    pub(crate) at: [f64; 3],
+    pub(crate) at: [f64; 3], // from the joint before, the first from the body's origin, at the zero posture, m
     pub(crate) axis: Axis,
-    /// -1 where recorded angles count against the axis; 1, if it is not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) sign: Option<f64>,
-    /// Recorded angle at the zero posture, rad; 0, if it is not given.
+    pub(crate) sign: Option<f64>, // -1 where recorded angles count against the axis; 1, if it is not given
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) offset_rad: Option<f64>,
+    pub(crate) offset_rad: Option<f64>, // recorded angle at the zero posture, rad; 0, if it is not given
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) limits_rad: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

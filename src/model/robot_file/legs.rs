@@ -1,6 +1,4 @@
-//! From an entry to a checked robot.
-//!
-//! What the joints take of the motors' torques, from a file.
+//! From an entry to a checked robot, and joint losses from a file or from a program's arrays.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -19,10 +17,8 @@ use crate::robot::{
 const MAX_NAME_LEN: usize = 80;
 const MAX_LINK_M: f64 = 10.0;
 const MIN_LINK_M: f64 = 1e-3;
-/// Largest sine of the angle between the axes of a leg's last two joints.
-const MAX_TILT: f64 = 1e-3;
-/// Smallest sine of the angle between the first axis and the second.
-const MIN_ABDUCTION: f64 = 0.1;
+const MAX_TILT: f64 = 1e-3; // largest sine of the angle between the axes of a leg's last two joints
+const MIN_ABDUCTION: f64 = 0.1; // smallest sine of the angle between the first axis and the second
 
 /// A part of an entry, by the indices of leg and joint.
 #[derive(Clone, Copy)]
@@ -32,20 +28,16 @@ pub(super) enum Part<'k> {
     Legs,
     Leg(usize),
     Foot(usize),
-    /// With a key; the joint itself, if that is empty.
-    Joint(usize, usize, &'k str),
+    Joint(usize, usize, &'k str), // with a key; the joint itself, if that is empty
 }
 
-/// Where the parts of an entry are in a file.
 pub(super) struct Places<'f> {
     pub file: &'f str,
-    /// `toml` or `urdf`.
-    pub kind: &'static str,
+    pub kind: &'static str, // `toml` or `urdf`
     pub of: &'f dyn Fn(Part<'_>) -> String,
 }
 
 impl<'f> Places<'f> {
-    /// By the keys of TOML and JSON.
     pub(super) fn keys(file: &'f str) -> Self {
         let of = &|part: Part<'_>| match part {
             Part::Name => "name".to_owned(),
@@ -251,8 +243,7 @@ impl Places<'_> {
             true => vector,
             false => vector / norm,
         };
-        // No -0.0, so that the usual axes are recognised.
-        Ok((unit * sign).map(|v| v + 0.0))
+        Ok((unit * sign).map(|v| v + 0.0)) // no -0.0, so that the usual axes are recognised
     }
 
     fn geometry(&self, index: usize, leg: &LegEntry) -> Result<LegGeometry, RobotFileError> {
@@ -310,8 +301,7 @@ struct File {
     actuators: ActuatorsEntry,
 }
 
-/// Share by which the gravity that was identified with the losses may differ from the earth's.
-const GRAVITY_SHARE: f64 = 0.25;
+const GRAVITY_SHARE: f64 = 0.25; // by which gravity identified with the losses may differ from the earth's
 
 /// Joint losses as files and programs write them: twelve numbers each, or three (hx, hy, kn) that hold for every leg.
 #[derive(Clone, Debug, Deserialize)]
@@ -323,7 +313,6 @@ pub struct ActuatorsEntry {
 }
 
 impl ActuatorsEntry {
-    /// The entry of a program's arrays by name.
     pub fn of_arrays(mut arrays: BTreeMap<String, Vec<f64>>) -> Result<Self, RobotFileError> {
         let mut take = |name: &str| {
             let missing = || RobotFileError::at("", format!("actuators.{name}"), "nothing", COUNT);
@@ -344,7 +333,6 @@ impl ActuatorsEntry {
         }
     }
 
-    /// The actuators of the entry, which is `actuators` of `file` in errors.
     pub fn actuators(&self, file: &str) -> Result<Actuators, RobotFileError> {
         let joints = |name: &str, values: &[f64]| match values.len() {
             found @ (3 | JOINT_DIM) => Ok(std::array::from_fn(|joint| values[joint % found])),

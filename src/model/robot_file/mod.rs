@@ -1,9 +1,9 @@
 //! Robots from files: TOML, URDF, the object in a model file; those that romc brings; and tables of joint losses.
 //!
-//! What enters: a name, or the path or text of a file. What leaves: a checked [`Robot`] with its legs in romc's order,
-//! or file, place, what was found and what was expected. Legs are matched by where their first joints stand, joints by
-//! their order from the trunk. Read `identity.rs` first, the grammar, which compares with romc's own robots and doubts
-//! numbers; `legs.rs` makes a robot of it, `urdf` finds the legs of a tree. `docs/robots.md` describes the file.
+//! Enters: a name, or the path or text of a file. Leaves: a checked [`Robot`](crate::robot::Robot) with its legs in
+//! romc's order, or file, place, what was found and what was expected. Legs are matched by where their first joints
+//! stand, joints by their order from the trunk. Read `identity.rs` first, the grammar, which doubts numbers; `legs.rs`
+//! makes a robot of it, `urdf` finds the legs of a tree. `docs/robots.md` describes the file.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};
@@ -17,8 +17,6 @@
 //! assert_eq!(lighter.foot_position(Leg::RearLeft, &q), own.foot_position(Leg::RearLeft, &q));
 //! # Ok::<(), romc::robot_file::RobotFileError>(())
 //! ```
-//!
-//! [`Robot`]: crate::robot::Robot
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 

@@ -1,6 +1,4 @@
-//! From a name or a file to a robot.
-//!
-//! The robots that romc brings, and those that were read.
+//! From a name or a file to a robot; the robots that romc brings, and those that were read.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -18,11 +16,9 @@ use crate::robot::{Robot, RobotError};
 /// A fault of a robot's file and its place; without a file, of a name or an option.
 pub type RobotFileError = Located<Fault>;
 
-/// What a command says of a robot's file besides its path.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RobotOptions<'a> {
-    /// Links of the four feet of a URDF, each with a point in its frame where that is not the foot (`LINK:x,y,z`);
-    /// empty to find them.
+    /// The four foot links of a URDF, as `LINK:x,y,z` where the foot is not the link's origin; empty to find them.
     pub feet: &'a [String],
     pub name: Option<&'a str>,
 }
@@ -32,7 +28,6 @@ pub fn find(name_or_file: &str) -> Result<&'static Robot, RobotFileError> {
     Ok(open(name_or_file, &RobotOptions::default())?.robot)
 }
 
-/// [`find`] with options and notes.
 pub fn open(
     name_or_file: &str,
     options: &RobotOptions<'_>,

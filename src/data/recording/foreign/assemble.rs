@@ -20,7 +20,6 @@ const MAX_GAP_S: f64 = 0.05; // largest distance between samples of a topic that
 const QUATERNION_TOLERANCE: f64 = 0.05; // how far the length of a quaternion may be from one
 const MAX_RESAMPLED: usize = 10_000_000; // most samples of a recording that is resampled
 
-/// Makes a recording of the logs as the map says, with notes of what was derived, resampled, turned or cut.
 pub(crate) fn assemble(path: &Path, logs: &[Log], map: &ColumnMap) -> Outcome<Reading> {
     let (mut signals, mut notes, mut epoch_s) = (BTreeMap::new(), Vec::new(), None);
     for quantity in Quantity::ALL {
@@ -345,20 +344,15 @@ impl Assembly<'_> {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Between {
-    /// Cubic polynomials: motion.
-    Smooth,
-    /// Straight lines: torques, which may step.
-    Straight,
-    /// The nearest sample: contact.
-    Nearest,
+    Smooth,   // cubic polynomials: motion
+    Straight, // straight lines: torques, which may step
+    Nearest,  // the nearest sample: contact
 }
 
 const SAME: f64 = 1e-6; // times within this share of a step are the same time
 
-/// Samples of a polynomial whose slope is that of its middle, or of its ends at the ends of a log.
-const STENCIL: usize = 5;
-/// How much longer than the shortest step of a stencil its longest may be: beyond, polynomials swing.
-const UNEVEN: f64 = 4.0;
+const STENCIL: usize = 5; // samples of a polynomial whose slope is that of its middle, or of its ends at a log's ends
+const UNEVEN: f64 = 4.0; // longest over shortest step of a stencil: beyond, polynomials swing
 
 /// Values at `times_s`, one column a time, of rows known at `own_s`, with these derivatives or [`slopes_of`] them.
 fn at_times(own: &Signal, slopes: Option<&Rows>, times_s: &[f64], between: Between) -> Rows {

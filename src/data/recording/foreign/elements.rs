@@ -18,14 +18,11 @@ pub(super) enum Quantity {
     JointAcceleration,
     JointTorque,
     BodyPosition,
-    /// Attitude of the trunk: a quaternion, or roll, pitch and yaw.
-    Orientation,
+    Orientation, // attitude of the trunk: a quaternion, or roll, pitch and yaw
     BodyVelocity,
-    /// Angular velocity of the trunk, or rates of roll, pitch and yaw.
-    AngularVelocity,
+    AngularVelocity, // angular velocity of the trunk, or rates of roll, pitch and yaw
     BodyAcceleration,
-    /// Second derivatives of roll, pitch and yaw.
-    AngularAcceleration,
+    AngularAcceleration, // second derivatives of roll, pitch and yaw
     Feet,
 }
 
@@ -44,7 +41,6 @@ impl Quantity {
         Self::Feet,
     ];
 
-    /// Accelerations, each with the velocity whose derivative it is.
     pub(crate) const ACCELERATIONS: [(Self, Self); 3] = [
         (Self::JointAcceleration, Self::JointVelocity),
         (Self::BodyAcceleration, Self::BodyVelocity),
@@ -111,8 +107,7 @@ impl Quantity {
     }
 }
 
-/// Elements of a quaternion, the real part first.
-pub(super) const QUATERNION: [&str; 4] = ["w", "x", "y", "z"];
+pub(super) const QUATERNION: [&str; 4] = ["w", "x", "y", "z"]; // the real part first
 
 /// The elements that words name: names, names with `*` (`*.hx`, `fl.*`), or single letters (`wxyz`, `rpy`, `xyz`).
 pub(super) fn ordered(words: &[&str], elements: &[&str]) -> Result<Vec<usize>, String> {
@@ -139,7 +134,6 @@ pub(super) fn named(word: &str, elements: &[&str]) -> Vec<usize> {
         None => element == word,
     };
     let found = Vec::from_iter((0..elements.len()).filter(|i| matches(elements[*i])));
-    // Letters: `wxyz`, or the first letters of roll, pitch and yaw.
     let has_letters = ["x", "roll"].iter().any(|axis| elements.contains(axis));
     if !found.is_empty() || !word.is_ascii() || !has_letters {
         return found;
@@ -242,7 +236,6 @@ pub(super) fn unwrap(angles: &mut DMatrix<f64>) -> bool {
     any
 }
 
-/// Velocities in the world of velocities along the body's own axes, at these angles.
 pub(super) fn in_world(angles: &DMatrix<f64>, velocities: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = velocities.clone();
     for (i, mut velocity) in out.column_iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! The map of a log: which column is what, in which unit, sign and order; a TOML file.
+//! The map of a log: which column is what, in which unit, sign and order; a TOML file, described by `docs/logs.md`.
 //!
 //! ```toml
 //! [time]
@@ -9,8 +9,6 @@
 //! columns = "{leg}_{joint}_joint/position"
 //! unit = "deg"
 //! ```
-//!
-//! `docs/logs.md` describes every key.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,15 +26,13 @@ const MOST: usize = 10_000; // most columns that a range stands for
 #[serde(deny_unknown_fields, default)]
 pub struct ColumnMap {
     pub(super) text: TextFormat,
-    /// The clock of all tables that have none of their own.
-    pub(super) time: TimeMap,
+    pub(super) time: TimeMap, // the clock of all tables that have none of their own
     pub(super) names: Names,
     joint: BTreeMap<String, Table>,
     body: BTreeMap<String, Table>,
     feet: Option<Table>,
-    /// The file that the map was read from, for messages.
     #[serde(skip)]
-    pub(super) file: String,
+    pub(super) file: String, // that the map was read from, for messages
 }
 
 /// How text files are laid out; what is absent is found from the file.
@@ -48,9 +44,8 @@ pub(crate) struct TextFormat {
     pub skip: usize,
     pub blank: bool, // empty cells and NaN are samples that a quantity does not have, where topics share one table
     pub rows: Option<[usize; 2]>, // first and last sample to keep, counted from 1
-    /// romc's own columns: none is left to guess, and each cell that is read has a finite number.
     #[serde(skip)]
-    pub own: bool,
+    pub own: bool, // romc's own columns: none is left to guess, and each cell that is read has a finite number
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -163,19 +158,13 @@ pub(super) enum Origin {
 }
 
 impl ColumnMap {
-    /// Reads a map.
-    ///
-    /// # Errors
-    /// [`RecordingError`] with line or key, and what was expected.
+    /// Reads a map; errors name line or key, and what was expected.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let text = read_toml(path).map_err(|source| io_fault("read", source).of(path))?;
         Self::parse(&path.display().to_string(), &text)
     }
 
     /// [`Self::read`] of a text; `file` stands for the file in messages.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
     pub fn parse(file: &str, toml: &str) -> Result<Self, RecordingError> {
         let mut map: Self = toml::from_str(toml).map_err(|error| {
             let message = error.to_string();
@@ -186,7 +175,6 @@ impl ColumnMap {
         Ok(map)
     }
 
-    /// Where a quantity stands.
     pub(super) fn table(&self, quantity: Quantity) -> Option<&Table> {
         match quantity.key().split_once('.') {
             Some(("joint", name)) => self.joint.get(name),
@@ -287,7 +275,6 @@ fn pattern(text: &str, names: &Names, quantity: Quantity) -> Vec<Name> {
     out.into_iter().map(Name::Text).collect()
 }
 
-/// What a map may not state, whatever the log.
 impl ColumnMap {
     fn require_applicable(&self) -> Outcome<()> {
         let known = Quantity::ALL.map(Quantity::key);

@@ -1,7 +1,6 @@
-//! MCAP files as logs, one log per topic and set of names; the only file that reads with the `mcap` crate.
-//!
-//! Records are read one by one and chunks unpacked one at a time. A file that ends early gives what its whole records
-//! and chunks hold. Folders of ROS 2 bags have the MCAP files that one recording was split into.
+//! MCAP files as logs, one per topic and set of names; the only file that reads with the `mcap` crate. Records are read
+//! one by one and chunks unpacked one at a time. A file that ends early gives what its whole records and chunks hold.
+//! Folders of ROS 2 bags have the MCAP files that one recording was split into.
 
 use std::borrow::Cow;
 use std::fs::{self, File};
@@ -72,8 +71,7 @@ pub(crate) fn read_mcap(path: &Path) -> Outcome<Vec<Log>> {
     Ok(logs)
 }
 
-/// Kind and contents of a record, and its first byte in the file.
-type Raw = (u64, Vec<u8>, Vec<u8>);
+type Raw = (u64, Vec<u8>, Vec<u8>); // of a record: first byte in the file, header, contents
 
 struct Scan<'a, R> {
     source: R,

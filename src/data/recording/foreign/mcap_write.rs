@@ -30,7 +30,6 @@ const GEOMETRY: [&str; 7] = [
     "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z",
 ];
 
-/// The definition of a message with those of its parts.
 fn definition(own: &str, parts: &[&str]) -> String {
     let part = |part: &&str| format!("{:=<80}\nMSG: {part}\n", "");
     own.to_owned() + &parts.iter().map(part).collect::<String>()
@@ -43,9 +42,6 @@ const FEET_TOPIC: &str = "/foot_contacts"; // contact, 1 or 0 for each foot
 const INPUT_TOPIC: &str = "/inputs"; // inputs of a model
 
 /// Writes a segment and, if given, its inputs (18 x samples) as messages; chunks are not packed.
-///
-/// # Errors
-/// Those of the destination.
 pub fn write_mcap(
     destination: impl Write + Seek,
     segment: &Segment,
@@ -99,7 +95,6 @@ pub fn write_mcap(
     Ok(())
 }
 
-/// Pose in the world, velocities in the trunk's axes, as `nav_msgs/Odometry` has them.
 fn odometry(segment: &Segment, sample: usize, time_ns: i64) -> Message {
     const BODY: usize = JOINT_DIM;
     let of = |m: &DMatrix<f64>, first: usize| -> Vector3<f64> {
@@ -126,11 +121,9 @@ fn odometry(segment: &Segment, sample: usize, time_ns: i64) -> Message {
     message
 }
 
-/// Bytes in CDR behind its header.
-struct Message(Vec<u8>);
+struct Message(Vec<u8>); // bytes in CDR behind its header
 
 impl Message {
-    /// With time, and the world as frame.
     fn stamped(time_ns: i64) -> Self {
         let mut message = Self(vec![0, 1, 0, 0]);
         let seconds = time_ns.div_euclid(1_000_000_000) as i32;

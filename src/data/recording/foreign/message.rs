@@ -40,8 +40,7 @@ struct Field {
     count: Count,
 }
 
-/// A fault is words.
-type Told<T> = Result<T, String>;
+type Told<T> = Result<T, String>; // a fault is words
 
 /// A message type with all that it is made of; the first is the message's own.
 #[derive(Debug, Clone)]
@@ -59,8 +58,7 @@ pub(super) enum Value {
 pub(super) struct Numbers {
     pub names: Vec<String>,
     pub values: Vec<Value>,
-    /// Lengths and names of its lists: messages of one type that agree in them have the same numbers in the same order.
-    pub lists: Vec<u8>,
+    pub lists: Vec<u8>, // lengths and names of its lists, which decide a type's numbers and their order
 }
 
 type Texts<'a> = BTreeMap<String, Vec<&'a str>>;
@@ -87,8 +85,7 @@ impl Definition {
         if let Some(index) = self.types.iter().position(|(known, _)| known == name) {
             return Ok(index);
         }
-        // An empty message has no lines.
-        let lines = texts.get(name).cloned().unwrap_or_default();
+        let lines = texts.get(name).cloned().unwrap_or_default(); // an empty message has no lines
         if level > MOST_LEVELS || (lines.is_empty() && level > 0 && !name.ends_with("/Empty")) {
             return Err(undefined(name));
         }
@@ -183,7 +180,6 @@ fn primitive(name: &str) -> Option<Kind> {
     })
 }
 
-/// Bytes of a message from its first field on, and what was read of them.
 struct Cursor<'a> {
     bytes: &'a [u8],
     place: usize,
@@ -346,8 +342,7 @@ impl<'a> Cursor<'a> {
 
     fn length(&mut self) -> Result<usize, String> {
         let length = self.unsigned(4)? as usize;
-        // Every entry has a byte at least.
-        self.require(length <= self.bytes.len()).map(|()| length)
+        self.require(length <= self.bytes.len()).map(|()| length) // every entry has a byte at least
     }
 
     fn text(&mut self) -> Result<String, String> {

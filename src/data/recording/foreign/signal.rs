@@ -12,8 +12,7 @@ use crate::recording::reader::folded;
 
 #[derive(Debug, Clone)]
 pub(super) struct Signal {
-    /// One row an element in romc's order, one column a sample; a quaternion has four rows, w first.
-    pub values: DMatrix<f64>,
+    pub values: DMatrix<f64>, // rows: elements in romc's order, a quaternion's four from w on; columns: samples
     pub times_s: Vec<f64>,
     pub first_row: usize,
 }
@@ -26,7 +25,6 @@ pub(super) struct Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// Where a quantity stands; `None` if the map does not have it.
     pub(crate) fn find(
         logs: &'a [Log],
         map: &'a ColumnMap,
@@ -160,7 +158,6 @@ impl<'a> Source<'a> {
         Err(self.fault("order", found, expected))
     }
 
-    /// The factor to SI of a unit that stands under this key; 1 without one.
     fn factor(&self, key: &str, dimension: Dimension, unit: Option<&String>) -> Outcome<f64> {
         let Some(unit) = unit else { return Ok(1.0) };
         let expected = || format!("one of {}", dimension.names());
@@ -296,10 +293,9 @@ pub(crate) struct Log {
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Channel {
-    pub name: String,     // its name; empty without a header
-    pub values: Vec<f64>, // its values; NaN where a cell is empty or no number
-    /// The same as times, where the column holds times that one number does not hold.
-    pub instants: Option<Vec<Instant>>,
+    pub name: String,                     // its name; empty without a header
+    pub values: Vec<f64>,                 // its values; NaN where a cell is empty or no number
+    pub instants: Option<Vec<Instant>>, // the same as times, where the column holds times that one number does not hold
     pub refused: Option<(usize, String)>, // the first cell that is no number: its sample and text
 }
 

@@ -1,6 +1,5 @@
-//! Topics of an MCAP log as tables: numbers by the names that each message gives them, rows in order of time.
-//!
-//! Messages whose lists have other names or lengths belong to another table of the topic. Rows are sorted by the time of
+//! Topics of an MCAP log as tables: numbers by the names that each message gives them, rows in order of time. Messages
+//! whose lists have other names or lengths belong to another table of the topic. Rows are sorted by the time of
 //! recording, late stamps into their place, and exact repeats are dropped; a note says so.
 
 use std::collections::BTreeMap;
@@ -15,8 +14,7 @@ use crate::recording::lines::MAX_ROWS;
 
 const MOST_TABLES: usize = 16; // most tables of a topic
 const MOST_ARRANGEMENTS: usize = 64; // most arrangements of lists that are kept in mind
-/// Most messages in a row with stamps before an earlier one that are late; more are another run of a simulator.
-const MOST_LATE: usize = 20;
+const MOST_LATE: usize = 20; // most messages in a row that are late; more earlier stamps are another run of a simulator
 
 #[derive(Default)]
 pub(super) struct Topics {
@@ -33,8 +31,7 @@ struct Topic {
     definition: Defined,
     declared: (String, Option<Schema>), // encoding of the messages, and their schema
     tables: Vec<Table>,
-    /// By lists of a message: its table, and the columns of its numbers.
-    arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>,
+    arrangements: BTreeMap<Vec<u8>, (usize, Vec<usize>)>, // by lists of a message: its table, columns of its numbers
     arrived: usize,
     fault: Option<String>,
 }

@@ -8,9 +8,8 @@ use crate::recording::preprocess::median;
 use crate::recording::{Recording, Segment};
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg, Robot};
 
-/// By how much feet in the air have to be higher in sum in another order, m, and as a share of that sum.
-///
-/// In right recordings single samples of a foot that rolls off or touches down can favour another order by 8 mm in sum.
+/// By how much feet in the air have to be higher in sum in another order, m, and as a share of that sum: in right
+/// recordings single samples of a foot that rolls off or touches down can favour another order by 8 mm in sum.
 const LEAST_GAIN: (f64, f64) = (9e-3, 0.3);
 const FLOOR_M: f64 = 0.1; // height of the feet that are on the ground, m
 
@@ -52,8 +51,7 @@ fn higher_m(feet: &ContactFlags, height: &[f64; FOOT_DIM], legs: &[Leg; FOOT_DIM
 }
 
 pub(super) fn floor(value: f64) -> Found {
-    // The bound has no sign.
-    let breach = outside(value, -FLOOR_M, FLOOR_M).map(|(value, _)| (value, FLOOR_M));
+    let breach = outside(value, -FLOOR_M, FLOOR_M).map(|(value, _)| (value, FLOOR_M)); // the bound has no sign
     let words = format!(
         "feet on the ground are at a height of {value:.2} m ({FLOOR_M:.2} m are accepted): is z that of the trunk \
          over the ground?"
@@ -69,12 +67,10 @@ pub(super) fn floor_m(recording: &Recording, robot: &Robot) -> f64 {
             heights.extend(Leg::down(*feet).map(|leg| foot_place(robot, leg, &x, false).z));
         }
     }
-    // 0 where no foot ever stands.
-    median(heights.into_iter())
+    median(heights.into_iter()) // 0 where no foot ever stands
 }
 
-/// Lowest height of the trunk over the floor, m, and largest tilt, rad, while feet are on the ground.
-const TRUNK: (f64, f64) = (0.05, 1.6);
+const TRUNK: (f64, f64) = (0.05, 1.6); // trunk's lowest height, m, and largest tilt, rad, with feet on the ground
 const LIES_S: f64 = 0.1; // shortest time that it lies, s
 
 /// Time, s, that the trunk lies on the ground, or under it, or on its back, if that is long enough.

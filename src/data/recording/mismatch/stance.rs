@@ -1,6 +1,5 @@
-//! Places of the feet in the world, and how well those on the ground stay there.
-//!
-//! Forces against weight and acceleration, falling in flight, hips' torques against the side they hold.
+//! Places of the feet in the world, and how well those on the ground stay there; forces against weight and
+//! acceleration, falling in flight, hips' torques against the side they hold.
 
 use std::ops::Range;
 
@@ -18,10 +17,8 @@ use crate::robot::{BODY_NAMES, BODY_Z, FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DI
 type State = [f64; STATE_DIM];
 
 const LEAST_STANCE_S: f64 = 0.05; // shortest stance that counts, s
-/// Time at both ends of a stance that does not count, s: touchdown and lift-off; at most an eighth of the stance.
-const EDGE_S: f64 = 0.02;
-/// Radius of the sphere that a foot rolls on, m: 0.02 to 0.023 on the robots that romc knows.
-const FOOT_RADIUS_M: f64 = 0.022;
+const EDGE_S: f64 = 0.02; // uncounted time at both ends of a stance, touchdown and lift-off; at most an eighth of it
+const FOOT_RADIUS_M: f64 = 0.022; // of the sphere that a foot rolls on: 0.02 to 0.023 on the robots that romc knows
 const LEAST_SAMPLES: usize = 50; // fewest samples of feet on the ground that say anything
 
 /// A way in which columns are easily recorded: words, body x and y exchanged, other signs, order of the quaternion.
@@ -229,8 +226,7 @@ pub(crate) fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
 }
 
 const LEAST_S: f64 = 0.04; // shortest flight, and shortest time on the ground in all, that counts, s
-/// Least force of a foot that counts where a hip's torque is compared with it, as a share of the weight.
-const LEAST_FORCE: f64 = 0.02;
+const LEAST_FORCE: f64 = 0.02; // of a foot whose hip's torque is compared with it, as a share of the weight
 
 /// What forces and accelerations of a recording come to.
 #[derive(Debug, Clone, PartialEq, Serialize)]

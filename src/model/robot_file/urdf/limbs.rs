@@ -8,8 +8,7 @@ use crate::robot::FOOT_DIM;
 use crate::robot::joints::LEG_JOINT_DIM;
 use crate::robot_file::RobotFileError;
 
-/// Largest distance of two feet that are one, m.
-const SAME_PLACE_M: f64 = 1e-12;
+const SAME_PLACE_M: f64 = 1e-12; // largest distance of two feet that are one
 
 /// Moving joints of a leg from the trunk, the link of its foot, and the foot in that link's frame.
 pub(super) struct Limb {
@@ -21,12 +20,10 @@ pub(super) struct Limb {
 pub(super) struct Legs {
     pub legs: Vec<Limb>,
     pub top: usize,
-    /// The link whose frame is the body's.
-    pub trunk: usize,
+    pub trunk: usize, // its frame is the body's
 }
 
-/// Moving joints below a body as far as they are a chain, and whether nothing else follows.
-type Chain = (Vec<usize>, bool);
+type Chain = (Vec<usize>, bool); // moving joints below a body while they are a chain; whether nothing else follows
 
 impl Legs {
     /// Finds legs, or takes those that end at these feet.
@@ -91,15 +88,13 @@ pub(super) fn feet(list: &[String]) -> Result<Vec<(String, Vector3<f64>)>, Robot
     }
 }
 
-/// The uppermost link of the body: the root, or what a joint without bounds, or a chain of massless links such as
-/// `world`, has below it.
+/// The uppermost link of a body: the root, or the link below a joint without bounds or massless links such as `world`.
 fn top(tree: &Tree<'_>) -> usize {
     let (mut top, mut link) = (tree.root, tree.root);
     loop {
         let body = tree.body(link);
         let [only] = body.moving[..] else {
-            // A chain without an end that branches is a limb.
-            return if body.moving.is_empty() { top } else { link };
+            return if body.moving.is_empty() { top } else { link }; // a chain without an end that branches is a limb
         };
         let is_free = matches!(tree.joints[only].kind, "floating" | "planar");
         if !is_free && tree.mass(&body.links) > 0.0 {

@@ -1,8 +1,6 @@
-//! The legs of a URDF.
-//!
-//! `element` reads elements and attributes, `tree` links and joints, `limbs` finds trunk, legs and feet: a limb begins
-//! at a moving joint with fixed joints alone between it and the body. The body's frame is that of the trunk, the
-//! heaviest of the links that all four legs are below, wherever the root is.
+//! The legs of a URDF. `tree` reads elements, links and joints, `limbs` finds trunk, legs and feet: a limb begins at a
+//! moving joint with fixed joints alone between it and the body. The body's frame is that of the trunk, the heaviest of
+//! the links that all four legs are below, wherever the root is.
 
 mod limbs;
 mod tree;
@@ -15,8 +13,7 @@ use super::read::{RobotFileError, RobotOptions};
 use limbs::{Legs, Limb};
 use tree::{Element, Joint, Tree, document};
 
-/// Components of axes and positions that are rounding of zero or one.
-const ROUNDING: f64 = 1e-12;
+const ROUNDING: f64 = 1e-12; // components of axes and positions that are rounding of zero or one
 const ENDLESS_RAD: f64 = 2.0 * std::f64::consts::PI;
 const AXIS: std::ops::Range<f64> = 1e-6..1e6;
 

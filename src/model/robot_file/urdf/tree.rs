@@ -1,6 +1,4 @@
-//! Links and joints of a URDF as a tree.
-//!
-//! Elements of a URDF with their place: attributes as numbers, children that may be there once.
+//! Elements of a URDF with their place (attributes as numbers), and its links and joints as a tree.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,11 +22,9 @@ const KINDS: [&str; 6] = [
 pub(super) struct Link<'x> {
     pub element: Element<'x>,
     pub name: &'x str,
-    /// kg; 0 without an `<inertial>`.
-    pub mass_kg: f64,
+    pub mass_kg: f64, // kg; 0 without an `<inertial>`
     pub above: Option<usize>,
-    /// Joints below, in the file's order.
-    pub below: Vec<usize>,
+    pub below: Vec<usize>, // joints, in the file's order
 }
 
 pub(super) struct Joint<'x> {
@@ -37,15 +33,13 @@ pub(super) struct Joint<'x> {
     pub kind: &'x str,
     pub parent: usize,
     pub child: usize,
-    /// The child's frame in the parent's at the zero posture.
-    pub origin: (Vector3<f64>, Rotation3<f64>),
+    pub origin: (Vector3<f64>, Rotation3<f64>), // child's frame in the parent's at the zero posture
 }
 
 pub(super) struct Tree<'x> {
     pub file: &'x str,
     pub links: Vec<Link<'x>>,
     pub joints: Vec<Joint<'x>>,
-    /// The link without a joint above.
     pub root: usize,
 }
 
@@ -154,8 +148,7 @@ impl<'x> Tree<'x> {
 
     pub(crate) fn mass_below(&self, link: usize) -> f64 {
         let mut links = self.below(link, |_| true).links;
-        // In the file's order, so that the order of joints does not change the last digit.
-        links.sort_unstable();
+        links.sort_unstable(); // in the file's order, so that the order of joints does not change the last digit
         self.mass(&links)
     }
 
@@ -281,8 +274,7 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, Ro
         let place = Place::Character(at.row as usize, at.col as usize);
         RobotFileError::text(file, place, error.to_string())
     })?;
-    // Meshes and extensions of simulators may have signs of xacro in what romc does not read.
-    let mut unread_to = 0;
+    let mut unread_to = 0; // meshes and extensions of simulators may have signs of xacro in what romc does not read
     for node in document.descendants().filter(Node::is_element) {
         let name = node.tag_name();
         if UNREAD.contains(&name.name()) {

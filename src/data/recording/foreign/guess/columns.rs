@@ -22,7 +22,6 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// The words of the names that do not say which quantity it is.
     fn qualifiers(&self) -> impl Iterator<Item = &String> {
         self.family.iter().filter(|word| !is_quantity(word))
     }
@@ -192,15 +191,13 @@ fn of_robot(name: &str, robot: &Robot) -> Option<Reading> {
     let low = name.to_lowercase();
     let names = robot.joint_names().iter().map(|joint| joint.to_lowercase());
     let found = (names.enumerate()).filter(|(_, joint)| !joint.is_empty() && low.contains(joint));
-    // `joint_11` contains `joint_1`.
-    let (element, joint) = found.max_by_key(|(_, joint)| joint.len())?;
+    let (element, joint) = found.max_by_key(|(_, joint)| joint.len())?; // `joint_11` contains `joint_1`
     let (before, after) = low.split_once(&joint)?;
     let is_cut = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
     if is_cut(before.chars().next_back()) || is_cut(after.chars().next()) {
         return None;
     }
-    // The rest of the name as it would be of a joint that is known.
-    let reading = read(&format!("fr {before} {after} hx"))?;
+    let reading = read(&format!("fr {before} {after} hx"))?; // the rest as it would be of a joint that is known
     (reading.quantity.is_of_joints()).then_some(Reading { element, ..reading })
 }
 
@@ -252,8 +249,7 @@ pub(super) fn clock(logs: &[Log], groups: &[Group]) -> Option<Clock> {
     let channel = named.or_else(|| candidates().next())?;
     const UNITS: [&str; 4] = ["s", "ms", "us", "ns"];
     let told = unit(&channel.name, &["ms", "us", "ns", "s"]);
-    // Samples further apart show no jump.
-    let step = mean_step(channel)?;
+    let step = mean_step(channel)?; // samples further apart show no jump
     let is_possible = |unit: &&str| {
         let factor = Dimension::Time.factor(unit);
         factor.is_some_and(|factor| (2e-4..0.06).contains(&(factor * step)))

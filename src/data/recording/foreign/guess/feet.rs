@@ -2,8 +2,7 @@
 
 use nalgebra::DMatrix;
 
-/// Share of the way from no force to the largest at which a foot counts as down; half of it for up.
-const SHARE: f64 = 0.1;
+const SHARE: f64 = 0.1; // of the way from no force to the largest at which a foot counts as down; half of it for up
 const DEVIATIONS: f64 = 4.0; // times the deviation of a sensor in the air that a foot on the ground shows at least
 const BINS: usize = 64; // bins over the range of a sensor
 const VALLEY: f64 = 0.02; // share of the samples within a bin of where two groups are divided, at most
@@ -97,7 +96,6 @@ fn divided(sorted: &[f64], range: f64) -> Option<usize> {
         counts[((scaled(*value) * BINS as f64) as usize).min(BINS - 1)] += 1;
     }
     let total = sorted.len() as f64;
-    // Count of the values in bins, and mean bin.
     let moment = |bins: std::ops::Range<usize>| {
         let count: usize = counts[bins.clone()].iter().sum();
         let sum: usize = bins.map(|bin| bin * counts[bin]).sum();

@@ -1,5 +1,4 @@
 //! A first map for an unknown log: from the names of its columns, then checked and completed by its numbers.
-//!
 //! `names` says what a name means, `columns` sorts them into quantities; `scales` finds units, signs, axes and orders:
 //! `physics` tries them on the robot's geometry and weight, `feet` divides forces; `write` prints the map.
 
@@ -33,8 +32,7 @@ pub struct Guess {
     pub outcome: Result<usize, String>,
     /// Where other readings of the log fit as well, or none fits.
     pub notes: Vec<String>,
-    /// What names and numbers do not decide, for a log that is read without asking.
-    pub(crate) open: Vec<String>,
+    pub(crate) open: Vec<String>, // what names and numbers do not decide, for a log that is read without asking
 }
 
 /// Guesses the map of a text or MCAP file.

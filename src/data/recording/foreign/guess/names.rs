@@ -1,8 +1,6 @@
-//! What the name of a column says: leg, joint, axis, quantity, unit.
+//! What the name of a column says: leg, joint, axis, quantity, unit. Tables have words of many loggers in lower case.
 
 use super::super::elements::Quantity;
-
-// Words of many loggers, lower case, with blanks between them.
 
 /// Words for legs, in romc's order.
 const LEGS: [&str; 4] = [
@@ -36,8 +34,7 @@ const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date"
 #[derive(Debug, Clone)]
 pub(super) struct Reading {
     pub quantity: Quantity,
-    /// In romc's order; of a quaternion 0 is w. The number of elements for the last of those counted from 1.
-    pub element: usize,
+    pub element: usize, // romc's order, of a quaternion 0 is w; number of elements for the last of those counted from 1
     pub is_quaternion: bool,
     pub is_counted: bool,
     pub family: String,
@@ -101,8 +98,7 @@ pub(super) fn unit(name: &str, units: &[&'static str]) -> Option<&'static str> {
     units.iter().find(is_told).copied()
 }
 
-/// The quantity, the element, whether that is one of a quaternion, and whether it was counted.
-type Meaning = (Quantity, usize, bool, bool);
+type Meaning = (Quantity, usize, bool, bool); // quantity, element, whether of a quaternion, whether counted
 
 pub(super) fn read(name: &str) -> Option<Reading> {
     let words = Name::of(name);

@@ -1,6 +1,5 @@
-//! Units, order and signs under which feet on the ground stay where they are, and signs and unit of torques under which
-//! the feet carry the body, tried on one recording that is read without scales; and under which a velocity is the
-//! derivative of its position.
+//! Units, order and signs under which feet on the ground stay in place, and signs and unit of torques under which they
+//! carry the body, tried on one recording read without scales; scales under which velocities are derivatives.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -15,23 +14,18 @@ use crate::robot::input_rule::rotation;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 const MOST: (usize, usize) = (40, 24); // most stances of a leg, and most samples of a stance, that are looked at
-/// Distance, m, that a joint outside of its limits counts as, and the same for each sign that is not the first choice.
-const OUTSIDE_M: f64 = 4e-3;
-const TURNED_M: f64 = 1e-4;
-/// Share of a figure, and its difference in m, by which another reading has to be better than a plainer one.
-const BETTER: (f64, f64) = (0.75, 5e-4);
+const OUTSIDE_M: f64 = 4e-3; // that a joint outside of its limits counts as
+const TURNED_M: f64 = 1e-4; // that each sign other than the first choice counts as
+const BETTER: (f64, f64) = (0.75, 5e-4); // share and difference, m, by which a reading has to beat a plainer one
 const LEAST_MOTION_M: f64 = 3e-3; // least movement of feet on stiff legs that shows anything, m
 const BLOCK_S: f64 = 0.08; // length of the times over which forces and changes of velocity are summed, s
-/// Share of what torques leave unexplained by which other signs have to be better than one sign for all.
-const OTHER_SIGNS: f64 = 0.5;
+const OTHER_SIGNS: f64 = 0.5; // share of the unexplained by which other signs have to be better than one sign for all
 const UNCARRIED: f64 = 0.8; // share of weight and change of velocity that torques may leave unexplained
-/// Slope of the hips' torques over what holds the feet on their side that decides their sign.
-const HIP_SHARE: f64 = 0.3;
+const HIP_SHARE: f64 = 0.3; // slope of the hips' torques over what holds the feet on their side that decides their sign
 const FITS_M: f64 = 0.05; // largest movement of feet on the ground in a reading that fits, m
 
 pub(super) type NamedUnit = (&'static str, f64);
-/// Sign of each joint's torque in romc's order, and their unit.
-pub(super) type Torques = ([f64; JOINT_DIM], NamedUnit);
+pub(super) type Torques = ([f64; JOINT_DIM], NamedUnit); // sign of each joint's torque in romc's order, and their unit
 
 /// How columns are read: units, whether joints are grouped by their kind, and signs in romc's order.
 #[derive(Debug, Clone)]
@@ -152,8 +146,7 @@ impl<'a> View<'a> {
             let turned = whole[best ^ (1 << kind)];
             whole[best] < BETTER.0 * turned && whole[best] + BETTER.1 < turned
         });
-        // A sign that they do not show is the plain one.
-        let shown_kinds = (0..3).filter(|kind| reading.shown[*kind]);
+        let shown_kinds = (0..3).filter(|kind| reading.shown[*kind]); // a sign that they do not show is the plain one
         let common = shown_kinds.fold(0, |code, kind| code | best & (1 << kind));
         let mut codes = [common; 4];
         reading.slip_m = whole[common];

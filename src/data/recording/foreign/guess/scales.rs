@@ -25,8 +25,7 @@ const ANGLE: [(&str, f64); 3] = [
 const LENGTHS: [&str; 3] = ["m", "cm", "mm"];
 const PITCH_RAD: f64 = 1.6; // largest pitch for which radians are the first choice
 
-/// A way to read the trunk's attitude: its lines, and roll, pitch and yaw.
-type Attitude = (Vec<String>, DMatrix<f64>);
+type Attitude = (Vec<String>, DMatrix<f64>); // a way to read the trunk's attitude: its lines, and roll, pitch and yaw
 
 impl Source<'_> {
     /// Lines of each quantity, the order of the joints' columns, if they are counted and grouped by kind, and notes.
@@ -185,7 +184,6 @@ impl Source<'_> {
         if is_degrees { "deg" } else { "rad" }
     }
 
-    /// Signs by the limits of the joints, where nothing else shows them.
     fn by_limits(&self, position: NamedUnit, joint: NamedUnit) -> Reading {
         let mut reading = Reading::plain(position, joint, false);
         let values = self.raw_of(Quantity::JointPosition) * joint.1;
@@ -285,7 +283,6 @@ impl Source<'_> {
         self.velocity(velocity, of, &[Frame::World, Frame::Body], turned, lines);
     }
 
-    /// Lines of a velocity of the trunk, whose positions have this group and these values.
     fn velocity(
         &self,
         (velocity, units): (Quantity, &[NamedUnit]),

@@ -19,7 +19,6 @@ use crate::robot::Robot;
 
 pub(super) type Lines = BTreeMap<Quantity, Vec<String>>;
 
-/// The guessed map of logs, and what reading by it gives.
 pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
     let groups = groups(logs, robot);
     let clock = clock(logs, &groups);
@@ -74,7 +73,6 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
     }
 }
 
-/// The clock of all tables.
 fn time(logs: &[Log], groups: &[Group], clock: Option<&Clock>) -> String {
     let step = "# sample_time_s = 0.001";
     match clock {
@@ -87,8 +85,7 @@ fn time(logs: &[Log], groups: &[Group], clock: Option<&Clock>) -> String {
 }
 
 fn quoted(name: &str) -> String {
-    // JSON escapes as TOML's basic strings do.
-    serde_json::Value::from(name).to_string()
+    serde_json::Value::from(name).to_string() // JSON escapes as TOML's basic strings do
 }
 
 pub(super) struct Source<'a> {
@@ -113,7 +110,6 @@ impl Source<'_> {
         &self.logs[group.log].columns[group.columns[0]].name
     }
 
-    /// The unit in the names of a group.
     pub(crate) fn told(&self, group: &Group, units: &[&'static str]) -> Option<&'static str> {
         unit(self.first_name(group), units)
     }
