@@ -6,10 +6,10 @@ use super::simplification::RESTART_S;
 use super::*;
 use crate::deploy::{self, EmitOptions, Target};
 use crate::equations::Equations;
-use crate::evaluate::{Assessment, verdict};
+use crate::evaluate::{Assessment, Verdict, verdict};
 use crate::report::{
-    Content, assessment_json, baseline_table, control_table, failed_runs, failures, run_table,
-    verdict_lines,
+    Content, NamedRun, assessment_json, baseline_table, control_table, failed_runs, failures,
+    run_table, verdict_lines,
 };
 use crate::simplify::Tolerance;
 use crate::train::sha256;
@@ -66,24 +66,14 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let self_test = self_test(&model, folder);
     progress.finish_and_clear();
 
-    let mut text = format!(
-        "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n{}\n{}\n{}",
-        MODEL.0,
-        jumps.len(),
-        baseline_table(&evaluation),
-        control_table(&control[0]),
-        run_table(&control[0])
-    );
     let failed: Vec<String> = control.iter().flat_map(|runs| failed_runs(runs)).collect();
-    text += &lines("FAILED along ", failures(&control[0]).iter().chain(&failed));
-    text += &verdict_lines(&verdict);
+    let mut text = figures(&evaluation, &control[0], &failed, &verdict);
     let is_failed = !failed.is_empty() || self_test.is_err() || verdict.fails_predictions();
     let self_test = self_test.unwrap_or_else(|reason| format!("FAILED: {reason}"));
     let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
     let _ = writeln!(text, "made in {}:", folder.display());
-    let sizes = files.iter();
-    let sizes = sizes.map(|file| format!("{} ({} bytes)", file.path, file.contents.len()));
-    text += &lines("  ", sizes);
+    let size = |file: &EmittedFile| format!("{} ({} bytes)", file.path, file.contents.len());
+    text += &lines("  ", files.iter().map(size));
     let json = json!({
         "model": MODEL.0,
         "rollouts": assessment_json(&model, &evaluation),
@@ -97,6 +87,25 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
         "files": names(&made),
     });
     Ok(Answer::new(text, json).failed_if(is_failed))
+}
+
+/// What is printed of the rollouts and of the controller.
+fn figures(
+    evaluation: &Assessment,
+    runs: &[NamedRun],
+    failed: &[String],
+    verdict: &Verdict,
+) -> String {
+    let mut text = format!(
+        "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n{}\n{}\n{}",
+        MODEL.0,
+        JUMPS.len(),
+        baseline_table(evaluation),
+        control_table(runs),
+        run_table(runs)
+    );
+    text += &lines("FAILED along ", failures(runs).iter().chain(failed));
+    text + &verdict_lines(verdict)
 }
 
 /// Compiles the emitted C with the machine's compiler and runs its self-test: what became of it, or why it failed.

@@ -77,6 +77,8 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error>
 
 const PATTERN_WIDTH: usize = 120;
 const DOMINANT: usize = 4;
+const LATENT_ONLY: &str =
+    "latent-only: no encoder, so it says nothing about a robot's coordinates\n";
 
 fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     let (equations, file) = (Equations::of(model), path.display().to_string());
@@ -90,12 +92,6 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     text += &lines("  ", description);
     text += &input_rule(model);
     let coefficients = equations.terms().len() * equations.latent_dim();
-    let table = Table::of(equations.phases())
-        .column("phase", "", |phase| &phase.name)
-        .column("feet", "", |phase| phase.feet.to_string())
-        .column("active terms", "", |phase| phase.active_count())
-        .column("of", "", |_| coefficients)
-        .table();
     let phases = equations.phases().iter().map(|phase| {
         json!({
             "name": phase.name,
@@ -105,6 +101,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         })
     });
     let phases: Vec<Value> = phases.collect();
+    let table = phase_table(&equations, coefficients);
     text += &format!("\n{table}\n{}", exact_words(&equations));
     if equations.terms().len() <= PATTERN_WIDTH {
         text.extend((0..phases.len()).map(|phase| pattern(&equations, phase)));
@@ -115,9 +112,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     text += &match (&dominant, &encoder) {
         (Some(dominant), _) => composition(dominant),
         (None, Some(_)) => lines("  encoder ", &encoder) + &lines("  decoder ", &decoder),
-        (None, None) => {
-            "latent-only: no encoder, so it says nothing about a robot's coordinates\n".to_owned()
-        }
+        (None, None) => LATENT_ONLY.to_owned(),
     };
     let invariance = Invariance::of(model).unwrap_or_else(|error| {
         note(&format!("{file}: invariance is not told: {error}"));
@@ -146,6 +141,15 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         "provenance": model.provenance(),
     });
     Answer::new(text, json)
+}
+
+fn phase_table(equations: &Equations<'_>, coefficients: usize) -> Table {
+    Table::of(equations.phases())
+        .column("phase", "", |phase| &phase.name)
+        .column("feet", "", |phase| phase.feet.to_string())
+        .column("active terms", "", |phase| phase.active_count())
+        .column("of", "", |_| coefficients)
+        .table()
 }
 
 type Dominant = Vec<Vec<(String, f64)>>;

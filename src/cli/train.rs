@@ -35,12 +35,8 @@ pub(super) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
     read?;
     let [training, validation, test] = recorded.sets.each_ref().map(|set| &set.recordings[..]);
     let sets = Recordings::new(training, validation);
-    let files = arguments.recordings.iter().chain(&arguments.validation);
     let command = command_line(arguments, &settings, method, &options);
-    let mut origin = Origin::new(command, files);
-    for file in &mut origin.recordings {
-        file.sets = recorded.sets_of(&file.path);
-    }
+    let origin = origin(arguments, command, &recorded);
 
     let bar = spinner("training");
     let mut listener = |progress: Progress| match progress {
@@ -75,6 +71,15 @@ pub(super) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
         answer.code = INTERRUPTED_CODE;
     }
     Ok(answer)
+}
+
+fn origin(arguments: &TrainArguments, command: String, recorded: &RecordedSets) -> Origin {
+    let files = arguments.recordings.iter().chain(&arguments.validation);
+    let mut origin = Origin::new(command, files);
+    for file in &mut origin.recordings {
+        file.sets = recorded.sets_of(&file.path);
+    }
+    origin
 }
 
 const INTERRUPTED_TEXT: &str = "\ninterrupted by Ctrl-C: the model is the best until then, and the command in its provenance, which says so, does not give it again\n";

@@ -313,7 +313,7 @@ fn sigmoid(a: Number) -> (Number, Number) {
     (value, value * (1.0 - value))
 }
 
-/// `a Phi(a)` and `Phi(a) + a phi(a)`, as in `model/activation.rs`.
+/// `a Phi(a)` and `Phi(a) + a phi(a)`.
 fn gelu(a: Number) -> (Number, Number) {
     let x = std::f64::consts::FRAC_1_SQRT_2 * a.abs();
     let t = 2.0 / (2.0 + x);

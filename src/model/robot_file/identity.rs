@@ -117,21 +117,8 @@ fn doubts(robot: &Robot) -> Vec<String> {
             what(first)
         ))
     };
-    let hips = Leg::ALL.map(|leg| robot.hip_position(leg));
-    let middle = hips.iter().sum::<Vector3<f64>>() / hips.len() as f64;
-    let reach = hips
-        .iter()
-        .map(|hip| (hip - middle).norm())
-        .fold(0.0, f64::max);
-    let far = (middle.norm() > reach).then(|| {
-        let [x, y, z] = middle.map(|v| (1e3 * v).round() / 1e3).into();
-        format!(
-            "the middle of the hips is at {x} {y} {z} m, beyond the legs: recordings have to have the position of that \
-             frame's origin, not of the trunk"
-        )
-    });
     let found = [
-        far,
+        far_hips(robot),
         note(&|joint| share(joint) > *TORQUE_SHARE.end(), &|joint| {
             format!(
                 "a largest torque of {} N m, {:.0} times the robot's weight on a stretched leg; commands stay \
@@ -161,6 +148,22 @@ fn doubts(robot: &Robot) -> Vec<String> {
         }),
     ];
     found.into_iter().flatten().collect()
+}
+
+fn far_hips(robot: &Robot) -> Option<String> {
+    let hips = Leg::ALL.map(|leg| robot.hip_position(leg));
+    let middle = hips.iter().sum::<Vector3<f64>>() / hips.len() as f64;
+    let reach = hips
+        .iter()
+        .map(|hip| (hip - middle).norm())
+        .fold(0.0, f64::max);
+    (middle.norm() > reach).then(|| {
+        let [x, y, z] = middle.map(|v| (1e3 * v).round() / 1e3).into();
+        format!(
+            "the middle of the hips is at {x} {y} {z} m, beyond the legs: recordings have to have the position of that \
+             frame's origin, not of the trunk"
+        )
+    })
 }
 
 /// A robot as files describe it, its legs in any order.
