@@ -77,10 +77,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
     let json = json!({
         "model": MODEL.0,
         "rollouts": assessment_json(&model, &evaluation),
-        "mpc": {
-            "transpose": mpc::runs_json(&control[0]),
-            "consistent": mpc::runs_json(&control[1]),
-        },
+        "mpc": {"transpose": mpc::runs_json(&control[0]), "consistent": mpc::runs_json(&control[1])},
         "self_test": self_test,
         "verdict": verdict,
         "failed": failed,

@@ -93,12 +93,8 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     text += &input_rule(model);
     let coefficients = equations.terms().len() * equations.latent_dim();
     let phases = equations.phases().iter().map(|phase| {
-        json!({
-            "name": phase.name,
-            "feet": phase.feet.to_string(),
-            "active_terms": phase.active_count(),
-            "coefficients": coefficients,
-        })
+        let (feet, active) = (phase.feet.to_string(), phase.active_count());
+        json!({"name": phase.name, "feet": feet, "active_terms": active, "coefficients": coefficients})
     });
     let phases: Vec<Value> = phases.collect();
     let table = phase_table(&equations, coefficients);

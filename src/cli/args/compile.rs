@@ -41,6 +41,7 @@ pub(crate) struct CompileArguments {
     pub force: Overwrite,
 }
 
+/// Units of coordinates and inputs in equations and generated code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum UnitsChoice {
     /// rad, m, N m, N
@@ -53,7 +54,7 @@ pub enum UnitsChoice {
 }
 
 impl UnitsChoice {
-    pub fn of_interface(self) -> Units {
+    pub(crate) fn of_interface(self) -> Units {
         match self {
             Self::Si | Self::Physical => Units::Si,
             Self::Scaled => Units::Scaled,

@@ -11,6 +11,7 @@ use crate::import::Format;
 use crate::mpc::Lift;
 
 impl Arguments {
+    /// Refuses a flag that has no effect beside the others.
     pub fn refuse_idle(&self) -> Result<(), Error> {
         match &self.command {
             Command::Compile(arguments) => of_compile(arguments),
