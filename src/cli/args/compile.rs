@@ -54,7 +54,8 @@ pub enum UnitsChoice {
 }
 
 impl UnitsChoice {
-    pub(crate) fn of_interface(self) -> Units {
+    /// Units at the interface of functions.
+    pub fn of_interface(self) -> Units {
         match self {
             Self::Si | Self::Physical => Units::Si,
             Self::Scaled => Units::Scaled,
