@@ -8,7 +8,6 @@ mod check;
 mod compile;
 mod convert;
 mod demo;
-mod destination;
 mod identify;
 mod import;
 mod inspect;
@@ -18,6 +17,7 @@ mod plan;
 mod prepared_recordings;
 mod report;
 mod robot;
+mod shared;
 mod simplification;
 mod simulate;
 mod study;
@@ -43,8 +43,8 @@ use crate::typeset::words::counted;
 use crate::typeset::{Cell, Table, significant};
 use crate::{Error, artifact};
 use args::*;
-use destination::*;
-use destination::{Format, Inputs};
+use shared::*;
+use shared::{Format, Inputs};
 
 #[derive(Debug, Clone)]
 pub(crate) struct Answer {

@@ -267,13 +267,9 @@ mod tests {
         let jumps = [recording::read(&folder.join("test_01.csv.gz")).expect("shipped")];
         let note = |x: Option<f64>, z: f64| {
             let metrics = SetMetrics {
-                decoder_mse: 0.0,
-                ddz_r2: Vec::new(),
-                torque_r2: 1.0,
-                prediction_x_m: 0.0,
-                prediction_z_m: 0.0,
                 rollout_x_m: x,
                 rollout_z_m: Some(z),
+                ..SetMetrics::default()
             };
             whole_jump_note(&metrics, "validation", &jumps)
         };

@@ -246,7 +246,8 @@ impl ImportOptions {
             "--scaling" => self.scaling.is_some(),
             "--input-scaling" => self.input_scaling.is_some(),
             "--order" => self.order.is_some(),
-            _ => self.robot.is_some(),
+            "--robot" => self.robot.is_some(),
+            other => unreachable!("{other} is no option of a table of this module"),
         };
         options.iter().find(is_given).copied()
     }

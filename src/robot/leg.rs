@@ -236,7 +236,7 @@ pub(crate) fn write_force_map(
 }
 
 /// Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false
-/// if they are not finite.
+/// if the torques are not finite or the leg has no force map. The angles must be finite.
 pub(crate) fn add_wrench(
     leg: &LegShape,
     hip: &[Real],

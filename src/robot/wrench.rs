@@ -86,7 +86,9 @@ impl Robot {
                 WrenchFrame::Body => [0.0; 3],
                 WrenchFrame::World => self.hip_position_m[leg.index()],
             };
-            add_wrench(shape, &hip, &q, &tau, &mut wrench);
+            if !add_wrench(shape, &hip, &q, &tau, &mut wrench) {
+                self.foot_force_map(leg, &q)?; // says why the leg has none
+            }
         }
         Ok(wrench.into())
     }

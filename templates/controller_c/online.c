@@ -1019,7 +1019,7 @@ static inline MAYBE_UNUSED void online_write_moment(const real *hip, const real 
 }
 
 /* Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false
- * if they are not finite. */
+ * if the torques are not finite or the leg has no force map. The angles must be finite. */
 static inline MAYBE_UNUSED bool online_add_wrench(const online_leg_shape *leg, const real *hip, const real *q,
         const real *torque, real *restrict wrench)
 {

@@ -8,7 +8,7 @@ use clap::builder::{
 use clap::{Args, ValueEnum as _};
 
 use super::train::Finite;
-use crate::cli::destination::quoted;
+use crate::cli::shared::quoted;
 use crate::files::Overwrite;
 use crate::limits::Range;
 use crate::recording::Clocks;

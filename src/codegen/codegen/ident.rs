@@ -26,7 +26,7 @@ pub(crate) struct Namer {
 }
 
 impl Namer {
-    /// A scope in which functions and the words of the target are taken, which are a text with blanks between them.
+    /// A scope in which names of functions are taken, and the `reserved` words of the target, separated by blanks.
     pub(crate) fn new(reserved: &str) -> Self {
         let used = reserved.split_whitespace().chain(FUNCTIONS);
         let used = used.map(str::to_owned).collect();

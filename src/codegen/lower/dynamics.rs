@@ -125,7 +125,8 @@ fn with_derivatives(
     Ok((builder.finish()?, pattern))
 }
 
-/// In nested form: what a variable was taken out of in an acceleration is a part of its derivative by that variable.
+/// Accelerations and Jacobian in nested form: the factor that multiplies a variable in an acceleration is a part of the
+/// derivative by that variable.
 fn nested(
     pool: &mut ExprPool,
     equations: &[Combination],

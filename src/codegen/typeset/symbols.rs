@@ -183,7 +183,7 @@ pub struct PrintOptions {
     /// two-column paper. `None` is 32 for LaTeX and 44 for other pages.
     pub width_em: Option<f64>,
     pub symbols: SymbolTable,
-    /// Digest of the model file, for the first line of each file.
+    /// Digest of the model file; the first line of every emitted file names it.
     pub digest: Option<String>,
     pub numbers: NumberStyle,
     pub form: Form,

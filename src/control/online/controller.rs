@@ -217,8 +217,8 @@ impl Controller {
         self.effectiveness = Effectiveness::full(self.plant.latent_dim());
     }
 
-    /// Prepares the step at a time ahead, for the feet of the reference then: stages and, with the Riccati solver,
-    /// gains. The command is the same to the bit either way, to rounding after a refused measurement or an early change
+    /// Prepares the step at `time_s`, with the contacts that the reference has at that time: stages and, with the Riccati
+    /// solver, gains. The command is the same to the bit either way, to rounding after a refused measurement or an early change
     /// of feet. For times when nothing waits for a command; does nothing without a reference, or about the last plan.
     pub fn prepare(&mut self, time_s: f64) {
         let Some(reference) = &self.reference else {

@@ -89,7 +89,7 @@ impl Horizon {
         }
     }
 
-    /// Writes what a solve starts from: the measured state, and the input of the command before.
+    /// Sets the initial state of the program, the measured one, and the input of the last command.
     pub(super) fn begin(
         &mut self,
         (measured, deviation): (&[f64], &[f64]),

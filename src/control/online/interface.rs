@@ -180,7 +180,7 @@ impl<const D: usize> Handle<D> {
             };
             guarded(|| self.controller.set_reference(samples))
         };
-        let code = take().err().unwrap_or_default();
+        let code = take().err().unwrap_or(0); // 0 without a fault
         self.is_broken = code == INTERNAL || self.is_broken && code != 0;
         code
     }

@@ -36,7 +36,8 @@
 //!
 //! A row is superfluous if no point that satisfies the other rows violates it by more than a margin, which a linear
 //! program decides: maximise `row · v` subject to the others, with the row itself relaxed so that the maximum exists. The
-//! margin matters: left and right legs have nearly equal rows, of which each cuts a sliver off what the other allows.
+//! margin matters: left and right legs have nearly equal rows, each of which alone excludes a thin part of the
+//! region that the other allows.
 
 use nalgebra::{DMatrix, DVector};
 

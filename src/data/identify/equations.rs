@@ -265,7 +265,7 @@ pub struct LegFrame {
 
 #[derive(Debug, Clone)]
 pub struct Motion {
-    pub attitude: Vec<Matrix3<f64>>,   // trunk to world, one a sample
+    pub attitude: Vec<Matrix3<f64>>, // rotation from trunk to world at each sample
     pub trunk_rate: Vec<Vector3<f64>>, // angular velocity of the trunk in the world, rad/s
     pub legs: Vec<[LegFrame; 4]>,
     pub coordinates: DMatrix<f64>, // accelerations of the recorded coordinates, 18 x n, per s^2
@@ -356,6 +356,7 @@ fn leg_frame(
     let hip = attitude * turn(links.abduction, q[0]);
     let thigh = hip * turn(links.flexion, q[1]);
     let calf = thigh * turn(links.flexion, q[2]);
+    // A hip link without a length has no direction.
     let [along_hip, along_thigh, along_calf] = [links.hip, links.thigh, links.calf]
         .map(|link| link.try_normalize(0.0).unwrap_or_default());
     // The body's front, whichever way the axis of a leg turns: the four legs share what is in front of their links.

@@ -187,7 +187,7 @@ impl Iteration {
     }
 
     fn normal(&self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Normal {
-        let mut normal = (self.normals(rows, mass_kg, |_| 0, 1).next()).unwrap_or_default();
+        let mut normal = (self.normals(rows, mass_kg, |_| 0, 1).next()).expect("one group");
         for prior in priors {
             let weight = (mass_kg / prior.deviation).powi(2);
             for (i, a) in &prior.terms {

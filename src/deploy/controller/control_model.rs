@@ -102,7 +102,7 @@ fn robot_text(robot: &Robot) -> String {
     format!("Robot {{\n{}}}", fields.concat())
 }
 
-/// A setting in generated files; `upper` is the model's name in capitals.
+/// A setting in generated files.
 pub(in crate::deploy) struct SettingText {
     pub(in crate::deploy) setting: &'static Setting,
     pub(in crate::deploy) default: f64,

@@ -143,9 +143,11 @@ impl<'a> Judge<'a> {
         let scaled = squares.iter().zip(&self.scales[kind]);
         let sum: f64 = scaled.map(|(square, scale)| square * scale * scale).sum();
         let error = (sum / squares.len().max(1) as f64).sqrt();
-        Some(error)
-            .filter(|error| error.is_finite())
-            .unwrap_or(f64::INFINITY)
+        if error.is_finite() {
+            error
+        } else {
+            f64::INFINITY
+        }
     }
 
     fn mean_squares(&self, xi: &[Xi], kind: usize) -> Vec<f64> {

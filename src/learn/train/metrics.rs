@@ -19,7 +19,7 @@ pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5]; // pla
 const SHORT_S: f64 = 0.1;
 const SMOOTHING: usize = 11; // samples, of the accelerations behind `ddz_r2`
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SetMetrics {
     /// Mean square of `x - decode(encode(x))` over samples and coordinates, scaled units.
     pub decoder_mse: f64,

@@ -90,8 +90,20 @@ fn with_finite_coefficients((mut report, fitted): (SeedReport, Fitted)) -> Outco
 }
 
 fn is_of_one_seed(error: &TrainError) -> bool {
-    use TrainError::{Model, NoStableModel, TermValue};
-    matches!(error, NoStableModel { .. } | TermValue { .. } | Model(_))
+    match error {
+        TrainError::NoStableModel { .. } | TrainError::TermValue { .. } | TrainError::Model(_) => {
+            true
+        }
+        TrainError::NoRecording
+        | TrainError::Split { .. }
+        | TrainError::TooFewSamples { .. }
+        | TrainError::PhaseSamples { .. }
+        | TrainError::LatentDim { .. }
+        | TrainError::Option { .. }
+        | TrainError::Range(_)
+        | TrainError::Cancelled
+        | TrainError::Recording(_) => false,
+    }
 }
 
 type Run<'a> = (&'a DMatrix<f64>, &'a [Xi]); // encoder weights, Xi of every phase
@@ -185,8 +197,70 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use nalgebra::DVector;
+
     use super::*;
-    use crate::model::{LibraryChoice, StandardLibrary};
+    use crate::model::{AffineMap, LibraryChoice, StandardLibrary};
+    use crate::train::metrics::SetMetrics;
+    use crate::train::progress::Progress;
+    use crate::train::task::Maps;
+
+    fn outcome(score: f64, coefficient: f64) -> Outcome {
+        let report = SeedReport {
+            seed: 1,
+            score,
+            losses: None,
+            active: 1,
+            dominant: Vec::new(),
+            judged: SetMetrics::default(),
+        };
+        let weights = DMatrix::identity(2, 2);
+        let map = AffineMap::new("map", weights.clone(), DVector::zeros(2)).expect("finite");
+        let maps = Maps {
+            decoder: map.clone().into(),
+            encoder: map.into(),
+            weights,
+            training: Vec::new(),
+            validation: Vec::new(),
+        };
+        let fitted = Fitted {
+            maps,
+            xi: vec![DMatrix::from_element(7, 2, coefficient)],
+            choice: None,
+            score: 0.0,
+        };
+        Ok((report, fitted))
+    }
+
+    #[test]
+    fn seeds_without_a_model_are_left_out_and_the_first_reason_is_kept() {
+        let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
+        let mut monitor = Monitor::new(&mut listener, &cancel);
+        let mut seeds = Seeds::default();
+        let outcomes = [
+            outcome(3.0, 1.0),
+            Err(TrainError::NoStableModel { candidates: 9 }),
+            outcome(-1.0, f64::NAN),
+            outcome(-f64::NAN, 1.0),
+            outcome(2.0, 1.0),
+        ];
+        for (seed, outcome) in outcomes.into_iter().enumerate() {
+            (seeds.add(seed as u64, outcome, &mut monitor)).expect("a fault of one seed");
+        }
+        let scores: Vec<f64> = (seeds.finished.iter())
+            .map(|(report, _)| report.score)
+            .collect();
+        assert_eq!(scores, [3.0, f64::INFINITY, 2.0]);
+        let failure = seeds.failure.as_ref();
+        assert!(matches!(
+            failure,
+            Some(TrainError::NoStableModel { candidates: 9 })
+        ));
+        let fault = seeds.add(5, Err(TrainError::Cancelled), &mut monitor);
+        assert!(matches!(fault, Err(TrainError::Cancelled)));
+    }
 
     #[test]
     fn exchanged_coordinates_overlap_fully_and_other_terms_do_not() {

@@ -418,4 +418,32 @@ mod tests {
         }
         assert!(found[0].len() < found[2].len() && found[2].len() < found[1].len());
     }
+
+    #[test]
+    fn gains_of_terms_are_what_a_fit_with_them_explains_more() {
+        let mut random = Random::new(6);
+        let (theta, target) = (random.matrix(100, 5, 1.0), random.matrix(100, 1, 1.0));
+        let regression = Regression::new(&theta, &target, Knowledge::nothing(5, 1));
+        let mut support = DMatrix::from_column_slice(5, 1, &[true, false, true, false, false]);
+        let gains = regression.gains(0, &support, 1e-2);
+        assert!(gains.iter().map(|(row, _)| *row).eq([1, 3, 4]));
+        // Taking a term out again loses what it gave.
+        support[(3, 0)] = true;
+        let losses = regression.losses(0, &support, 1e-2);
+        let (_, loss) = losses[2]; // of rows 0, 2 and 3
+        assert!((gains[1].1 - loss).abs() < 1e-12);
+    }
+
+    #[test]
+    fn no_term_is_left_of_an_elimination_of_everything_or_without_accelerations() {
+        let theta = Random::new(7).matrix(200, 4, 1.0);
+        let target = theta.columns(1, 1) * 30.0;
+        let left = |target: &DMatrix<f64>, pruning| {
+            let regression = Regression::new(&theta, target, Knowledge::nothing(4, 1));
+            active_terms(&regression.fit_each(1e-3, &[pruning], &[true; 4])[0])
+        };
+        assert_eq!(left(&target, Pruning::Elimination(2.0)), 0);
+        assert_eq!(left(&(&target * 0.0), Pruning::Threshold(0.03)), 0);
+        assert_eq!(left(&target, Pruning::Elimination(1e-6)), 1);
+    }
 }

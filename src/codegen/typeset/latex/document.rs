@@ -21,7 +21,7 @@ use crate::typeset::{
 /// The LaTeX files of a model; NAME is its identifier:
 ///
 /// - `NAME.tex`: the equations of each phase, below how rounding changed them; `NAME_PHASE.tex`: those of one phase;
-/// - `NAME-table.tex`: the coefficients as booktabs tables; `NAME-nomenclature.tex`: what the symbols mean;
+/// - `NAME-table.tex`: the coefficients as booktabs tables; `NAME-nomenclature.tex`: the list of symbols;
 /// - `NAME-robot.tex`, with encoder and decoder: the latent coordinates and robot accelerations in SI units;
 /// - `NAME-preview.tex`: a document that shows them all, in two columns for narrow equations.
 ///

@@ -298,7 +298,7 @@ fn is_plain(character: char) -> bool {
             .contains(character)
 }
 
-/// A name reduced to what a `\label` and a file name can hold: ASCII letters and digits, everything else a hyphen.
+/// A name for a `\label` or a file: ASCII letters and digits, any other character replaced by a hyphen.
 pub(crate) fn label(name: &str) -> String {
     name.chars()
         .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })

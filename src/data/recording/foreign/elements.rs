@@ -140,7 +140,7 @@ pub(super) fn named(word: &str, elements: &[&str]) -> Vec<usize> {
     }
     let of_letter = |letter: char| elements.iter().position(|e| e.starts_with(letter));
     let letters: Option<_> = word.chars().map(of_letter).collect();
-    letters.unwrap_or_default()
+    letters.unwrap_or_default() // none: the caller names the word and the elements
 }
 
 /// What a unit measures; rates and accelerations are the same per s and s^2.

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::loss::{Batch, JointLoss, Losses};
+use super::batch::Batch;
+use super::loss::{JointLoss, Losses};
 use super::parameters::Parameters;
 
 #[derive(Clone, Debug, PartialEq)]

@@ -6,14 +6,11 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use super::batch::Batch;
 use super::descent::Moved;
 use super::network::{Jacobians, Tape, add_transposed, dot, product};
 use super::parameters::{Frame, InputProjections, Parameters};
 use super::unroll::{Unroll, Window};
-use crate::recording::Recording;
-use crate::recording::preprocess::{BATCH_ROWS, moving_average, prepare};
-use crate::train::dataset::{Dataset, scaled};
-use crate::train::error::TrainError;
 use crate::train::features::{FeatureValues, Features};
 
 /// Weights of the terms of the loss (equation 20).
@@ -369,57 +366,6 @@ fn l1_subgradient(xi: &DMatrix<f64>, scale: f64, gradient: &mut DMatrix<f64>) ->
         }
     }
     xi.iter().map(|value| value.abs()).sum::<f64>() / xi.len() as f64
-}
-
-/// Consecutive samples of one phase, rows are samples, scaled units.
-pub(super) struct Batch {
-    pub phase: usize,
-    entering: DMatrix<f64>, // x, dx, ddx as they enter the encoder, 3n x 18
-    x: DMatrix<f64>,
-    ddx: DMatrix<f64>,
-    u: DMatrix<f64>,
-    step_s: f64,
-}
-
-impl Batch {
-    fn new(phase: usize, [x, dx, ddx, u]: [DMatrix<f64>; 4], step_s: f64, frame: &Frame) -> Self {
-        Self {
-            phase,
-            entering: frame.enter([&x, &dx, &ddx]),
-            x,
-            ddx,
-            u,
-            step_s,
-        }
-    }
-
-    fn samples(&self) -> usize {
-        self.x.nrows()
-    }
-}
-
-/// Batches of all phases of all recordings, in their order, with the phases, inputs, units and smoothing of `dataset`.
-pub(super) fn batches(
-    recordings: &[Recording],
-    dataset: &Dataset,
-    frame: &Frame,
-) -> Result<Vec<Batch>, TrainError> {
-    let mut out = Vec::new();
-    let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
-    for recording in recordings {
-        for (span, samples) in prepare(recording, &dataset.phases)? {
-            let u = scaled(samples.input(&dataset.rule)?, &dataset.scaling.input).transpose();
-            let ddx = state(moving_average(&samples.ddx, dataset.smoothing));
-            let all = [state(samples.x.clone()), state(samples.dx.clone()), ddx, u];
-            for start in (0..samples.len()).step_by(BATCH_ROWS) {
-                let cut = all
-                    .each_ref()
-                    .map(|rows| rows.rows(start, BATCH_ROWS).into_owned());
-                out.push(Batch::new(span.phase, cut, samples.mean_step_s(), frame));
-            }
-        }
-    }
-    Ok(out)
 }
 
 #[cfg(test)]

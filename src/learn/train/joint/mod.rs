@@ -3,6 +3,7 @@
 //! gradient), then `descent` (Adam, transfer steps of section IV-D) and [`joint`] (seeds, choice, assembly). Linear
 //! maps are networks of one layer.
 
+mod batch;
 mod descent;
 mod loss;
 mod network;

@@ -5,8 +5,9 @@ use std::sync::mpsc::{Sender, channel};
 
 use nalgebra::{DMatrix, DVector};
 
+use super::batch::{Batch, batches};
 use super::descent::{Listener, Moved, descend};
-use super::loss::{Batch, JointLoss, LossWeights, Losses, batches};
+use super::loss::{JointLoss, LossWeights, Losses};
 use super::parameters::{Frame, LatentBasis, Parameters, folded};
 use crate::model::{Layer, ModelError, StateMap};
 use crate::robot::{Robot, STATE_DIM};

@@ -41,7 +41,7 @@ pub(super) fn guessed(path: &Path, logs: &[Log], robot: &Robot) -> Guess {
     let mut open = Vec::new();
     for group in &sound {
         let key = group.quantity.key();
-        let scales = lines.remove(&group.quantity).unwrap_or_default();
+        let scales = lines.remove(&group.quantity).unwrap_or_default(); // none: SI units as they stand
         let lines = source.lines(group, order, scales).join("\n");
         text += &format!("\n[{key}]\n{lines}\n");
         if !group.others.is_empty() {
