@@ -6,7 +6,7 @@ mod definitions;
 mod known_system;
 mod outside;
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -88,6 +88,58 @@ fn closed_form_d4_meets_its_lines_on_jumps_it_never_saw() {
     assert!(test.torque_r2 >= 0.95, "{test:?}");
     assert_predictions(&test, [1.5, 2.5, 30.0, 25.0]);
     assert_eq!(report.encoded.len(), 15, "{:?}", report.encoded);
+}
+
+#[test]
+fn refinement_predicts_whole_jumps_better_and_terms_are_dropped_within_the_slack() {
+    let (training, validation) = (jumps("train", 6), jumps("validation", 2));
+    let told = RefCell::new(Vec::new());
+    let trained = |refinements, slack| {
+        let mut options = TrainOptions::new("d4", 4);
+        options.regression.refinements = refinements;
+        options.regression.slack = slack;
+        told.borrow_mut().clear();
+        let (cancel, mut listener) = (AtomicBool::new(false), |news| told.borrow_mut().push(news));
+        let recordings = Recordings::new(&training, &validation);
+        let origin = Origin::new("romc train", paths(&training));
+        let monitor = &mut Monitor::new(&mut listener, &cancel);
+        train::closed_form(recordings, go1(), &options, &origin, monitor).expect("trains")
+    };
+    let score = |trained: &Trained| trained.report.choice.as_ref().expect("chosen").score;
+    let whole_m = |trained: &Trained| {
+        let metrics = trained.report.validation.as_ref().expect("validated");
+        let both = [metrics.rollout_x_m, metrics.rollout_z_m].map(|error| error.expect("finite"));
+        both[0].hypot(both[1])
+    };
+    let usual = TrainOptions::new("d4", 4).regression;
+    let plain = trained(0, usual.slack);
+    let refined = trained(usual.refinements, 0.0);
+    assert!(score(&refined) < 0.95 * score(&plain));
+    assert!(whole_m(&refined) < 0.9 * whole_m(&plain));
+    for slack in [0.1, 0.5] {
+        trained(usual.refinements, slack);
+        // Scores of a stage's steps, relative to the first candidate's errors.
+        let scores_of = |name: &str| -> Vec<f64> {
+            let told = told.borrow();
+            let mut is_in = false;
+            let each = told.iter().filter_map(|news| match news {
+                Progress::Stage { name: own } => {
+                    is_in = own.ends_with(name);
+                    None
+                }
+                Progress::Done { text } => {
+                    text.strip_prefix("score ")?.parse().ok().filter(|_| is_in)
+                }
+            });
+            each.collect()
+        };
+        let refined = scores_of("by rollouts")
+            .into_iter()
+            .fold(f64::MAX, f64::min);
+        let dropped = scores_of("rollouts do not miss");
+        let rise = dropped.last().expect("terms dropped") / refined - 1.0;
+        assert!(0.0 < rise && rise <= slack + 1e-4, "{refined} {dropped:?}");
+    }
 }
 
 #[test]
