@@ -1,5 +1,5 @@
 //! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in. In: sources, a
-//! prefix for names, the functions that the C is for. Out: these, what they call, the types and constants that they
+//! prefix for names, the functions that the C is for or the C that calls them. Out: these, what they call, the types and constants that they
 //! need, with comments. `cargo run -p romc-translate` writes `templates/controller_c/`; `tests/controller_c.rs`
 //! compares it byte for byte. Read `function` first.
 //!
@@ -28,6 +28,7 @@ mod statement;
 mod text;
 mod types;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::{fmt, fs};
 
@@ -73,8 +74,8 @@ pub struct Unit<'a> {
     pub prefix: &'a str,
     /// Functions that the C is for, as `Type::function` or `function`.
     pub roots: &'a [&'a str],
-    /// Constants that whoever includes the C reads.
-    pub constants: &'a [&'a str],
+    /// C that includes it: the functions and constants that it names are needed as well.
+    pub users: &'a str,
     /// Structs that nothing changes, which are `const` wherever they are pointed to.
     pub fixed: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
@@ -108,8 +109,20 @@ pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Faul
     for root in unit.roots {
         writer.root(root)?;
     }
-    for name in unit.constants {
-        writer.constant(name);
+    let is_other = |letter: char| !letter.is_ascii_alphanumeric() && letter != '_';
+    let words = unit.users.split_inclusive(is_other);
+    let words: BTreeSet<&str> = words
+        .flat_map(|word| [word, word.trim_end_matches(is_other)])
+        .collect();
+    for ((owner, name), function) in &items.functions {
+        if words.contains(format!("{}(", items.name(&[owner, name])).as_str()) {
+            writer.function(owner, name, function, BTreeMap::new())?;
+        }
+    }
+    for name in items.constants.keys() {
+        if words.contains(items.constant_name(name).as_str()) {
+            writer.constant(name);
+        }
     }
     writer.finish(unit)
 }
@@ -128,13 +141,13 @@ fn file(root: &Path, path: String) -> Result<Source, Fault> {
     Ok(Source { path, text })
 }
 
-/// The sources of a folder of `src/control`.
-fn read(root: &Path, folder: &str) -> Result<Vec<Source>, Fault> {
-    let folder = format!("src/control/{folder}");
-    let entries = fs::read_dir(root.join(&folder)).map_err(|error| fault(&folder, error))?;
+/// The files of a folder whose names end so.
+fn read(root: &Path, folder: &str, end: &str) -> Result<Vec<Source>, Fault> {
+    let entries = fs::read_dir(root.join(folder)).map_err(|error| fault(folder, error))?;
     let names = entries.flatten().map(|entry| entry.file_name());
     let mut paths: Vec<String> = names
         .map(|name| format!("{folder}/{}", name.to_string_lossy()))
+        .filter(|path| path.ends_with(end))
         .collect();
     paths.sort();
     paths.into_iter().map(|path| file(root, path)).collect()
@@ -149,49 +162,15 @@ fn head(what: &str) -> String {
 
 /// The C of the structured solver and of the controller, as paths below the workspace's folder and texts.
 pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
-    let mut texts = solver_of(&read(root, "solver")?)?.to_vec();
+    let mut texts = solver_of(&read(root, "src/control/solver", ".rs")?)?.to_vec();
+    let templates = read(root, "templates/controller_c", ".askama")?;
+    let users: String = templates
+        .into_iter()
+        .map(|template| template.text)
+        .collect();
     let unit = Unit {
         prefix: "online",
-        roots: &[
-            "Trajectory::state_at",
-            "Trajectory::mean_input",
-            "Trajectory::write_deviations",
-            "Trajectory::comes_near",
-            "Trajectory::schedule",
-            "Trajectory::write_acceleration",
-            "LatentDynamics::step",
-            "LatentDynamics::write_gain",
-            "write_still",
-            "write_expected",
-            "add_correction",
-            "turn_force",
-            "scale_dynamics",
-            "write_pyramid",
-            "unscale",
-            "write_defect",
-            "clamped_torque",
-            "clamped_joint",
-            "Share::unknown",
-            "Share::update",
-            "write_torque",
-            "free_optimum",
-            "write_limits",
-            "write_foot",
-            "write_hessian",
-            "change_rows",
-            "add_wrench",
-            "write_force_map",
-            "write_world_axes",
-        ],
-        constants: &[
-            "CURVATURE",
-            "GAP",
-            "LIFT_ITERATIONS",
-            "MOST_TURN_RAD",
-            "POSTURE_SHARE",
-            "SLACK_PRICE",
-            "SOFTENED_FROM",
-        ],
+        users: &users,
         fixed: &["LegShape"],
         header: &["Share"],
         elsewhere: &[
@@ -201,8 +180,9 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             ("SQRT_HALF", "SQRT_HALF"),
         ],
         attribute: "MAYBE_UNUSED ",
+        ..Unit::default()
     };
-    let mut sources = read(root, "online")?;
+    let mut sources = read(root, "src/control/online", ".rs")?;
     sources.push(file(root, "src/robot/leg.rs".to_owned())?);
     let Translated { header, source } = translate(&sources, &unit)?;
     let state = head("state of the controller's own steps.") + &header;
