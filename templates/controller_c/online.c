@@ -8,6 +8,9 @@
 /* Smallest standard deviation against the largest of the same kind. */
 #define ONLINE_DEVIATION_FLOOR (real)1e-2
 
+/* Joint speed within which dry friction changes its sign, in rad/s. */
+#define ONLINE_DRY_SPEED_RAD_S (real)0.05
+
 /* Gap between primal and dual cost, relative to the cost, at which they end as well. */
 #define ONLINE_GAP (real)1e-8
 
@@ -25,7 +28,7 @@
 #define ONLINE_LIFT_ITERATIONS 60
 
 /* Most that legs are turned, rad. */
-#define ONLINE_MOST_TURN_RAD (real)0.3
+#define ONLINE_MOST_RAD (real)0.3
 
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
@@ -63,6 +66,20 @@
 
 /* Whether the feet are where the reference has them. */
 typedef enum { ONLINE_AS_SCHEDULED, ONLINE_EARLY, ONLINE_LATE, ONLINE_UNKNOWN } online_contact;
+
+/* What the controller does while it has no plan to trust. */
+typedef struct {
+    /* How many stages of the last good plan may be used after a failure. */
+    int plan_stages;
+    /* Time constant with which the feed-forward torque of a hold decays, s. */
+    real torque_decay_s;
+    /* Joint damping of a hold, N m s/rad, on measured joint velocities. */
+    real damping_nm_s;
+    /* Deviation from the prediction, in standard deviations of the reference, that is not believed at first. */
+    real jump_deviations;
+    /* How many steps in a row a measurement is disbelieved before it is taken for true. */
+    int jump_patience;
+} online_fallback_settings;
 
 /* Where a time is: the last sample at or before it, and how far it is on the way to the next one. */
 typedef struct {
@@ -300,7 +317,7 @@ static inline MAYBE_UNUSED real online_damped_reciprocal(real d, real least)
 {
     const real square = d * d;
     const real smallest = least * least;
-    return square > smallest ? d / square : d / smallest;
+    return d / (square > smallest ? square : smallest);
 }
 
 /* Writes -J^-T with damped levers. */
@@ -407,14 +424,21 @@ static inline MAYBE_UNUSED void online_change_rows(const real *hessian, const re
     }
 }
 
-static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
-{
-    return position >= lower ? (position > upper ? upper : position) : lower;
-}
-
+/* The torque within a limit that is nearest to this one; zero for what is not a number. */
 static inline MAYBE_UNUSED real online_clamped_torque(real torque, real limit)
 {
     return torque >= -limit ? (torque > limit ? limit : torque) : torque < 0 ? -limit : 0;
+}
+
+/* The first of these numbers that is infinite or undefined; count without one. */
+static inline MAYBE_UNUSED int online_first_undefined(const real *values, int count)
+{
+    for (int i = 0; i < count; ++i) {
+        if (!solver_is_finite_number(values[i])) {
+            return i;
+        }
+    }
+    return count;
 }
 
 /* Writes A and y_0; false if a number is not finite. wrench is G; matrices are row-major. */
@@ -466,6 +490,28 @@ static inline MAYBE_UNUSED bool online_free_optimum(const real *projection, cons
     return true;
 }
 
+/* Whether times are the same but for rounding. */
+static inline MAYBE_UNUSED bool online_is_same_time(double time_s, double other_s)
+{
+    const double off_s = time_s - other_s;
+    return off_s < ONLINE_TIME_TOLERANCE_S && off_s > -ONLINE_TIME_TOLERANCE_S;
+}
+
+/* b dq + c tanh(dq / v) + I ddq of a joint with these b, c and I, N m, at dq (rad/s) and ddq (rad/s^2). */
+static inline MAYBE_UNUSED real online_joint_loss(const real *of, real dq, real ddq)
+{
+    return of[0] * dq + of[1] * TANH(dq / ONLINE_DRY_SPEED_RAD_S) + of[2] * ddq;
+}
+
+/* Loss of a joint over a time, N m, at the mean of its velocities at both ends with their difference as acceleration; at
+ * most the limit. */
+static inline MAYBE_UNUSED real online_planned_loss(const real *of, real before, real after, real step_s, real limit)
+{
+    const real dq = (real)0.5 * (before + after);
+    const real ddq = (after - before) / step_s;
+    return online_clamped_torque(online_joint_loss(of, dq, ddq), limit);
+}
+
 /* Writes sigma^-1 A sigma and sigma^-1 B C_p of derivatives (A B), 2d x 3d; all row-major but C_p, lower triangular,
  * column by column. */
 static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *root, const real *deviation, int d,
@@ -503,6 +549,27 @@ static inline MAYBE_UNUSED real online_scale_row(const real *row, const real *ro
     return at_reference;
 }
 
+/* By how many of its stages a horizon that begins at a time moves on to begin at another: 0 unless they are whole. */
+static inline MAYBE_UNUSED int online_stages_between(double from_s, double to_s, double step_s, int horizon)
+{
+    const double passed = (to_s - from_s) / step_s;
+    const double whole = FLOOR(passed + 0.5);
+    const bool is_whole = online_is_same_time((passed - whole) * step_s, 0.0);
+    const bool is_within = is_whole && whole >= 1.0 && whole < (double)horizon;
+    return is_within ? (int)whole : 0;
+}
+
+/* Makes a defect that of a reference which is itself a trajectory: none about it, else less what nominal, the model's
+ * step from the reference, leaves of its end. */
+static inline MAYBE_UNUSED void online_trust_reference(bool is_about_plan, const real *nominal, const real *end,
+        int d, real *restrict defect)
+{
+    for (int i = 0; i < 2 * d; ++i) {
+        const real left = defect[i] + (end[i] - nominal[i]);
+        defect[i] = is_about_plan ? left : 0;
+    }
+}
+
 /* Writes the rows (mu F_z, F_x, F_y) of a force 3 x d turned by a rotation; both row-major. */
 static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *force, real coefficient, int d,
         real *restrict out)
@@ -514,6 +581,79 @@ static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const re
             sum += turned[1] * force[d + j];
             sum += turned[2] * force[2 * d + j];
             out[row * d + j] = row == 0 ? coefficient * sum : sum;
+        }
+    }
+}
+
+/* Turns the foot of a leg about the body's origin by the opposite of an error e of pitch (rad), to first order in the
+ * joints, q + J^-1 (R_y(-e) - 1) (h + p(q)) with the hip h; a foot that cannot be moved stays. */
+static inline MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, const real *hip, real error,
+        real *restrict q)
+{
+    real map[3][3] = {{0}};
+    real foot[3] = {0};
+    if (!online_write_force_map(leg, q, false, map, foot)) {
+        return;
+    }
+    const real most = error < 0 ? -ONLINE_MOST_RAD : ONLINE_MOST_RAD;
+    const real turn = solver_magnitude(error) > ONLINE_MOST_RAD ? most : error;
+    const real sine = SIN(turn);
+    const real shrunk = COS(turn) - 1;
+    const real x = hip[0] + foot[0];
+    const real z = hip[2] + foot[2];
+    const real forward = shrunk * x - sine * z;
+    const real up = sine * x + shrunk * z;
+    for (int j = 0; j < 3; ++j) {
+        /* The map is -J^-T. */
+        q[j] -= map[0][j] * forward + map[2][j] * up;
+    }
+}
+
+/* Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to
+ * the generalised moments of roll, pitch and yaw, which are the angles (rad). */
+static inline MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turned[restrict 3][3],
+        real rates[restrict 3][3])
+{
+    const real sr = SIN(attitude[0]);
+    const real cr = COS(attitude[0]);
+    const real sp = SIN(attitude[1]);
+    const real cp = COS(attitude[1]);
+    const real sy = SIN(attitude[2]);
+    const real cy = COS(attitude[2]);
+    turned[0][0] = cy * cp;
+    turned[0][1] = cy * sp * sr - sy * cr;
+    turned[0][2] = cy * sp * cr + sy * sr;
+    turned[1][0] = sy * cp;
+    turned[1][1] = sy * sp * sr + cy * cr;
+    turned[1][2] = sy * sp * cr - cy * sr;
+    turned[2][0] = -sp;
+    turned[2][1] = cp * sr;
+    turned[2][2] = cp * cr;
+    rates[0][0] = 1;
+    rates[0][1] = 0;
+    rates[0][2] = 0;
+    rates[1][0] = 0;
+    rates[1][1] = cr;
+    rates[1][2] = -sr;
+    for (int i = 0; i < 3; ++i) {
+        rates[2][i] = turned[2][i];
+    }
+}
+
+/* Turns count columns of forces and moments in the body's axes into generalised forces of position and of roll, pitch
+ * and yaw, the attitude (rad): [R F; E^T M] with the angular velocity E (d roll, d pitch, d yaw) in the body's axes. */
+static inline MAYBE_UNUSED void online_turn_to_world(const real *attitude, int count, real *restrict wrench)
+{
+    real turned[3][3] = {{0}};
+    real rates[3][3] = {{0}};
+    online_write_world_axes(attitude, turned, rates);
+    for (int j = 0; j < count; ++j) {
+        real f[3] = {wrench[j], wrench[count + j], wrench[2 * count + j]};
+        real m[3] = {wrench[3 * count + j], wrench[4 * count + j], wrench[5 * count + j]};
+        for (int i = 0; i < 3; ++i) {
+            wrench[i * count + j] = turned[i][0] * f[0] + turned[i][1] * f[1] + turned[i][2] * f[2];
+            const real moment = rates[i][0] * m[0] + rates[i][1] * m[1] + rates[i][2] * m[2];
+            wrench[(3 + i) * count + j] = moment;
         }
     }
 }
@@ -532,6 +672,23 @@ static inline MAYBE_UNUSED void online_unscale(const real *root, const real *dev
     for (int i = 0; i < 2 * d; ++i) {
         end[i] += deviation[i] * x[i];
     }
+}
+
+/* The larger of two numbers; the second if the first is not one. */
+static inline MAYBE_UNUSED real online_greater(real value, real other)
+{
+    return value > other ? value : other;
+}
+
+/* The largest violation of a limit by joint positions, in half ranges, or largest if that is more. */
+static inline MAYBE_UNUSED real online_violation(const real *q, const real *lower, const real *upper, real largest)
+{
+    real worst = largest;
+    for (int i = 0; i < 12; ++i) {
+        const real outside = online_greater(q[i] - upper[i], lower[i] - q[i]);
+        worst = online_greater(outside / ((real)0.5 * (upper[i] - lower[i])), worst);
+    }
+    return worst;
 }
 
 /* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that
@@ -634,12 +791,6 @@ static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const re
     }
 }
 
-/* The larger of two numbers; the second if the first is not one. */
-static inline MAYBE_UNUSED real online_greater(real value, real other)
-{
-    return value > other ? value : other;
-}
-
 /* Scale of (z, dz) for a trajectory that stands still: the change of each latent alone that moves some joint by
  * STILL_SHARE of half its range, and that change within STILL_TIME_S; decoder has d columns. */
 static inline MAYBE_UNUSED void online_write_still(const real *decoder, const real *lower, const real *upper, int d,
@@ -668,45 +819,43 @@ static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real
     }
 }
 
-/* Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to
- * the generalised moments of roll, pitch and yaw, which are the angles (rad). */
-static inline MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turned[restrict 3][3],
-        real rates[restrict 3][3])
+/* Writes force and moment on the body by each torque of a leg into its columns of a matrix of twelve; false if the leg
+ * has no force map. The angles must be finite. */
+static inline MAYBE_UNUSED bool online_write_wrench_map(const online_leg_shape *leg, const real *hip, const real *q,
+        real *restrict out)
 {
-    const real sr = SIN(attitude[0]);
-    const real cr = COS(attitude[0]);
-    const real sp = SIN(attitude[1]);
-    const real cp = COS(attitude[1]);
-    const real sy = SIN(attitude[2]);
-    const real cy = COS(attitude[2]);
-    turned[0][0] = cy * cp;
-    turned[0][1] = cy * sp * sr - sy * cr;
-    turned[0][2] = cy * sp * cr + sy * sr;
-    turned[1][0] = sy * cp;
-    turned[1][1] = sy * sp * sr + cy * cr;
-    turned[1][2] = sy * sp * cr - cy * sr;
-    turned[2][0] = -sp;
-    turned[2][1] = cp * sr;
-    turned[2][2] = cp * cr;
-    rates[0][0] = 1;
-    rates[0][1] = 0;
-    rates[0][2] = 0;
-    rates[1][0] = 0;
-    rates[1][1] = cr;
-    rates[1][2] = -sr;
-    for (int i = 0; i < 3; ++i) {
-        rates[2][i] = turned[2][i];
+    real map[3][3] = {{0}};
+    real arm[3] = {0};
+    if (!online_write_force_map(leg, q, false, map, arm)) {
+        return false;
     }
+    for (int j = 0; j < 3; ++j) {
+        real force[3] = {map[0][j], map[1][j], map[2][j]};
+        real moment[3] = {0};
+        online_write_moment(hip, arm, force, moment);
+        for (int i = 0; i < 3; ++i) {
+            out[12 * i + j] = force[i];
+            out[12 * (3 + i) + j] = moment[i];
+        }
+    }
+    return true;
 }
 
-/* Writes F(x, u) and (A B), row by row, for a stage of step_s. All else is memory: two states, two matrices
- * of the size of (A B), the entries of a Jacobian. */
+/* Writes F(x, u) and (A B), row by row, for a stage of step_s. The memory has room for two states, two matrices
+ * of the size of (A B) and the entries of a Jacobian. */
 static inline MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynamics *restrict self, int phase,
         const real *x, const real *u, int d, real step_s, real *restrict next, real *restrict by,
-        real *restrict state, real *restrict slope, real *restrict sensitivity, real *restrict slope_sensitivity,
-        real *restrict entries)
+        real *restrict memory)
 {
     const int width = 3 * d;
+    real *state = memory;
+    real *rest = memory + 2 * d;
+    real *slope = rest;
+    real *others = rest + 2 * d;
+    real *sensitivity = others;
+    real *last = others + 2 * d * width;
+    real *slope_sensitivity = last;
+    real *entries = last + 2 * d * width;
     for (int i = 0; i < 2 * d; ++i) {
         slope[i] = 0;
         next[i] = 0;
@@ -773,29 +922,171 @@ static inline MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_
     }
 }
 
+/* Takes the joint velocities of a measurement, if all its numbers are finite; whether they are. */
+static inline MAYBE_UNUSED bool online_memory_accepts(online_memory *restrict self, double time_s, const real *x,
+        const real *dx)
+{
+    const bool is_finite = online_first_undefined(x, 18) + online_first_undefined(dx, 18) == 36;
+    const bool is_accepted = is_finite && is_finite_double(time_s);
+    for (int i = 0; i < 12; ++i) {
+        self->joint_velocity[i] = is_accepted ? dx[i] : 0;
+    }
+    return is_accepted;
+}
+
+/* Time since the last command, at most one stage, and one stage where it is not known or the clock stands still. */
+static inline MAYBE_UNUSED double online_memory_since_command(online_memory *self, double time_s, double step_s)
+{
+    const double passed_s = time_s - self->command_s;
+    const bool is_known = self->has_command && passed_s > 0.0 && passed_s <= step_s;
+    return is_known ? passed_s : step_s;
+}
+
+/* Writes what holds the posture, without one the middle of the ranges: fading torques that damp the joints. */
+static inline MAYBE_UNUSED void online_memory_hold(online_memory *restrict self,
+        const online_fallback_settings *fallback, double time_s, double step_s, const real *limit, const real *lower,
+        const real *upper, real *restrict torque, real *restrict joints)
+{
+    const real fade = EXP(-(real)online_memory_since_command(self, time_s, step_s) / fallback->torque_decay_s);
+    for (int i = 0; i < 12; ++i) {
+        self->feed_forward_nm[i] *= fade;
+        const real damping = fallback->damping_nm_s * self->joint_velocity[i];
+        torque[i] = online_clamped_torque(self->feed_forward_nm[i] - damping, limit[i]);
+        const real kept = self->joint_position[i];
+        const real middle = (real)0.5 * (lower[i] + upper[i]);
+        joints[i] = self->has_position ? kept : middle;
+    }
+}
+
+/* The position within the limits that is nearest to this one; the lower limit for what is not a number. */
+static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
+{
+    return position >= lower ? (position > upper ? upper : position) : lower;
+}
+
+/* Keeps a posture, within the limits, for the command and for a hold. */
+static inline MAYBE_UNUSED void online_memory_keep_posture(online_memory *restrict self, const real *joints,
+        const real *lower, const real *upper)
+{
+    for (int i = 0; i < 12; ++i) {
+        self->joint_position[i] = online_clamped_joint(joints[i], lower[i], upper[i]);
+    }
+    self->has_position = true;
+}
+
+/* A time, or where it is not known that of the last command, if there was one, and one stage. */
+static inline MAYBE_UNUSED double online_memory_now_s(online_memory *self, double time_s, double step_s)
+{
+    const double next_s = self->command_s + step_s;
+    const bool is_known = is_finite_double(time_s) || !self->has_command;
+    return is_known ? time_s : next_s;
+}
+
+/* Keeps the time of a command and awaits the next measurement. */
+static inline MAYBE_UNUSED void online_memory_keep_time(online_memory *self, double time_s, double step_s)
+{
+    self->command_s = online_memory_now_s(self, time_s, step_s);
+    self->has_command = is_finite_double(self->command_s);
+    memset(self->joint_velocity, 0, sizeof(real[12]));
+}
+
+/* Whether a measurement is not believed: it jumps, and few did before. Its velocities must not become torques. */
+static inline MAYBE_UNUSED bool online_memory_refuses(online_memory *self, bool is_jump, int patience)
+{
+    if (!is_jump || self->disbelieved >= patience) {
+        self->disbelieved = 0;
+        return false;
+    }
+    self->disbelieved += 1;
+    memset(self->joint_velocity, 0, sizeof(real[12]));
+    return true;
+}
+
+/* Stages that have passed at a time; -1 without a plan. */
+static inline MAYBE_UNUSED double online_plan_time_passed(online_plan_time *self, double time_s)
+{
+    const double passed = (time_s - self->start_s) / self->step_s;
+    return self->is_made ? passed : -1.0;
+}
+
+/* Whether a measured state is more than most of its deviations from what the states of a plan predict for its
+ * time; not beyond their end. */
+static inline MAYBE_UNUSED bool online_plan_time_is_jump(online_plan_time *self, double time_s, const real *states,
+        int horizon, const real *measured, const real *deviation, int d, real most)
+{
+    const double passed = online_plan_time_passed(self, time_s);
+    if (!(passed >= 0.0 && passed <= (double)horizon)) {
+        return false;
+    }
+    const int whole = (int)passed;
+    const int before = whole < horizon ? whole : horizon - 1;
+    const real share = (real)(passed - (double)before);
+    real largest = 0;
+    for (int i = 0; i < 2 * d; ++i) {
+        const real start = states[2 * d * before + i];
+        const real predicted = start + share * (states[2 * d * (before + 1) + i] - start);
+        const real change = (measured[i] - predicted) / deviation[i];
+        largest = online_greater(solver_magnitude(change), largest);
+    }
+    return largest > most;
+}
+
+/* The instant whose posture is commanded for a stage, s. */
+static inline MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, int stage)
+{
+    return self->start_s + ((double)stage + ONLINE_POSTURE_SHARE) * self->step_s;
+}
+
+/* Whether a time belongs to a stage or is beyond the last. */
+static inline MAYBE_UNUSED bool online_plan_time_reaches(online_plan_time *self, double time_s)
+{
+    return online_plan_time_passed(self, time_s) > -0.5;
+}
+
+/* The stage that a time belongs to, at most most; that as well for a time before the plan. */
+static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self, double time_s, int most)
+{
+    /* A time that is a stage's beginning but for rounding belongs to that stage. */
+    const double passed = online_plan_time_passed(self, time_s) + 1e-6;
+    const bool is_within = online_plan_time_reaches(self, time_s) && passed < (double)most;
+    return is_within ? (int)passed : most;
+}
+
 static inline MAYBE_UNUSED online_share online_share_unknown(void)
 {
     return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
 }
 
-/* Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities
- * at the stage's start and end, its input, and the latent input of the drives at the command and now. */
-static inline MAYBE_UNUSED void online_share_update(online_share *restrict self, real part, real kept,
-        const real *by_input, const real *input, const real *start, const real *end, const real *velocity,
+/* The smaller of two numbers; the second if the first is not one. */
+static inline MAYBE_UNUSED real online_smaller(real value, real other)
+{
+    return value < other ? value : other;
+}
+
+/* Takes what the velocities of a measurement say after a part of the plan's first stage, or a little later,
+ * with the states at the stage's beginning and end, its input, and the latent input of the drives at the
+ * command and now. */
+static inline MAYBE_UNUSED void online_share_update(online_share *restrict self, double passed, real step_s,
+        real time_constant_s, const real *by_input, const real *input, const real *states, const real *measured,
         const real *deviation, const real *at_command, const real *drives, int d)
 {
+    if (!(passed > 0.0 && passed < 1.1)) {
+        return;
+    }
+    const real part = (real)passed;
     real size = 0;
     real agreement = 0;
     for (int i = 0; i < d; ++i) {
         real by_plan = 0;
         real by_drives = 0;
         for (int k = 0; k < d; ++k) {
-            const real effect = part * by_input[i * d + k] / deviation[i];
+            const real effect = part * by_input[i * d + k] / deviation[d + i];
             by_plan += effect * input[k];
             by_drives += effect * ((real)0.5 * (at_command[k] + drives[k]));
         }
-        const real planned = start[i] + part * (end[i] - start[i]);
-        const real missed = (velocity[i] - planned) / deviation[i] - by_drives;
+        const real start = states[d + i];
+        const real planned = start + part * (states[3 * d + i] - start);
+        const real missed = (measured[d + i] - planned) / deviation[d + i] - by_drives;
         const real change = by_plan + by_drives;
         size += change * change;
         agreement += change * missed;
@@ -807,11 +1098,12 @@ static inline MAYBE_UNUSED void online_share_update(online_share *restrict self,
         self->unit = size;
     }
     const real ratio = size / self->unit;
-    const real weight = ratio < ONLINE_LARGEST_WEIGHT ? ratio : ONLINE_LARGEST_WEIGHT;
+    const real weight = online_smaller(ratio, ONLINE_LARGEST_WEIGHT);
+    const real kept = EXP(-part * step_s / time_constant_s);
     self->weight = kept * self->weight + weight;
     self->weighted = kept * self->weighted + weight * self->estimate * (1 + agreement / size);
     const real mean = (ONLINE_PRIOR_WEIGHT + self->weighted) / (ONLINE_PRIOR_WEIGHT + self->weight);
-    self->estimate = mean < ONLINE_LEAST ? ONLINE_LEAST : mean > ONLINE_LARGEST ? ONLINE_LARGEST : mean;
+    self->estimate = online_greater(ONLINE_LEAST, online_smaller(mean, ONLINE_LARGEST));
 }
 
 /* Whether a state within STATE_REACH standard deviations of some state of the trajectory reaches row . z =
@@ -832,7 +1124,8 @@ static inline MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *
         for (int i = 0; i < d; ++i) {
             along += z[i] * row[i];
         }
-        farthest = sample > 0 && farthest > along ? farthest : along;
+        const bool is_farther = sample == 0 || !(farthest > along);
+        farthest = is_farther ? along : farthest;
     }
     return farthest + ONLINE_STATE_REACH * SQRT(spread) >= bound;
 }
@@ -1066,7 +1359,8 @@ static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajec
         for (int i = half * d; i < (half + 1) * d; ++i) {
             least = online_greater(deviation[i], least);
         }
-        least = least > 0 ? ONLINE_DEVIATION_FLOOR * least : 1;
+        const real lowest = ONLINE_DEVIATION_FLOOR * least;
+        least = least > 0 ? lowest : 1;
         for (int i = half * d; i < (half + 1) * d; ++i) {
             const real own = online_greater(deviation[i], least);
             deviation[i] = is_still ? still[i] : own;

@@ -292,6 +292,21 @@ pub(super) fn unscale(
     }
 }
 
+/// Makes a defect that of a reference which is itself a trajectory: none about it, else less what `nominal`, the model's
+/// step from the reference, leaves of its end.
+pub(super) fn trust_reference(
+    is_about_plan: bool,
+    nominal: &[Real],
+    end: &[Real],
+    d: usize,
+    defect: &mut [Real],
+) {
+    for i in 0..2 * d {
+        let left = defect[i] + (end[i] - nominal[i]);
+        defect[i] = if is_about_plan { left } else { 0.0 };
+    }
+}
+
 /// What a step `next` with derivatives `(A B)` at `(x, u)` leaves of the dynamics at a reference `(state, input)` that
 /// goes to `end`: `next + A (state − x) + B (input − u) − end`.
 pub(super) fn write_defect(

@@ -1,5 +1,5 @@
 //! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in. In: sources, a
-//! prefix for names, the functions that the C is for or the C that calls them. Out: these, what they call, the types and constants that they
+//! prefix for names, the C that calls functions of them. Out: these, what they call, the types and constants that they
 //! need, with comments. `cargo run -p romc-translate` writes `templates/controller_c/`; `tests/controller_c.rs`
 //! compares it byte for byte. Read `function` first.
 //!
@@ -72,9 +72,7 @@ impl std::error::Error for Fault {}
 pub struct Unit<'a> {
     /// Before every name: `solver` for `solver_solve` and `SOLVER_WIDE`.
     pub prefix: &'a str,
-    /// Functions that the C is for, as `Type::function` or `function`.
-    pub roots: &'a [&'a str],
-    /// C that includes it: the functions and constants that it names are needed as well.
+    /// C that includes it: the functions that it calls and the constants that it names are those that are needed.
     pub users: &'a str,
     /// Structs that nothing changes, which are `const` wherever they are pointed to.
     pub fixed: &'a [&'a str],
@@ -102,13 +100,10 @@ pub struct Translated {
     pub source: String,
 }
 
-/// Translates the functions of a unit, and all that they need.
+/// Translates the functions that a unit is for, and all that they need.
 pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Fault> {
     let items = items::Items::read(sources, unit)?;
     let mut writer = function::Writer::new(&items);
-    for root in unit.roots {
-        writer.root(root)?;
-    }
     let is_other = |letter: char| !letter.is_ascii_alphanumeric() && letter != '_';
     let words = unit.users.split_inclusive(is_other);
     let words: BTreeSet<&str> = words
@@ -164,15 +159,12 @@ fn head(what: &str) -> String {
 pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
     let mut texts = solver_of(&read(root, "src/control/solver", ".rs")?)?.to_vec();
     let templates = read(root, "templates/controller_c", ".askama")?;
-    let users: String = templates
-        .into_iter()
-        .map(|template| template.text)
-        .collect();
+    let users: String = templates.into_iter().map(|file| file.text).collect();
     let unit = Unit {
         prefix: "online",
         users: &users,
-        fixed: &["LegShape"],
-        header: &["Share"],
+        fixed: &["LegShape", "FallbackSettings"],
+        header: &["Share", "Memory", "PlanTime"],
         elsewhere: &[
             ("MOST_LATENT", "D"),
             ("MOST_STATE", "X"),
@@ -183,7 +175,7 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
         ..Unit::default()
     };
     let mut sources = read(root, "src/control/online", ".rs")?;
-    sources.push(file(root, "src/robot/leg.rs".to_owned())?);
+    sources.extend(read(root, "src/robot", ".rs")?);
     let Translated { header, source } = translate(&sources, &unit)?;
     let state = head("state of the controller's own steps.") + &header;
     let steps = head("the controller's own steps.") + &source;
@@ -196,12 +188,7 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
 pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Fault> {
     let unit = Unit {
         prefix: "solver",
-        roots: &[
-            "Program::bounds_mut",
-            "Program::shift",
-            "Program::prepare",
-            "Program::solve",
-        ],
+        users: "solver_program_bounds_mut(), solver_program_shift(), solver_program_prepare(), solver_program_solve()",
         header: &["Stage"],
         elsewhere: &[("is_linked", "LINKED")],
         ..Unit::default()
