@@ -30,6 +30,8 @@ mod random;
 mod ros2;
 #[path = "controller_c/solver.rs"]
 mod solver;
+#[path = "controller_c/steps.rs"]
+mod steps;
 mod tools;
 use emitted::Emitted;
 use programs::{root, shipped, succeed, with_losses};
