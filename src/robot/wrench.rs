@@ -88,8 +88,7 @@ impl Robot {
         Ok(wrench)
     }
 
-    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` in [`Self::wrench_by_arms`], row by row; zero columns for legs in
-    /// the air.
+    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau`, row by row; zero columns for legs in the air.
     pub(super) fn map_by_arms(
         &self,
         frame: WrenchFrame,

@@ -683,12 +683,11 @@ static inline MAYBE_UNUSED real online_greater(real value, real other)
 /* The largest violation of a limit by joint positions, in half ranges, or largest if that is more. */
 static inline MAYBE_UNUSED real online_violation(const real *q, const real *lower, const real *upper, real largest)
 {
-    real worst = largest;
     for (int i = 0; i < 12; ++i) {
         const real outside = online_greater(q[i] - upper[i], lower[i] - q[i]);
-        worst = online_greater(outside / ((real)0.5 * (upper[i] - lower[i])), worst);
+        largest = online_greater(outside / ((real)0.5 * (upper[i] - lower[i])), largest);
     }
-    return worst;
+    return largest;
 }
 
 /* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that
@@ -816,6 +815,18 @@ static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real
         for (int j = i; j < 12; ++j) {
             torque[i] += deviation[12 * i + j] * y[j];
         }
+    }
+}
+
+/* Writes weights of squared deviations of positions and velocities in units of deviation: one, and of velocities
+ * weight where these have the units of the positions. */
+static inline MAYBE_UNUSED void online_write_weights(const real *deviation, real weight, int d,
+        real *restrict weights)
+{
+    for (int i = 0; i < d; ++i) {
+        const real ratio = deviation[d + i] / deviation[i];
+        weights[i] = 1;
+        weights[d + i] = weight * (ratio * ratio);
     }
 }
 
@@ -958,10 +969,16 @@ static inline MAYBE_UNUSED void online_memory_hold(online_memory *restrict self,
     }
 }
 
+/* The smaller of two numbers; the second if the first is not one. */
+static inline MAYBE_UNUSED real online_smaller(real value, real other)
+{
+    return value < other ? value : other;
+}
+
 /* The position within the limits that is nearest to this one; the lower limit for what is not a number. */
 static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
 {
-    return position >= lower ? (position > upper ? upper : position) : lower;
+    return online_smaller(online_greater(position, lower), upper);
 }
 
 /* Keeps a posture, within the limits, for the command and for a hold. */
@@ -1055,12 +1072,6 @@ static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self,
 static inline MAYBE_UNUSED online_share online_share_unknown(void)
 {
     return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
-}
-
-/* The smaller of two numbers; the second if the first is not one. */
-static inline MAYBE_UNUSED real online_smaller(real value, real other)
-{
-    return value < other ? value : other;
 }
 
 /* Takes what the velocities of a measurement say after a part of the plan's first stage, or a little later,

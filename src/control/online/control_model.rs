@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::dense::{Real, greater};
+use super::dense::{Real, greater, smaller};
 use super::error::ControlError;
 use super::estimate::InputGivenState;
 use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM, joint_loss};
@@ -231,11 +231,7 @@ pub(super) fn clamped_torque(torque: Real, limit: Real) -> Real {
 
 /// The position within the limits that is nearest to this one; the lower limit for what is not a number.
 pub(super) fn clamped_joint(position: Real, lower: Real, upper: Real) -> Real {
-    if position >= lower {
-        if position > upper { upper } else { position }
-    } else {
-        lower
-    }
+    smaller(greater(position, lower), upper)
 }
 
 /// Loss of a joint over a time, N m, at the mean of its velocities at both ends with their difference as acceleration; at
@@ -247,13 +243,12 @@ fn planned_loss(of: &[Real; 3], before: Real, after: Real, step_s: Real, limit: 
 }
 
 /// The largest violation of a limit by joint positions, in half ranges, or `largest` if that is more.
-pub(super) fn violation(q: &[Real], lower: &[Real], upper: &[Real], largest: Real) -> Real {
-    let mut worst = largest;
+pub(super) fn violation(q: &[Real], lower: &[Real], upper: &[Real], mut largest: Real) -> Real {
     for i in 0..12 {
         let outside = greater(q[i] - upper[i], lower[i] - q[i]);
-        worst = greater(outside / (0.5 * (upper[i] - lower[i])), worst);
+        largest = greater(outside / (0.5 * (upper[i] - lower[i])), largest);
     }
-    worst
+    largest
 }
 
 /// `out += M v`, without allocating.

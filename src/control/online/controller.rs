@@ -17,7 +17,7 @@ use super::problem::{ROW_MARGIN, StageRows, row_selection, stage_cost};
 use super::qp::QpSolver;
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelection};
-use super::stage::StageShape;
+use super::stage::{StageShape, write_weights};
 use super::trajectory::Trajectory;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
@@ -167,10 +167,9 @@ impl Controller {
         }
         let d = self.plant.latent_dim();
         let deviation = reference.deviation();
-        let weight = self.settings.velocity_weight;
-        let of_velocity = |i: usize| weight * (deviation[d + i] / deviation[i]).powi(2);
-        let mut state_weights = vec![1.0; d];
-        state_weights.extend((0..d).map(of_velocity));
+        let mut state_weights = vec![1.0; 2 * d];
+        let of_velocities = self.settings.velocity_weight;
+        write_weights(deviation, of_velocities, d, &mut state_weights);
         let rows = match row_selection(&self.plant, &self.settings) {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),

@@ -77,7 +77,6 @@ impl PlanTime {
 pub struct Plan {
     pub(super) time: PlanTime,
     latent_dim: usize,
-    /// Of each stage.
     pub(super) inputs: Vec<f64>,
     /// States at the beginning of each stage and at the end of the last.
     pub(super) states: Vec<f64>,

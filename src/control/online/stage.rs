@@ -91,6 +91,16 @@ pub(super) struct StageCost {
     pub slack: f64,
 }
 
+/// Writes weights of squared deviations of positions and velocities in units of `deviation`: one, and of velocities
+/// `weight` where these have the units of the positions.
+pub(super) fn write_weights(deviation: &[Real], weight: Real, d: usize, weights: &mut [Real]) {
+    for i in 0..d {
+        let ratio = deviation[d + i] / deviation[i];
+        weights[i] = 1.0;
+        weights[d + i] = weight * (ratio * ratio);
+    }
+}
+
 /// A stage's numbers; matrices are row-major.
 #[derive(Debug, Clone)]
 pub(super) struct StageQp {
