@@ -30,6 +30,8 @@ mod random;
 mod ros2;
 #[path = "controller_c/solver.rs"]
 mod solver;
+#[path = "controller_c/steps.rs"]
+mod steps;
 mod tools;
 use emitted::Emitted;
 use programs::{root, shipped, succeed, with_losses};
@@ -276,7 +278,9 @@ fn one_step(
     if random.signed() > 0.95 {
         feet = std::array::from_fn(|_| random.signed() > 0.0);
     }
-    if random.signed() > 0.98 {
+    // Now and then for so long that the last plan is used up and its torques fade.
+    let is_lost = (350..390).contains(&(sample % 400));
+    if is_lost || random.signed() > 0.98 {
         dx[sample % 18] = f64::NAN;
     }
     let jitter = if random.signed() > 0.9 { 0.003 } else { 0.0 };

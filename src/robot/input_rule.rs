@@ -6,12 +6,12 @@
 //! rotor's inertia seen through the gear (armature). `F` and `M` follow through the feet in contact, in a
 //! [`WrenchFrame`].
 
-use nalgebra::{ArrayStorage, Matrix3, SMatrix, Vector6};
+use nalgebra::{Matrix3, SMatrix, Vector6};
 
 use super::error::RobotError;
 use super::geometry::Robot;
 use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, STATE_DIM};
-use super::leg::write_world_axes;
+use super::leg::{Real, turn_to_world, write_world_axes};
 
 /// Axes of the force and moment in an input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -104,11 +104,11 @@ impl InputRule {
     ) -> Result<Vector6<f64>, RobotError> {
         let joints = x.first_chunk().expect("joints come first");
         let [.., roll, pitch, yaw] = *x;
-        let wrench = (self.robot).wrench_by_arms(self.frame, joints, net, contact)?;
-        Ok(match self.frame {
-            WrenchFrame::Body => wrench,
-            WrenchFrame::World => generalised([roll, pitch, yaw]) * wrench,
-        })
+        let mut wrench = (self.robot).wrench_by_arms(self.frame, joints, net, contact)?;
+        if self.frame == WrenchFrame::World {
+            turn_to_world(&[roll, pitch, yaw], 1, &mut wrench);
+        }
+        Ok(wrench.into())
     }
 
     /// The 6 x 12 matrix `G` of `[F; M] = G net` at a posture (rad), an attitude (roll, pitch, yaw, rad) and a contact;
@@ -119,59 +119,28 @@ impl InputRule {
         attitude: [f64; 3],
         contact: ContactFlags,
     ) -> Result<SMatrix<f64, BODY_DIM, JOINT_DIM>, RobotError> {
-        let map = self.robot.map_by_arms(self.frame, joints, contact)?;
-        Ok(match self.frame {
-            WrenchFrame::Body => map,
-            WrenchFrame::World => product(&generalised(attitude), &map),
-        })
-    }
-}
-
-/// Sums of products in their order, to the bit as nalgebra's, without its call for each column and factor.
-fn product(
-    left: &SMatrix<f64, BODY_DIM, BODY_DIM>,
-    right: &SMatrix<f64, BODY_DIM, JOINT_DIM>,
-) -> SMatrix<f64, BODY_DIM, JOINT_DIM> {
-    let (left, right) = (&left.data.0, &right.data.0);
-    let mut columns = [[0.0; BODY_DIM]; JOINT_DIM];
-    for j in 0..JOINT_DIM {
-        for i in 0..BODY_DIM {
-            let mut sum = left[0][i] * right[j][0];
-            for k in 1..BODY_DIM {
-                sum += left[k][i] * right[j][k];
-            }
-            columns[j][i] = sum;
+        let mut map = self.robot.map_by_arms(self.frame, joints, contact)?;
+        if self.frame == WrenchFrame::World {
+            turn_to_world(&attitude, JOINT_DIM, &mut map);
         }
+        Ok(SMatrix::from_row_slice(&map))
     }
-    SMatrix::from_data(ArrayStorage(columns))
 }
 
 /// Rotation from the body's axes to the world's, `R_z(yaw) R_y(pitch) R_x(roll)`.
 pub fn rotation(attitude: [f64; 3]) -> Matrix3<f64> {
-    let [turned, _] = world_axes(attitude);
-    turned
-}
-
-/// Rotation of forces from the body's axes to the world's, and the map of moments to those of roll, pitch and yaw.
-fn world_axes(attitude: [f64; 3]) -> [Matrix3<f64>; 2] {
-    let mut maps = [[[0.0; 3]; 3]; 2];
-    let [turned, rates] = &mut maps;
-    write_world_axes(&attitude, turned, rates);
-    maps.map(|rows| Matrix3::from_fn(|row, column| rows[row][column]))
-}
-
-/// From force and moment about the body's origin in the body's axes to the generalised forces of position and of roll,
-/// pitch and yaw: `[R F; E^T M]` with the angular velocity `E (d roll, d pitch, d yaw)` in the body's axes.
-fn generalised(attitude: [f64; 3]) -> SMatrix<f64, BODY_DIM, BODY_DIM> {
-    let mut map = SMatrix::<f64, BODY_DIM, BODY_DIM>::zeros();
-    for (first, block) in [0, 3].into_iter().zip(world_axes(attitude)) {
-        map.fixed_view_mut::<3, 3>(first, first).copy_from(&block);
-    }
-    map
+    let [mut turned, mut rates] = [[[0.0; 3]; 3]; 2];
+    write_world_axes(&attitude, &mut turned, &mut rates);
+    Matrix3::from_fn(|row, column| turned[row][column])
 }
 
 /// Joint speed within which dry friction changes its sign, in rad/s.
-pub const DRY_SPEED_RAD_S: f64 = 0.05;
+pub const DRY_SPEED_RAD_S: Real = 0.05;
+
+/// `b dq + c tanh(dq / v) + I ddq` of a joint with these `b`, `c` and `I`, N m, at `dq` (rad/s) and `ddq` (rad/s^2).
+pub fn joint_loss(of: &[Real; 3], dq: Real, ddq: Real) -> Real {
+    of[0] * dq + of[1] * (dq / DRY_SPEED_RAD_S).tanh() + of[2] * ddq
+}
 
 /// Losses of the twelve joints, in the order of [`JOINT_NAMES`](super::JOINT_NAMES).
 #[derive(Debug, Clone, PartialEq)]
@@ -215,13 +184,14 @@ impl Actuators {
         })
     }
 
-    /// `b dq + c tanh(dq / v) + I ddq`, in N m, at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2).
+    /// [`joint_loss`] of every joint at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2).
     #[must_use]
     pub fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
-        std::array::from_fn(|i| {
-            self.viscous[i] * dq[i]
-                + self.dry[i] * (dq[i] / DRY_SPEED_RAD_S).tanh()
-                + self.armature[i] * ddq[i]
-        })
+        std::array::from_fn(|i| joint_loss(&self.of_joint(i), dq[i], ddq[i]))
+    }
+
+    /// Viscous friction, dry friction and armature of a joint.
+    pub fn of_joint(&self, joint: usize) -> [f64; 3] {
+        [&self.viscous, &self.dry, &self.armature].map(|values| values[joint])
     }
 }

@@ -31,6 +31,9 @@ pub const LEAST_SPAN: f64 = 0.3;
 /// which torques are turned into forces without damping.
 pub const LEAST_HEIGHT: f64 = 0.12;
 
+/// Most that legs are turned, rad.
+const MOST_RAD: Real = 0.3;
+
 /// A leg in the frame of its plane at the zero posture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegShape {
@@ -175,11 +178,7 @@ impl Posture {
 fn damped_reciprocal(d: Real, least: Real) -> Real {
     let square = d * d;
     let smallest = least * least;
-    if square > smallest {
-        d / square
-    } else {
-        d / smallest
-    }
+    d / if square > smallest { square } else { smallest }
 }
 
 /// Writes `-J^-T` by cofactors; false if there is none.
@@ -263,6 +262,48 @@ pub(crate) fn add_wrench(
     true
 }
 
+/// Writes force and moment on the body by each torque of a leg into its columns of a matrix of twelve; false if the leg
+/// has no force map. The angles must be finite.
+pub(crate) fn write_wrench_map(leg: &LegShape, hip: &[Real], q: &[Real], out: &mut [Real]) -> bool {
+    let mut map: [[Real; 3]; 3] = [[0.0; 3]; 3];
+    let mut arm: [Real; 3] = [0.0; 3];
+    if !write_force_map(leg, q, false, &mut map, &mut arm) {
+        return false;
+    }
+    for j in 0..3 {
+        let force: [Real; 3] = [map[0][j], map[1][j], map[2][j]];
+        let mut moment: [Real; 3] = [0.0; 3];
+        write_moment(hip, &arm, &force, &mut moment);
+        for i in 0..3 {
+            out[12 * i + j] = force[i];
+            out[12 * (3 + i) + j] = moment[i];
+        }
+    }
+    true
+}
+
+/// Turns the foot of a leg about the body's origin by the opposite of an error `e` of pitch (rad), to first order in the
+/// joints, `q + J^-1 (R_y(-e) - 1) (h + p(q))` with the hip `h`; a foot that cannot be moved stays.
+pub(crate) fn turn_leg(leg: &LegShape, hip: &[Real], error: Real, q: &mut [Real]) {
+    let mut map: [[Real; 3]; 3] = [[0.0; 3]; 3];
+    let mut foot: [Real; 3] = [0.0; 3];
+    if !write_force_map(leg, q, false, &mut map, &mut foot) {
+        return;
+    }
+    let most = if error < 0.0 { -MOST_RAD } else { MOST_RAD };
+    let turn = if error.abs() > MOST_RAD { most } else { error };
+    let sine = turn.sin();
+    let shrunk = turn.cos() - 1.0;
+    let x = hip[0] + foot[0];
+    let z = hip[2] + foot[2];
+    let forward = shrunk * x - sine * z;
+    let up = sine * x + shrunk * z;
+    for j in 0..3 {
+        // The map is -J^-T.
+        q[j] -= map[0][j] * forward + map[2][j] * up;
+    }
+}
+
 /// Writes the moment of a force at a foot about where its hip is from.
 fn write_moment(hip: &[Real], foot: &[Real], force: &[Real], moment: &mut [Real]) {
     let arm: [Real; 3] = [hip[0] + foot[0], hip[1] + foot[1], hip[2] + foot[2]];
@@ -301,5 +342,26 @@ pub(crate) fn write_world_axes(
     rates[1][2] = -sr;
     for i in 0..3 {
         rates[2][i] = turned[2][i];
+    }
+}
+
+/// Turns `count` columns of forces and moments in the body's axes into generalised forces of position and of roll, pitch
+/// and yaw, the attitude (rad): `[R F; E^T M]` with the angular velocity `E (d roll, d pitch, d yaw)` in the body's axes.
+pub(crate) fn turn_to_world(attitude: &[Real], count: usize, wrench: &mut [Real]) {
+    let mut turned: [[Real; 3]; 3] = [[0.0; 3]; 3];
+    let mut rates: [[Real; 3]; 3] = [[0.0; 3]; 3];
+    write_world_axes(attitude, &mut turned, &mut rates);
+    for j in 0..count {
+        let f: [Real; 3] = [wrench[j], wrench[count + j], wrench[2 * count + j]];
+        let m: [Real; 3] = [
+            wrench[3 * count + j],
+            wrench[4 * count + j],
+            wrench[5 * count + j],
+        ];
+        for i in 0..3 {
+            wrench[i * count + j] = turned[i][0] * f[0] + turned[i][1] * f[1] + turned[i][2] * f[2];
+            let moment = rates[i][0] * m[0] + rates[i][1] * m[1] + rates[i][2] * m[2];
+            wrench[(3 + i) * count + j] = moment;
+        }
     }
 }

@@ -29,7 +29,7 @@ mod error;
 
 pub use error::RobotError;
 pub use geometry::{LegGeometry, LegLinks, Robot};
-pub use input_rule::{Actuators, DRY_SPEED_RAD_S, InputRule, WrenchFrame};
+pub use input_rule::{Actuators, DRY_SPEED_RAD_S, InputRule, WrenchFrame, joint_loss};
 pub use joints::{
     BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
     JOINT_NAMES, Leg, STATE_DIM,

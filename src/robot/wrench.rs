@@ -6,13 +6,13 @@
 
 use std::fmt;
 
-use nalgebra::{Matrix3, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::error::RobotError;
 use super::geometry::Robot;
 use super::input_rule::WrenchFrame;
-use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg};
-use super::leg::{SINGULAR_BOUND, add_wrench};
+use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, Leg};
+use super::leg::{SINGULAR_BOUND, add_wrench, turn_leg, write_wrench_map};
 
 impl Robot {
     /// Force of a leg in contact on the body, in N: `F = -J^-T tau` (equation 4), at `q` in rad and `tau` in N m:
@@ -51,10 +51,8 @@ impl Robot {
     /// [`LEAST_HEIGHT`](super::leg::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm. Elsewhere it is exact.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
-        match self.geometry(leg).force_map(q, false) {
-            Some(map) => Ok(map),
-            None => self.foot_force_map(leg, q),
-        }
+        let damped = self.geometry(leg).force_map(q, false);
+        damped.map_or_else(|| self.foot_force_map(leg, q), Ok)
     }
 
     /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5 to 7, 22): sums of `F_k` and of `x_k x
@@ -65,7 +63,8 @@ impl Robot {
         torque: &[f64; JOINT_DIM],
         contact: ContactFlags,
     ) -> Result<Vector6<f64>, RobotError> {
-        self.wrench_by_arms(WrenchFrame::Body, joints, torque, contact)
+        let wrench = self.wrench_by_arms(WrenchFrame::Body, joints, torque, contact);
+        wrench.map(Vector6::from)
     }
 
     /// The same with the moments by the arms of a frame, in axes parallel to the body's.
@@ -75,47 +74,53 @@ impl Robot {
         joints: &[f64; JOINT_DIM],
         torque: &[f64; JOINT_DIM],
         contact: ContactFlags,
-    ) -> Result<Vector6<f64>, RobotError> {
+    ) -> Result<[f64; BODY_DIM], RobotError> {
         let mut wrench = [0.0; BODY_DIM];
         for leg in Leg::down(contact) {
             let (q, tau) = (leg.of_joints(joints), leg.of_joints(torque));
             self.require_finite(leg, "joint angle", &q)?;
             self.require_finite(leg, "torque", &tau)?;
             let shape = &self.geometry(leg).shape;
-            let hip = match frame {
-                WrenchFrame::Body => [0.0; 3],
-                WrenchFrame::World => self.hip_position_m[leg.index()],
-            };
-            if !add_wrench(shape, &hip, &q, &tau, &mut wrench) {
+            if !add_wrench(shape, &self.arm_from(frame, leg), &q, &tau, &mut wrench) {
                 self.foot_force_map(leg, &q)?; // says why the leg has none
             }
         }
-        Ok(wrench.into())
+        Ok(wrench)
     }
 
-    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau` in [`Self::wrench_by_arms`]; zero columns for legs in the air.
+    /// The 6 x 12 matrix `G` of `[F_lin; F_ang] = G tau`, row by row; zero columns for legs in the air.
     pub(super) fn map_by_arms(
         &self,
         frame: WrenchFrame,
         joints: &[f64; JOINT_DIM],
         contact: ContactFlags,
-    ) -> Result<SMatrix<f64, 6, JOINT_DIM>, RobotError> {
-        let mut map = SMatrix::<f64, 6, JOINT_DIM>::zeros();
+    ) -> Result<[f64; BODY_DIM * JOINT_DIM], RobotError> {
+        let mut map = [0.0; BODY_DIM * JOINT_DIM];
         for leg in Leg::down(contact) {
             let q = leg.of_joints(joints);
-            let force = self.damped_force_map(leg, &q)?;
-            let moment = self.arm(frame, leg, &q).cross_matrix() * force;
-            let first = LEG_JOINT_DIM * leg.index();
-            map.fixed_view_mut::<3, 3>(0, first).copy_from(&force);
-            map.fixed_view_mut::<3, 3>(3, first).copy_from(&moment);
+            self.require_finite(leg, "joint angle", &q)?;
+            let (shape, columns) = (&self.geometry(leg).shape, &mut map[3 * leg.index()..]);
+            if !write_wrench_map(shape, &self.arm_from(frame, leg), &q, columns) {
+                self.foot_force_map(leg, &q)?;
+            }
         }
         Ok(map)
     }
 
-    fn arm(&self, frame: WrenchFrame, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
+    /// From where the arms of moments are, in the frame of the hip.
+    fn arm_from(&self, frame: WrenchFrame, leg: Leg) -> [f64; 3] {
         match frame {
-            WrenchFrame::Body => self.foot_position(leg, q),
-            WrenchFrame::World => self.foot_from_body(leg, q),
+            WrenchFrame::Body => [0.0; 3],
+            WrenchFrame::World => self.hip_position_m[leg.index()],
+        }
+    }
+
+    /// Turns every foot about the body's origin by `-turn_rad` of pitch, at most 0.3 rad, to first order in the joint
+    /// angles (rad). A leg whose foot cannot be moved stays as it is.
+    pub fn turn_legs(&self, turn_rad: f64, joints_rad: &mut [f64; JOINT_DIM]) {
+        for leg in Leg::ALL {
+            let (shape, hip) = (&self.geometry(leg).shape, &self.hip_position_m[leg.index()]);
+            turn_leg(shape, hip, turn_rad, &mut joints_rad[3 * leg.index()..]);
         }
     }
 

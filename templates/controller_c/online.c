@@ -8,6 +8,9 @@
 /* Smallest standard deviation against the largest of the same kind. */
 #define ONLINE_DEVIATION_FLOOR (real)1e-2
 
+/* Joint speed within which dry friction changes its sign, in rad/s. */
+#define ONLINE_DRY_SPEED_RAD_S (real)0.05
+
 /* Gap between primal and dual cost, relative to the cost, at which they end as well. */
 #define ONLINE_GAP (real)1e-8
 
@@ -25,7 +28,7 @@
 #define ONLINE_LIFT_ITERATIONS 60
 
 /* Most that legs are turned, rad. */
-#define ONLINE_MOST_TURN_RAD (real)0.3
+#define ONLINE_MOST_RAD (real)0.3
 
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
@@ -63,6 +66,20 @@
 
 /* Whether the feet are where the reference has them. */
 typedef enum { ONLINE_AS_SCHEDULED, ONLINE_EARLY, ONLINE_LATE, ONLINE_UNKNOWN } online_contact;
+
+/* What the controller does while it has no plan to trust. */
+typedef struct {
+    /* How many stages of the last good plan may be used after a failure. */
+    int plan_stages;
+    /* Time constant with which the feed-forward torque of a hold decays, s. */
+    real torque_decay_s;
+    /* Joint damping of a hold, N m s/rad, on measured joint velocities. */
+    real damping_nm_s;
+    /* Deviation from the prediction, in standard deviations of the reference, that is not believed at first. */
+    real jump_deviations;
+    /* How many steps in a row a measurement is disbelieved before it is taken for true. */
+    int jump_patience;
+} online_fallback_settings;
 
 /* Where a time is: the last sample at or before it, and how far it is on the way to the next one. */
 typedef struct {
@@ -114,383 +131,6 @@ static const real ONLINE_NODES[4] = {(real)0.0, (real)0.5, (real)0.5, (real)1.0}
 /* Weights of its slopes. */
 static const real ONLINE_WEIGHTS[4] = {(real)(1.0 / 6.0), (real)(1.0 / 3.0), (real)(1.0 / 3.0), (real)(1.0 / 6.0)};
 
-static inline MAYBE_UNUSED online_instant online_trajectory_locate(online_trajectory *self, double time_s)
-{
-    const int count = online_trajectory_count(self);
-    int low = 0;
-    int high = count;
-    while (low < high) {
-        const int middle = low + (high - low) / 2;
-        /* Never so, but analysers of the C do not see it. */
-        if (middle >= count) {
-            break;
-        }
-        if (online_trajectory_time_s(self, middle) <= time_s + ONLINE_TIME_TOLERANCE_S) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    const int before = low > 0 && low <= count ? low - 1 : 0;
-    double share = 0.0;
-    if (before + 1 < count) {
-        const double start_s = online_trajectory_time_s(self, before);
-        share = (time_s - start_s) / (online_trajectory_time_s(self, before + 1) - start_s);
-        share = share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
-    }
-    return (online_instant){.sample = before, .share = (real)share};
-}
-
-/* Writes (z, dz) of a sample. */
-static inline MAYBE_UNUSED void online_trajectory_write_state(online_trajectory *self, int sample,
-        real *restrict state)
-{
-    online_trajectory_write_position(self, sample, state);
-    online_trajectory_write_velocity(self, sample, state + online_trajectory_latent_dim(self));
-}
-
-/* Writes (z, dz) at a time. */
-static inline MAYBE_UNUSED void online_trajectory_state_at(online_trajectory *self, double time_s,
-        real *restrict state)
-{
-    const int d = online_trajectory_latent_dim(self);
-    const int last = online_trajectory_count(self) - 1;
-    online_instant at = online_trajectory_locate(self, time_s);
-    online_trajectory_write_state(self, at.sample, state);
-    if (at.sample < last) {
-        real later[X] = {0};
-        online_trajectory_write_state(self, at.sample + 1, later);
-        for (int i = 0; i < 2 * d; ++i) {
-            state[i] += at.share * (later[i] - state[i]);
-        }
-    }
-    if (time_s < online_trajectory_time_s(self, 0) || time_s > online_trajectory_time_s(self, last)) {
-        for (int i = d; i < 2 * d; ++i) {
-            state[i] = 0;
-        }
-    }
-}
-
-/* sum += factor values. */
-static inline MAYBE_UNUSED void online_add_scaled(real factor, const real *values, int dim, real *restrict sum)
-{
-    for (int i = 0; i < dim; ++i) {
-        sum[i] += factor * values[i];
-    }
-}
-
-/* Writes the mean latent input over a time: between two samples their mean, beyond the ends the end's. */
-static inline MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *self, double time_s,
-        double duration_s, real *restrict mean)
-{
-    const int d = online_trajectory_latent_dim(self);
-    const int last = online_trajectory_count(self) - 1;
-    const double first_s = online_trajectory_time_s(self, 0);
-    const double last_s = online_trajectory_time_s(self, last);
-    const double end_s = time_s + duration_s;
-    real input[D] = {0};
-    real next[D] = {0};
-    for (int i = 0; i < d; ++i) {
-        mean[i] = 0;
-    }
-    const double before_s = (first_s < end_s ? first_s : end_s) - time_s;
-    if (before_s > 0.0) {
-        online_trajectory_write_input(self, 0, input);
-        online_add_scaled((real)before_s, input, d, mean);
-    }
-    online_instant at = online_trajectory_locate(self, time_s);
-    bool has_input = false;
-    for (int sample = at.sample; sample < last; ++sample) {
-        const double start_s = online_trajectory_time_s(self, sample);
-        const double stop_s = online_trajectory_time_s(self, sample + 1);
-        if (start_s >= end_s) {
-            break;
-        }
-        const double from_s = start_s > time_s ? start_s : time_s;
-        const double span_s = (stop_s < end_s ? stop_s : end_s) - from_s;
-        if (span_s > 0.0) {
-            const real half_s = (real)(0.5 * span_s);
-            if (!has_input) {
-                online_trajectory_write_input(self, sample, input);
-            }
-            online_trajectory_write_input(self, sample + 1, next);
-            online_add_scaled(half_s, input, d, mean);
-            online_add_scaled(half_s, next, d, mean);
-            memcpy(input, next, sizeof(real[D]));
-            has_input = true;
-        }
-    }
-    const double after_s = end_s - (last_s > time_s ? last_s : time_s);
-    if (after_s > 0.0) {
-        online_trajectory_write_input(self, last, input);
-        online_add_scaled((real)after_s, input, d, mean);
-    }
-    for (int i = 0; i < d; ++i) {
-        mean[i] /= (real)duration_s;
-    }
-}
-
-/* The larger of two numbers; the second if the first is not one. */
-static inline MAYBE_UNUSED real online_greater(real value, real other)
-{
-    return value > other ? value : other;
-}
-
-/* Writes the standard deviation of each of (z, dz), never below a hundredth of the largest of its kind; still
- * if that is a motion within which the trajectory stands still. */
-static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajectory *self, const real *still,
-        real *restrict deviation)
-{
-    const int d = online_trajectory_latent_dim(self);
-    real mean[X] = {0};
-    real state[X] = {0};
-    for (int sample = 0; sample < online_trajectory_count(self); ++sample) {
-        online_trajectory_write_state(self, sample, state);
-        online_add_scaled(1, state, 2 * d, mean);
-    }
-    for (int i = 0; i < 2 * d; ++i) {
-        mean[i] /= (real)online_trajectory_count(self);
-        deviation[i] = 0;
-    }
-    for (int sample = 0; sample < online_trajectory_count(self); ++sample) {
-        online_trajectory_write_state(self, sample, state);
-        for (int i = 0; i < 2 * d; ++i) {
-            deviation[i] += (state[i] - mean[i]) * (state[i] - mean[i]);
-        }
-    }
-    bool is_still = true;
-    for (int i = 0; i < 2 * d; ++i) {
-        deviation[i] = SQRT(deviation[i] / (real)online_trajectory_count(self));
-        is_still = is_still && (i >= d || deviation[i] < still[i]);
-    }
-    for (int half = 0; half < 2; ++half) {
-        real least = 0;
-        for (int i = half * d; i < (half + 1) * d; ++i) {
-            least = online_greater(deviation[i], least);
-        }
-        least = least > 0 ? ONLINE_DEVIATION_FLOOR * least : 1;
-        for (int i = half * d; i < (half + 1) * d; ++i) {
-            const real own = online_greater(deviation[i], least);
-            deviation[i] = is_still ? still[i] : own;
-        }
-    }
-}
-
-/* Whether a state within STATE_REACH standard deviations of some state of the trajectory reaches row . z =
- * bound. */
-static inline MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *self, const real *row, real bound,
-        const real *deviation)
-{
-    const int d = online_trajectory_latent_dim(self);
-    real z[D] = {0};
-    real spread = 0;
-    real farthest = 0;
-    for (int i = 0; i < d; ++i) {
-        spread += row[i] * deviation[i] * (row[i] * deviation[i]);
-    }
-    for (int sample = 0; sample < online_trajectory_count(self); ++sample) {
-        online_trajectory_write_position(self, sample, z);
-        real along = 0;
-        for (int i = 0; i < d; ++i) {
-            along += z[i] * row[i];
-        }
-        farthest = sample > 0 && farthest > along ? farthest : along;
-    }
-    return farthest + ONLINE_STATE_REACH * SQRT(spread) >= bound;
-}
-
-static inline MAYBE_UNUSED int online_trajectory_phase_at(online_trajectory *self, double time_s)
-{
-    online_instant at = online_trajectory_locate(self, time_s);
-    return online_trajectory_phase(self, at.sample);
-}
-
-/* Writes the phases of the stages from a time on: the trajectory's, changed where the feet disagree. */
-static inline MAYBE_UNUSED online_contact online_trajectory_schedule(online_trajectory *self, double time_s,
-        double step_s, int measured, int horizon, int *restrict phases)
-{
-    for (int k = 0; k < horizon; ++k) {
-        phases[k] = online_trajectory_phase_at(self, time_s + ((double)k + 0.5) * step_s);
-    }
-    if (measured == ONLINE_NO_PHASE) {
-        return ONLINE_UNKNOWN;
-    }
-    if (measured == phases[0] || measured == online_trajectory_phase_at(self, time_s)) {
-        return ONLINE_AS_SCHEDULED;
-    }
-    int next = horizon;
-    int last = 0;
-    for (int k = horizon - 1; k >= 0; --k) {
-        if (phases[k] == measured) {
-            next = k;
-        }
-        if (online_trajectory_phase_at(self, time_s - (double)(k + 1) * step_s) == measured) {
-            last = k + 1;
-        }
-    }
-    if (next < horizon && (last == 0 || next <= last)) {
-        for (int k = 0; k < next; ++k) {
-            phases[k] = measured;
-        }
-        return ONLINE_EARLY;
-    }
-    phases[0] = measured;
-    return last > 0 ? ONLINE_LATE : ONLINE_UNKNOWN;
-}
-
-/* Whether a sample is in the window around another one: in its phase and near in time. */
-static inline MAYBE_UNUSED bool online_trajectory_is_beside(online_trajectory *self, int sample, int other)
-{
-    const double off_s = online_trajectory_time_s(self, other) - online_trajectory_time_s(self, sample);
-    return online_trajectory_phase(self, other) == online_trajectory_phase(self, sample)
-            && off_s <= ONLINE_HALF_WINDOW_S && off_s >= -ONLINE_HALF_WINDOW_S;
-}
-
-/* Writes the slope of the straight line through the velocities around a sample, within its phase. */
-static inline MAYBE_UNUSED void online_trajectory_write_acceleration(online_trajectory *self, int sample,
-        real *restrict slope)
-{
-    const int d = online_trajectory_latent_dim(self);
-    int first = sample;
-    int last = sample;
-    while (first > 0 && online_trajectory_is_beside(self, sample, first - 1)) {
-        first -= 1;
-    }
-    while (last + 1 < online_trajectory_count(self) && online_trajectory_is_beside(self, sample, last + 1)) {
-        last += 1;
-    }
-    /* A lone sample of its phase: its neighbours are all there is. */
-    const bool is_lone = first == last;
-    if (is_lone && first > 0) {
-        first -= 1;
-    }
-    if (is_lone && last + 1 < online_trajectory_count(self)) {
-        last += 1;
-    }
-    double mean_s = 0.0;
-    for (int other = first; other <= last; ++other) {
-        mean_s += online_trajectory_time_s(self, other);
-    }
-    mean_s /= (double)(last - first + 1);
-    for (int i = 0; i < d; ++i) {
-        slope[i] = 0;
-    }
-    double spread = 0.0;
-    real velocity[D] = {0};
-    for (int other = first; other <= last; ++other) {
-        const double off_s = online_trajectory_time_s(self, other) - mean_s;
-        spread += off_s * off_s;
-        online_trajectory_write_velocity(self, other, velocity);
-        online_add_scaled((real)off_s, velocity, d, slope);
-    }
-    for (int i = 0; i < d; ++i) {
-        slope[i] /= (real)spread;
-    }
-}
-
-/* Writes F(x, u) and (A B), row by row, for a stage of step_s. All else is memory: two states, two matrices
- * of the size of (A B), the entries of a Jacobian. */
-static inline MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynamics *restrict self, int phase,
-        const real *x, const real *u, int d, real step_s, real *restrict next, real *restrict by,
-        real *restrict state, real *restrict slope, real *restrict sensitivity, real *restrict slope_sensitivity,
-        real *restrict entries)
-{
-    const int width = 3 * d;
-    for (int i = 0; i < 2 * d; ++i) {
-        slope[i] = 0;
-        next[i] = 0;
-    }
-    for (int i = 0; i < 2 * d * width; ++i) {
-        slope_sensitivity[i] = 0;
-        by[i] = 0;
-    }
-    for (int node = 0; node < 4; ++node) {
-        const real scale = ONLINE_NODES[node] * step_s;
-        for (int i = 0; i < 2 * d; ++i) {
-            state[i] = x[i] + scale * slope[i];
-        }
-        for (int i = 0; i < 2 * d * width; ++i) {
-            sensitivity[i] = scale * slope_sensitivity[i];
-        }
-        for (int i = 0; i < 2 * d; ++i) {
-            sensitivity[i * width + i] += 1;
-        }
-        for (int i = 0; i < d; ++i) {
-            slope[i] = state[d + i];
-        }
-        const int count = online_latent_dynamics_accelerate(self, phase, state, state + d, u, slope + d, entries);
-        for (int i = 0; i < d * width; ++i) {
-            slope_sensitivity[i] = sensitivity[d * width + i];
-            slope_sensitivity[d * width + i] = 0;
-        }
-        for (int entry = 0; entry < count; ++entry) {
-            const int row = (d + online_latent_dynamics_row(self, phase, entry)) * width;
-            const int column = online_latent_dynamics_column(self, phase, entry);
-            if (column < 2 * d) {
-                const real *by_column = sensitivity + column * width;
-                online_add_scaled(entries[entry], by_column, width, slope_sensitivity + row);
-            } else {
-                slope_sensitivity[row + column] += entries[entry];
-            }
-        }
-        online_add_scaled(ONLINE_WEIGHTS[node], slope, 2 * d, next);
-        online_add_scaled(ONLINE_WEIGHTS[node], slope_sensitivity, 2 * d * width, by);
-    }
-    for (int i = 0; i < 2 * d; ++i) {
-        next[i] = x[i] + step_s * next[i];
-    }
-    for (int i = 0; i < 2 * d * width; ++i) {
-        by[i] *= step_s;
-    }
-    for (int i = 0; i < 2 * d; ++i) {
-        by[i * width + i] += 1;
-    }
-}
-
-/* Writes ∂ddz/∂u, row by row, of so many entries. */
-static inline MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_dynamics *self, int phase, int count,
-        const real *entries, int d, real *restrict gain)
-{
-    for (int i = 0; i < d * d; ++i) {
-        gain[i] = 0;
-    }
-    for (int entry = 0; entry < count; ++entry) {
-        const int column = online_latent_dynamics_column(self, phase, entry);
-        if (column >= 2 * d) {
-            gain[online_latent_dynamics_row(self, phase, entry) * d + column - 2 * d] = entries[entry];
-        }
-    }
-}
-
-/* Scale of (z, dz) for a trajectory that stands still: the change of each latent alone that moves some joint by
- * STILL_SHARE of half its range, and that change within STILL_TIME_S; decoder has d columns. */
-static inline MAYBE_UNUSED void online_write_still(const real *decoder, const real *lower, const real *upper, int d,
-        real *restrict still)
-{
-    for (int i = 0; i < d; ++i) {
-        real largest = 0;
-        for (int joint = 0; joint < 12; ++joint) {
-            const real share = solver_magnitude(decoder[joint * d + i]) / ((real)0.5 * (upper[joint] - lower[joint]));
-            largest = online_greater(share, largest);
-        }
-        still[i] = largest > 0 ? ONLINE_STILL_SHARE / largest : 1;
-        still[d + i] = still[i] / ONLINE_STILL_TIME_S;
-    }
-}
-
-/* Writes m = M [1; z; dz]. */
-static inline MAYBE_UNUSED void online_write_expected(const real *given, const real *state, int d,
-        real *restrict input)
-{
-    for (int i = 0; i < d; ++i) {
-        const real *row = given + i * (1 + 2 * d);
-        input[i] = row[0];
-        for (int k = 0; k < 2 * d; ++k) {
-            input[i] += row[1 + k] * state[k];
-        }
-    }
-}
-
 /* Lower Cholesky factor of a row-major symmetric matrix in place of its lower triangle; false if it is not positive
  * definite. */
 static inline MAYBE_UNUSED bool online_factorise(real *matrix, int dim)
@@ -535,6 +175,14 @@ static inline MAYBE_UNUSED void online_solve_upper(const real *factor, int dim, 
     }
 }
 
+/* sum += factor values. */
+static inline MAYBE_UNUSED void online_add_scaled(real factor, const real *values, int dim, real *restrict sum)
+{
+    for (int i = 0; i < dim; ++i) {
+        sum[i] += factor * values[i];
+    }
+}
+
 /* Adds S B^T (B S B^T + R)^-1 y to an input, unless the sum in brackets is not positive definite. Matrices are
  * row-major; y is overwritten. */
 static inline MAYBE_UNUSED void online_add_correction(const real *gain, const real *covariance, const real *residual,
@@ -570,298 +218,6 @@ static inline MAYBE_UNUSED void online_add_correction(const real *gain, const re
     }
     if (is_finite) {
         online_add_scaled(1, estimate, d, input);
-    }
-}
-
-/* Writes the rows (mu F_z, F_x, F_y) of a force 3 x d turned by a rotation; both row-major. */
-static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *force, real coefficient, int d,
-        real *restrict out)
-{
-    for (int row = 0; row < 3; ++row) {
-        const real *turned = rotation + 3 * ((row + 2) % 3);
-        for (int j = 0; j < d; ++j) {
-            real sum = turned[0] * force[j];
-            sum += turned[1] * force[d + j];
-            sum += turned[2] * force[2 * d + j];
-            out[row * d + j] = row == 0 ? coefficient * sum : sum;
-        }
-    }
-}
-
-/* Writes sigma^-1 A sigma and sigma^-1 B C_p of derivatives (A B), 2d x 3d; all row-major but C_p, lower triangular,
- * column by column. */
-static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *root, const real *deviation, int d,
-        real *restrict a, real *restrict b)
-{
-    for (int i = 0; i < 2 * d; ++i) {
-        const real factor = 1 / deviation[i];
-        const real *row = by + 3 * i * d;
-        for (int j = 0; j < d; ++j) {
-            real sum = 0;
-            for (int k = j; k < d; ++k) {
-                sum += row[2 * d + k] * root[j * d + k];
-            }
-            b[i * d + j] = factor * sum;
-        }
-        for (int j = 0; j < 2 * d; ++j) {
-            a[2 * i * d + j] = factor * row[j] * deviation[j];
-        }
-    }
-}
-
-/* Writes row C_p; returns row . input. */
-static inline MAYBE_UNUSED real online_scale_row(const real *row, const real *root, const real *input, int d,
-        real *restrict out)
-{
-    real at_reference = 0;
-    for (int j = 0; j < d; ++j) {
-        real sum = 0;
-        for (int k = j; k < d; ++k) {
-            sum += row[k] * root[j * d + k];
-        }
-        out[j] = sum;
-        at_reference += row[j] * input[j];
-    }
-    return at_reference;
-}
-
-/* Writes the friction pyramid of a force with rows (mu F_z, F_x, F_y), all zero without contact, where slacks are
- * strictly inside. */
-static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const real *root, const real *input, int d,
-        real *restrict rows, real *restrict bounds)
-{
-    real row[D] = {0};
-    for (int side = 0; side < 4; ++side) {
-        const int axis = (1 + side / 2) * d;
-        const real sign = side % 2 == 0 ? 1 : -1;
-        bool is_free = true;
-        for (int j = 0; j < d; ++j) {
-            row[j] = sign * force[axis + j] - SQRT_HALF * force[j];
-            is_free = is_free && row[j] == 0;
-        }
-        const real at_reference = online_scale_row(row, root, input, d, rows + side * d);
-        bounds[side] = is_free ? 1 : -at_reference;
-    }
-}
-
-/* Writes a stage's latent input u_r + C_p v and the latent state at its end x_r + sigma x of a solution. */
-static inline MAYBE_UNUSED void online_unscale(const real *root, const real *deviation, int d, const real *v,
-        const real *x, real *restrict input, real *restrict end)
-{
-    for (int i = 0; i < d; ++i) {
-        real sum = 0;
-        for (int j = 0; j <= i; ++j) {
-            sum += root[j * d + i] * v[j];
-        }
-        input[i] += sum;
-    }
-    for (int i = 0; i < 2 * d; ++i) {
-        end[i] += deviation[i] * x[i];
-    }
-}
-
-/* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that
- * goes to end: next + A (state - x) + B (input - u) - end. */
-static inline MAYBE_UNUSED void online_write_defect(const real *next, const real *by, const real *x, const real *u,
-        const real *state, const real *input, const real *end, int d, real *restrict defect)
-{
-    for (int i = 0; i < 2 * d; ++i) {
-        const real *row = by + 3 * i * d;
-        real sum = next[i] - end[i];
-        for (int j = 0; j < 2 * d; ++j) {
-            sum += row[j] * (state[j] - x[j]);
-        }
-        for (int j = 0; j < d; ++j) {
-            sum += row[2 * d + j] * (input[j] - u[j]);
-        }
-        defect[i] = sum;
-    }
-}
-
-static inline MAYBE_UNUSED real online_clamped_torque(real torque, real limit)
-{
-    return torque >= -limit ? (torque > limit ? limit : torque) : torque < 0 ? -limit : 0;
-}
-
-static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
-{
-    return position >= lower ? (position > upper ? upper : position) : lower;
-}
-
-static inline MAYBE_UNUSED online_share online_share_unknown(void)
-{
-    return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
-}
-
-/* Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities
- * at the stage's start and end, its input, and the latent input of the drives at the command and now. */
-static inline MAYBE_UNUSED void online_share_update(online_share *restrict self, real part, real kept,
-        const real *by_input, const real *input, const real *start, const real *end, const real *velocity,
-        const real *deviation, const real *at_command, const real *drives, int d)
-{
-    real size = 0;
-    real agreement = 0;
-    for (int i = 0; i < d; ++i) {
-        real by_plan = 0;
-        real by_drives = 0;
-        for (int k = 0; k < d; ++k) {
-            const real effect = part * by_input[i * d + k] / deviation[i];
-            by_plan += effect * input[k];
-            by_drives += effect * ((real)0.5 * (at_command[k] + drives[k]));
-        }
-        const real planned = start[i] + part * (end[i] - start[i]);
-        const real missed = (velocity[i] - planned) / deviation[i] - by_drives;
-        const real change = by_plan + by_drives;
-        size += change * change;
-        agreement += change * missed;
-    }
-    if (!(size > 0 && solver_is_finite_number(size) && solver_is_finite_number(agreement))) {
-        return;
-    }
-    if (self->unit == 0) {
-        self->unit = size;
-    }
-    const real ratio = size / self->unit;
-    const real weight = ratio < ONLINE_LARGEST_WEIGHT ? ratio : ONLINE_LARGEST_WEIGHT;
-    self->weight = kept * self->weight + weight;
-    self->weighted = kept * self->weighted + weight * self->estimate * (1 + agreement / size);
-    const real mean = (ONLINE_PRIOR_WEIGHT + self->weighted) / (ONLINE_PRIOR_WEIGHT + self->weight);
-    self->estimate = mean < ONLINE_LEAST ? ONLINE_LEAST : mean > ONLINE_LARGEST ? ONLINE_LARGEST : mean;
-}
-
-/* Writes m + C y. */
-static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real *deviation, const real *y,
-        real *restrict torque)
-{
-    for (int i = 0; i < 12; ++i) {
-        torque[i] = mean[i];
-        for (int j = i; j < 12; ++j) {
-            torque[i] += deviation[12 * i + j] * y[j];
-        }
-    }
-}
-
-/* Writes row C. */
-static inline MAYBE_UNUSED void online_by_deviation(const real *row, const real *deviation, real *restrict out)
-{
-    for (int j = 0; j < 12; ++j) {
-        out[j] = 0;
-        for (int k = 0; k <= j; ++k) {
-            out[j] += row[k] * deviation[12 * k + j];
-        }
-    }
-}
-
-/* Writes A and y_0; false if a number is not finite. wrench is G; matrices are row-major. */
-static inline MAYBE_UNUSED bool online_free_optimum(const real *projection, const real *wrench, const real *mean,
-        const real *deviation, const real *u_lat, real prior_weight, int d, real *restrict scaled_map,
-        real *restrict y)
-{
-    const real scale = 1 / SQRT(prior_weight);
-    real row[12] = {0};
-    real residual[D] = {0};
-    real square[D * D] = {0};
-    for (int i = 0; i < d; ++i) {
-        const real *own = projection + 18 * i;
-        real left = u_lat[i];
-        for (int j = 0; j < 12; ++j) {
-            real by_wrench = 0;
-            for (int axis = 0; axis < 6; ++axis) {
-                by_wrench += wrench[12 * axis + j] * own[12 + axis];
-            }
-            row[j] = own[j] + by_wrench;
-            left -= row[j] * mean[j];
-        }
-        online_by_deviation(row, deviation, scaled_map + 12 * i);
-        for (int j = 0; j < 12; ++j) {
-            scaled_map[12 * i + j] *= scale;
-        }
-        residual[i] = scale * left;
-    }
-    for (int i = 0; i < d; ++i) {
-        for (int j = 0; j <= i; ++j) {
-            real sum = i == j ? 1 : 0;
-            for (int k = 0; k < 12; ++k) {
-                sum += scaled_map[12 * i + k] * scaled_map[12 * j + k];
-            }
-            square[i * d + j] = sum;
-        }
-    }
-    if (!online_factorise(square, d)) {
-        return false;
-    }
-    online_solve_lower(square, d, residual);
-    online_solve_upper(square, d, residual);
-    for (int j = 0; j < 12; ++j) {
-        y[j] = 0;
-    }
-    for (int i = 0; i < d; ++i) {
-        online_add_scaled(residual[i], scaled_map + 12 * i, 12, y);
-    }
-    return true;
-}
-
-/* Writes both sides of the torque limits as rows on the torques, and the room that torque leaves. */
-static inline MAYBE_UNUSED void online_write_limits(const real *limit_nm, const real *losses_nm, const real *torque,
-        real *restrict rows, real *restrict bounds)
-{
-    for (int number = 0; number < 24; ++number) {
-        const int joint = number % 12;
-        const real sign = number < 12 ? 1 : -1;
-        for (int j = 0; j < 12; ++j) {
-            rows[12 * number + j] = 0;
-        }
-        rows[12 * number + joint] = sign / limit_nm[joint];
-        bounds[number] = 1 - sign * ((torque[joint] + losses_nm[joint]) / limit_nm[joint]);
-    }
-}
-
-/* Writes the pyramid |F_x|, |F_y| <= mu F_z / √2 of a foot with its force by the leg's torques, 3 x 3 row-major. */
-static inline MAYBE_UNUSED void online_write_foot(const real *force, real friction, real weight_n,
-        const real *torque, int leg, real *restrict rows, real *restrict bounds)
-{
-    for (int side = 0; side < 4; ++side) {
-        const real sign = side % 2 == 0 ? 1 : -1;
-        real room = 0;
-        for (int j = 0; j < 12; ++j) {
-            rows[12 * side + j] = 0;
-        }
-        for (int k = 0; k < 3; ++k) {
-            const real within = friction * force[6 + k] * SQRT_HALF;
-            const real entry = (sign * force[3 * (side / 2) + k] - within) / weight_n;
-            rows[12 * side + 3 * leg + k] = entry;
-            room -= entry * torque[3 * leg + k];
-        }
-        bounds[side] = room;
-    }
-}
-
-/* Writes L; false if a number is not finite. */
-static inline MAYBE_UNUSED bool online_write_hessian(const real *scaled_map, int d, real *restrict hessian)
-{
-    for (int i = 0; i < 12; ++i) {
-        for (int j = 0; j <= i; ++j) {
-            real sum = i == j ? 1 : 0;
-            for (int k = 0; k < d; ++k) {
-                sum += scaled_map[12 * k + i] * scaled_map[12 * k + j];
-            }
-            hessian[12 * i + j] = sum;
-        }
-    }
-    return online_factorise(hessian, 12);
-}
-
-/* Rows on the torques become rows on v. */
-static inline MAYBE_UNUSED void online_change_rows(const real *hessian, const real *deviation, int count,
-        real *restrict rows)
-{
-    real changed[12] = {0};
-    for (int row = 0; row < count; ++row) {
-        online_by_deviation(rows + 12 * row, deviation, changed);
-        online_solve_lower(hessian, 12, changed);
-        for (int j = 0; j < 12; ++j) {
-            rows[12 * row + j] = changed[j];
-        }
     }
 }
 
@@ -961,7 +317,7 @@ static inline MAYBE_UNUSED real online_damped_reciprocal(real d, real least)
 {
     const real square = d * d;
     const real smallest = least * least;
-    return square > smallest ? d / square : d / smallest;
+    return d / (square > smallest ? square : smallest);
 }
 
 /* Writes -J^-T with damped levers. */
@@ -1043,6 +399,216 @@ static inline MAYBE_UNUSED bool online_add_wrench(const online_leg_shape *leg, c
     return true;
 }
 
+/* Writes row C. */
+static inline MAYBE_UNUSED void online_by_deviation(const real *row, const real *deviation, real *restrict out)
+{
+    for (int j = 0; j < 12; ++j) {
+        out[j] = 0;
+        for (int k = 0; k <= j; ++k) {
+            out[j] += row[k] * deviation[12 * k + j];
+        }
+    }
+}
+
+/* Rows on the torques become rows on v. */
+static inline MAYBE_UNUSED void online_change_rows(const real *hessian, const real *deviation, int count,
+        real *restrict rows)
+{
+    real changed[12] = {0};
+    for (int row = 0; row < count; ++row) {
+        online_by_deviation(rows + 12 * row, deviation, changed);
+        online_solve_lower(hessian, 12, changed);
+        for (int j = 0; j < 12; ++j) {
+            rows[12 * row + j] = changed[j];
+        }
+    }
+}
+
+/* The torque within a limit that is nearest to this one; zero for what is not a number. */
+static inline MAYBE_UNUSED real online_clamped_torque(real torque, real limit)
+{
+    return torque >= -limit ? (torque > limit ? limit : torque) : torque < 0 ? -limit : 0;
+}
+
+/* The first of these numbers that is infinite or undefined; count without one. */
+static inline MAYBE_UNUSED int online_first_undefined(const real *values, int count)
+{
+    for (int i = 0; i < count; ++i) {
+        if (!solver_is_finite_number(values[i])) {
+            return i;
+        }
+    }
+    return count;
+}
+
+/* Writes A and y_0; false if a number is not finite. wrench is G; matrices are row-major. */
+static inline MAYBE_UNUSED bool online_free_optimum(const real *projection, const real *wrench, const real *mean,
+        const real *deviation, const real *u_lat, real prior_weight, int d, real *restrict scaled_map,
+        real *restrict y)
+{
+    const real scale = 1 / SQRT(prior_weight);
+    real row[12] = {0};
+    real residual[D] = {0};
+    real square[D * D] = {0};
+    for (int i = 0; i < d; ++i) {
+        const real *own = projection + 18 * i;
+        real left = u_lat[i];
+        for (int j = 0; j < 12; ++j) {
+            real by_wrench = 0;
+            for (int axis = 0; axis < 6; ++axis) {
+                by_wrench += wrench[12 * axis + j] * own[12 + axis];
+            }
+            row[j] = own[j] + by_wrench;
+            left -= row[j] * mean[j];
+        }
+        online_by_deviation(row, deviation, scaled_map + 12 * i);
+        for (int j = 0; j < 12; ++j) {
+            scaled_map[12 * i + j] *= scale;
+        }
+        residual[i] = scale * left;
+    }
+    for (int i = 0; i < d; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            real sum = i == j ? 1 : 0;
+            for (int k = 0; k < 12; ++k) {
+                sum += scaled_map[12 * i + k] * scaled_map[12 * j + k];
+            }
+            square[i * d + j] = sum;
+        }
+    }
+    if (!online_factorise(square, d)) {
+        return false;
+    }
+    online_solve_lower(square, d, residual);
+    online_solve_upper(square, d, residual);
+    for (int j = 0; j < 12; ++j) {
+        y[j] = 0;
+    }
+    for (int i = 0; i < d; ++i) {
+        online_add_scaled(residual[i], scaled_map + 12 * i, 12, y);
+    }
+    return true;
+}
+
+/* Whether times are the same but for rounding. */
+static inline MAYBE_UNUSED bool online_is_same_time(double time_s, double other_s)
+{
+    const double off_s = time_s - other_s;
+    return off_s < ONLINE_TIME_TOLERANCE_S && off_s > -ONLINE_TIME_TOLERANCE_S;
+}
+
+/* b dq + c tanh(dq / v) + I ddq of a joint with these b, c and I, N m, at dq (rad/s) and ddq (rad/s^2). */
+static inline MAYBE_UNUSED real online_joint_loss(const real *of, real dq, real ddq)
+{
+    return of[0] * dq + of[1] * TANH(dq / ONLINE_DRY_SPEED_RAD_S) + of[2] * ddq;
+}
+
+/* Loss of a joint over a time, N m, at the mean of its velocities at both ends with their difference as acceleration; at
+ * most the limit. */
+static inline MAYBE_UNUSED real online_planned_loss(const real *of, real before, real after, real step_s, real limit)
+{
+    const real dq = (real)0.5 * (before + after);
+    const real ddq = (after - before) / step_s;
+    return online_clamped_torque(online_joint_loss(of, dq, ddq), limit);
+}
+
+/* Writes sigma^-1 A sigma and sigma^-1 B C_p of derivatives (A B), 2d x 3d; all row-major but C_p, lower triangular,
+ * column by column. */
+static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *root, const real *deviation, int d,
+        real *restrict a, real *restrict b)
+{
+    for (int i = 0; i < 2 * d; ++i) {
+        const real factor = 1 / deviation[i];
+        const real *row = by + 3 * i * d;
+        for (int j = 0; j < d; ++j) {
+            real sum = 0;
+            for (int k = j; k < d; ++k) {
+                sum += row[2 * d + k] * root[j * d + k];
+            }
+            b[i * d + j] = factor * sum;
+        }
+        for (int j = 0; j < 2 * d; ++j) {
+            a[2 * i * d + j] = factor * row[j] * deviation[j];
+        }
+    }
+}
+
+/* Writes row C_p; returns row . input. */
+static inline MAYBE_UNUSED real online_scale_row(const real *row, const real *root, const real *input, int d,
+        real *restrict out)
+{
+    real at_reference = 0;
+    for (int j = 0; j < d; ++j) {
+        real sum = 0;
+        for (int k = j; k < d; ++k) {
+            sum += row[k] * root[j * d + k];
+        }
+        out[j] = sum;
+        at_reference += row[j] * input[j];
+    }
+    return at_reference;
+}
+
+/* By how many of its stages a horizon that begins at a time moves on to begin at another: 0 unless they are whole. */
+static inline MAYBE_UNUSED int online_stages_between(double from_s, double to_s, double step_s, int horizon)
+{
+    const double passed = (to_s - from_s) / step_s;
+    const double whole = FLOOR(passed + 0.5);
+    const bool is_whole = online_is_same_time((passed - whole) * step_s, 0.0);
+    const bool is_within = is_whole && whole >= 1.0 && whole < (double)horizon;
+    return is_within ? (int)whole : 0;
+}
+
+/* Makes a defect that of a reference which is itself a trajectory: none about it, else less what nominal, the model's
+ * step from the reference, leaves of its end. */
+static inline MAYBE_UNUSED void online_trust_reference(bool is_about_plan, const real *nominal, const real *end,
+        int d, real *restrict defect)
+{
+    for (int i = 0; i < 2 * d; ++i) {
+        const real left = defect[i] + (end[i] - nominal[i]);
+        defect[i] = is_about_plan ? left : 0;
+    }
+}
+
+/* Writes the rows (mu F_z, F_x, F_y) of a force 3 x d turned by a rotation; both row-major. */
+static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *force, real coefficient, int d,
+        real *restrict out)
+{
+    for (int row = 0; row < 3; ++row) {
+        const real *turned = rotation + 3 * ((row + 2) % 3);
+        for (int j = 0; j < d; ++j) {
+            real sum = turned[0] * force[j];
+            sum += turned[1] * force[d + j];
+            sum += turned[2] * force[2 * d + j];
+            out[row * d + j] = row == 0 ? coefficient * sum : sum;
+        }
+    }
+}
+
+/* Turns the foot of a leg about the body's origin by the opposite of an error e of pitch (rad), to first order in the
+ * joints, q + J^-1 (R_y(-e) - 1) (h + p(q)) with the hip h; a foot that cannot be moved stays. */
+static inline MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, const real *hip, real error,
+        real *restrict q)
+{
+    real map[3][3] = {{0}};
+    real foot[3] = {0};
+    if (!online_write_force_map(leg, q, false, map, foot)) {
+        return;
+    }
+    const real most = error < 0 ? -ONLINE_MOST_RAD : ONLINE_MOST_RAD;
+    const real turn = solver_magnitude(error) > ONLINE_MOST_RAD ? most : error;
+    const real sine = SIN(turn);
+    const real shrunk = COS(turn) - 1;
+    const real x = hip[0] + foot[0];
+    const real z = hip[2] + foot[2];
+    const real forward = shrunk * x - sine * z;
+    const real up = sine * x + shrunk * z;
+    for (int j = 0; j < 3; ++j) {
+        /* The map is -J^-T. */
+        q[j] -= map[0][j] * forward + map[2][j] * up;
+    }
+}
+
 /* Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to
  * the generalised moments of roll, pitch and yaw, which are the angles (rad). */
 static inline MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turned[restrict 3][3],
@@ -1071,6 +637,745 @@ static inline MAYBE_UNUSED void online_write_world_axes(const real *attitude, re
     rates[1][2] = -sr;
     for (int i = 0; i < 3; ++i) {
         rates[2][i] = turned[2][i];
+    }
+}
+
+/* Turns count columns of forces and moments in the body's axes into generalised forces of position and of roll, pitch
+ * and yaw, the attitude (rad): [R F; E^T M] with the angular velocity E (d roll, d pitch, d yaw) in the body's axes. */
+static inline MAYBE_UNUSED void online_turn_to_world(const real *attitude, int count, real *restrict wrench)
+{
+    real turned[3][3] = {{0}};
+    real rates[3][3] = {{0}};
+    online_write_world_axes(attitude, turned, rates);
+    for (int j = 0; j < count; ++j) {
+        real f[3] = {wrench[j], wrench[count + j], wrench[2 * count + j]};
+        real m[3] = {wrench[3 * count + j], wrench[4 * count + j], wrench[5 * count + j]};
+        for (int i = 0; i < 3; ++i) {
+            wrench[i * count + j] = turned[i][0] * f[0] + turned[i][1] * f[1] + turned[i][2] * f[2];
+            const real moment = rates[i][0] * m[0] + rates[i][1] * m[1] + rates[i][2] * m[2];
+            wrench[(3 + i) * count + j] = moment;
+        }
+    }
+}
+
+/* Writes a stage's latent input u_r + C_p v and the latent state at its end x_r + sigma x of a solution. */
+static inline MAYBE_UNUSED void online_unscale(const real *root, const real *deviation, int d, const real *v,
+        const real *x, real *restrict input, real *restrict end)
+{
+    for (int i = 0; i < d; ++i) {
+        real sum = 0;
+        for (int j = 0; j <= i; ++j) {
+            sum += root[j * d + i] * v[j];
+        }
+        input[i] += sum;
+    }
+    for (int i = 0; i < 2 * d; ++i) {
+        end[i] += deviation[i] * x[i];
+    }
+}
+
+/* The larger of two numbers; the second if the first is not one. */
+static inline MAYBE_UNUSED real online_greater(real value, real other)
+{
+    return value > other ? value : other;
+}
+
+/* The largest violation of a limit by joint positions, in half ranges, or largest if that is more. */
+static inline MAYBE_UNUSED real online_violation(const real *q, const real *lower, const real *upper, real largest)
+{
+    for (int i = 0; i < 12; ++i) {
+        const real outside = online_greater(q[i] - upper[i], lower[i] - q[i]);
+        largest = online_greater(outside / ((real)0.5 * (upper[i] - lower[i])), largest);
+    }
+    return largest;
+}
+
+/* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that
+ * goes to end: next + A (state - x) + B (input - u) - end. */
+static inline MAYBE_UNUSED void online_write_defect(const real *next, const real *by, const real *x, const real *u,
+        const real *state, const real *input, const real *end, int d, real *restrict defect)
+{
+    for (int i = 0; i < 2 * d; ++i) {
+        const real *row = by + 3 * i * d;
+        real sum = next[i] - end[i];
+        for (int j = 0; j < 2 * d; ++j) {
+            sum += row[j] * (state[j] - x[j]);
+        }
+        for (int j = 0; j < d; ++j) {
+            sum += row[2 * d + j] * (input[j] - u[j]);
+        }
+        defect[i] = sum;
+    }
+}
+
+/* Writes m = M [1; z; dz]. */
+static inline MAYBE_UNUSED void online_write_expected(const real *given, const real *state, int d,
+        real *restrict input)
+{
+    for (int i = 0; i < d; ++i) {
+        const real *row = given + i * (1 + 2 * d);
+        input[i] = row[0];
+        for (int k = 0; k < 2 * d; ++k) {
+            input[i] += row[1 + k] * state[k];
+        }
+    }
+}
+
+/* Writes the pyramid |F_x|, |F_y| <= mu F_z / √2 of a foot with its force by the leg's torques, 3 x 3 row-major. */
+static inline MAYBE_UNUSED void online_write_foot(const real *force, real friction, real weight_n,
+        const real *torque, int leg, real *restrict rows, real *restrict bounds)
+{
+    for (int side = 0; side < 4; ++side) {
+        const real sign = side % 2 == 0 ? 1 : -1;
+        real room = 0;
+        for (int j = 0; j < 12; ++j) {
+            rows[12 * side + j] = 0;
+        }
+        for (int k = 0; k < 3; ++k) {
+            const real within = friction * force[6 + k] * SQRT_HALF;
+            const real entry = (sign * force[3 * (side / 2) + k] - within) / weight_n;
+            rows[12 * side + 3 * leg + k] = entry;
+            room -= entry * torque[3 * leg + k];
+        }
+        bounds[side] = room;
+    }
+}
+
+/* Writes L; false if a number is not finite. */
+static inline MAYBE_UNUSED bool online_write_hessian(const real *scaled_map, int d, real *restrict hessian)
+{
+    for (int i = 0; i < 12; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            real sum = i == j ? 1 : 0;
+            for (int k = 0; k < d; ++k) {
+                sum += scaled_map[12 * k + i] * scaled_map[12 * k + j];
+            }
+            hessian[12 * i + j] = sum;
+        }
+    }
+    return online_factorise(hessian, 12);
+}
+
+/* Writes both sides of the torque limits as rows on the torques, and the room that torque leaves. */
+static inline MAYBE_UNUSED void online_write_limits(const real *limit_nm, const real *losses_nm, const real *torque,
+        real *restrict rows, real *restrict bounds)
+{
+    for (int number = 0; number < 24; ++number) {
+        const int joint = number % 12;
+        const real sign = number < 12 ? 1 : -1;
+        for (int j = 0; j < 12; ++j) {
+            rows[12 * number + j] = 0;
+        }
+        rows[12 * number + joint] = sign / limit_nm[joint];
+        bounds[number] = 1 - sign * ((torque[joint] + losses_nm[joint]) / limit_nm[joint]);
+    }
+}
+
+/* Writes the friction pyramid of a force with rows (mu F_z, F_x, F_y), all zero without contact, where slacks are
+ * strictly inside. */
+static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const real *root, const real *input, int d,
+        real *restrict rows, real *restrict bounds)
+{
+    real row[D] = {0};
+    for (int side = 0; side < 4; ++side) {
+        const int axis = (1 + side / 2) * d;
+        const real sign = side % 2 == 0 ? 1 : -1;
+        bool is_free = true;
+        for (int j = 0; j < d; ++j) {
+            row[j] = sign * force[axis + j] - SQRT_HALF * force[j];
+            is_free = is_free && row[j] == 0;
+        }
+        const real at_reference = online_scale_row(row, root, input, d, rows + side * d);
+        bounds[side] = is_free ? 1 : -at_reference;
+    }
+}
+
+/* Scale of (z, dz) for a trajectory that stands still: the change of each latent alone that moves some joint by
+ * STILL_SHARE of half its range, and that change within STILL_TIME_S; decoder has d columns. */
+static inline MAYBE_UNUSED void online_write_still(const real *decoder, const real *lower, const real *upper, int d,
+        real *restrict still)
+{
+    for (int i = 0; i < d; ++i) {
+        real largest = 0;
+        for (int joint = 0; joint < 12; ++joint) {
+            const real share = solver_magnitude(decoder[joint * d + i]) / ((real)0.5 * (upper[joint] - lower[joint]));
+            largest = online_greater(share, largest);
+        }
+        still[i] = largest > 0 ? ONLINE_STILL_SHARE / largest : 1;
+        still[d + i] = still[i] / ONLINE_STILL_TIME_S;
+    }
+}
+
+/* Writes m + C y. */
+static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real *deviation, const real *y,
+        real *restrict torque)
+{
+    for (int i = 0; i < 12; ++i) {
+        torque[i] = mean[i];
+        for (int j = i; j < 12; ++j) {
+            torque[i] += deviation[12 * i + j] * y[j];
+        }
+    }
+}
+
+/* Writes weights of squared deviations of positions and velocities in units of deviation: one, and of velocities
+ * weight where these have the units of the positions. */
+static inline MAYBE_UNUSED void online_write_weights(const real *deviation, real weight, int d,
+        real *restrict weights)
+{
+    for (int i = 0; i < d; ++i) {
+        const real ratio = deviation[d + i] / deviation[i];
+        weights[i] = 1;
+        weights[d + i] = weight * (ratio * ratio);
+    }
+}
+
+/* Writes force and moment on the body by each torque of a leg into its columns of a matrix of twelve; false if the leg
+ * has no force map. The angles must be finite. */
+static inline MAYBE_UNUSED bool online_write_wrench_map(const online_leg_shape *leg, const real *hip, const real *q,
+        real *restrict out)
+{
+    real map[3][3] = {{0}};
+    real arm[3] = {0};
+    if (!online_write_force_map(leg, q, false, map, arm)) {
+        return false;
+    }
+    for (int j = 0; j < 3; ++j) {
+        real force[3] = {map[0][j], map[1][j], map[2][j]};
+        real moment[3] = {0};
+        online_write_moment(hip, arm, force, moment);
+        for (int i = 0; i < 3; ++i) {
+            out[12 * i + j] = force[i];
+            out[12 * (3 + i) + j] = moment[i];
+        }
+    }
+    return true;
+}
+
+/* Writes F(x, u) and (A B), row by row, for a stage of step_s. The memory has room for two states, two matrices
+ * of the size of (A B) and the entries of a Jacobian. */
+static inline MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynamics *restrict self, int phase,
+        const real *x, const real *u, int d, real step_s, real *restrict next, real *restrict by,
+        real *restrict memory)
+{
+    const int width = 3 * d;
+    real *state = memory;
+    real *rest = memory + 2 * d;
+    real *slope = rest;
+    real *others = rest + 2 * d;
+    real *sensitivity = others;
+    real *last = others + 2 * d * width;
+    real *slope_sensitivity = last;
+    real *entries = last + 2 * d * width;
+    for (int i = 0; i < 2 * d; ++i) {
+        slope[i] = 0;
+        next[i] = 0;
+    }
+    for (int i = 0; i < 2 * d * width; ++i) {
+        slope_sensitivity[i] = 0;
+        by[i] = 0;
+    }
+    for (int node = 0; node < 4; ++node) {
+        const real scale = ONLINE_NODES[node] * step_s;
+        for (int i = 0; i < 2 * d; ++i) {
+            state[i] = x[i] + scale * slope[i];
+        }
+        for (int i = 0; i < 2 * d * width; ++i) {
+            sensitivity[i] = scale * slope_sensitivity[i];
+        }
+        for (int i = 0; i < 2 * d; ++i) {
+            sensitivity[i * width + i] += 1;
+        }
+        for (int i = 0; i < d; ++i) {
+            slope[i] = state[d + i];
+        }
+        const int count = online_latent_dynamics_accelerate(self, phase, state, state + d, u, slope + d, entries);
+        for (int i = 0; i < d * width; ++i) {
+            slope_sensitivity[i] = sensitivity[d * width + i];
+            slope_sensitivity[d * width + i] = 0;
+        }
+        for (int entry = 0; entry < count; ++entry) {
+            const int row = (d + online_latent_dynamics_row(self, phase, entry)) * width;
+            const int column = online_latent_dynamics_column(self, phase, entry);
+            if (column < 2 * d) {
+                const real *by_column = sensitivity + column * width;
+                online_add_scaled(entries[entry], by_column, width, slope_sensitivity + row);
+            } else {
+                slope_sensitivity[row + column] += entries[entry];
+            }
+        }
+        online_add_scaled(ONLINE_WEIGHTS[node], slope, 2 * d, next);
+        online_add_scaled(ONLINE_WEIGHTS[node], slope_sensitivity, 2 * d * width, by);
+    }
+    for (int i = 0; i < 2 * d; ++i) {
+        next[i] = x[i] + step_s * next[i];
+    }
+    for (int i = 0; i < 2 * d * width; ++i) {
+        by[i] *= step_s;
+    }
+    for (int i = 0; i < 2 * d; ++i) {
+        by[i * width + i] += 1;
+    }
+}
+
+/* Writes ∂ddz/∂u, row by row, of so many entries. */
+static inline MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_dynamics *self, int phase, int count,
+        const real *entries, int d, real *restrict gain)
+{
+    for (int i = 0; i < d * d; ++i) {
+        gain[i] = 0;
+    }
+    for (int entry = 0; entry < count; ++entry) {
+        const int column = online_latent_dynamics_column(self, phase, entry);
+        if (column >= 2 * d) {
+            gain[online_latent_dynamics_row(self, phase, entry) * d + column - 2 * d] = entries[entry];
+        }
+    }
+}
+
+/* Takes the joint velocities of a measurement, if all its numbers are finite; whether they are. */
+static inline MAYBE_UNUSED bool online_memory_accepts(online_memory *restrict self, double time_s, const real *x,
+        const real *dx)
+{
+    const bool is_finite = online_first_undefined(x, 18) + online_first_undefined(dx, 18) == 36;
+    const bool is_accepted = is_finite && is_finite_double(time_s);
+    for (int i = 0; i < 12; ++i) {
+        self->joint_velocity[i] = is_accepted ? dx[i] : 0;
+    }
+    return is_accepted;
+}
+
+/* Time since the last command, at most one stage, and one stage where it is not known or the clock stands still. */
+static inline MAYBE_UNUSED double online_memory_since_command(online_memory *self, double time_s, double step_s)
+{
+    const double passed_s = time_s - self->command_s;
+    const bool is_known = self->has_command && passed_s > 0.0 && passed_s <= step_s;
+    return is_known ? passed_s : step_s;
+}
+
+/* Writes what holds the posture, without one the middle of the ranges: fading torques that damp the joints. */
+static inline MAYBE_UNUSED void online_memory_hold(online_memory *restrict self,
+        const online_fallback_settings *fallback, double time_s, double step_s, const real *limit, const real *lower,
+        const real *upper, real *restrict torque, real *restrict joints)
+{
+    const real fade = EXP(-(real)online_memory_since_command(self, time_s, step_s) / fallback->torque_decay_s);
+    for (int i = 0; i < 12; ++i) {
+        self->feed_forward_nm[i] *= fade;
+        const real damping = fallback->damping_nm_s * self->joint_velocity[i];
+        torque[i] = online_clamped_torque(self->feed_forward_nm[i] - damping, limit[i]);
+        const real kept = self->joint_position[i];
+        const real middle = (real)0.5 * (lower[i] + upper[i]);
+        joints[i] = self->has_position ? kept : middle;
+    }
+}
+
+/* The smaller of two numbers; the second if the first is not one. */
+static inline MAYBE_UNUSED real online_smaller(real value, real other)
+{
+    return value < other ? value : other;
+}
+
+/* The position within the limits that is nearest to this one; the lower limit for what is not a number. */
+static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
+{
+    return online_smaller(online_greater(position, lower), upper);
+}
+
+/* Keeps a posture, within the limits, for the command and for a hold. */
+static inline MAYBE_UNUSED void online_memory_keep_posture(online_memory *restrict self, const real *joints,
+        const real *lower, const real *upper)
+{
+    for (int i = 0; i < 12; ++i) {
+        self->joint_position[i] = online_clamped_joint(joints[i], lower[i], upper[i]);
+    }
+    self->has_position = true;
+}
+
+/* A time, or where it is not known that of the last command, if there was one, and one stage. */
+static inline MAYBE_UNUSED double online_memory_now_s(online_memory *self, double time_s, double step_s)
+{
+    const double next_s = self->command_s + step_s;
+    const bool is_known = is_finite_double(time_s) || !self->has_command;
+    return is_known ? time_s : next_s;
+}
+
+/* Keeps the time of a command and awaits the next measurement. */
+static inline MAYBE_UNUSED void online_memory_keep_time(online_memory *self, double time_s, double step_s)
+{
+    self->command_s = online_memory_now_s(self, time_s, step_s);
+    self->has_command = is_finite_double(self->command_s);
+    memset(self->joint_velocity, 0, sizeof(real[12]));
+}
+
+/* Whether a measurement is not believed: it jumps, and few did before. Its velocities must not become torques. */
+static inline MAYBE_UNUSED bool online_memory_refuses(online_memory *self, bool is_jump, int patience)
+{
+    if (!is_jump || self->disbelieved >= patience) {
+        self->disbelieved = 0;
+        return false;
+    }
+    self->disbelieved += 1;
+    memset(self->joint_velocity, 0, sizeof(real[12]));
+    return true;
+}
+
+/* Stages that have passed at a time; -1 without a plan. */
+static inline MAYBE_UNUSED double online_plan_time_passed(online_plan_time *self, double time_s)
+{
+    const double passed = (time_s - self->start_s) / self->step_s;
+    return self->is_made ? passed : -1.0;
+}
+
+/* Whether a measured state is more than most of its deviations from what the states of a plan predict for its
+ * time; not beyond their end. */
+static inline MAYBE_UNUSED bool online_plan_time_is_jump(online_plan_time *self, double time_s, const real *states,
+        int horizon, const real *measured, const real *deviation, int d, real most)
+{
+    const double passed = online_plan_time_passed(self, time_s);
+    if (!(passed >= 0.0 && passed <= (double)horizon)) {
+        return false;
+    }
+    const int whole = (int)passed;
+    const int before = whole < horizon ? whole : horizon - 1;
+    const real share = (real)(passed - (double)before);
+    real largest = 0;
+    for (int i = 0; i < 2 * d; ++i) {
+        const real start = states[2 * d * before + i];
+        const real predicted = start + share * (states[2 * d * (before + 1) + i] - start);
+        const real change = (measured[i] - predicted) / deviation[i];
+        largest = online_greater(solver_magnitude(change), largest);
+    }
+    return largest > most;
+}
+
+/* The instant whose posture is commanded for a stage, s. */
+static inline MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, int stage)
+{
+    return self->start_s + ((double)stage + ONLINE_POSTURE_SHARE) * self->step_s;
+}
+
+/* Whether a time belongs to a stage or is beyond the last. */
+static inline MAYBE_UNUSED bool online_plan_time_reaches(online_plan_time *self, double time_s)
+{
+    return online_plan_time_passed(self, time_s) > -0.5;
+}
+
+/* The stage that a time belongs to, at most most; that as well for a time before the plan. */
+static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self, double time_s, int most)
+{
+    /* A time that is a stage's beginning but for rounding belongs to that stage. */
+    const double passed = online_plan_time_passed(self, time_s) + 1e-6;
+    const bool is_within = online_plan_time_reaches(self, time_s) && passed < (double)most;
+    return is_within ? (int)passed : most;
+}
+
+static inline MAYBE_UNUSED online_share online_share_unknown(void)
+{
+    return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
+}
+
+/* Takes what the velocities of a measurement say after a part of the plan's first stage, or a little later,
+ * with the states at the stage's beginning and end, its input, and the latent input of the drives at the
+ * command and now. */
+static inline MAYBE_UNUSED void online_share_update(online_share *restrict self, double passed, real step_s,
+        real time_constant_s, const real *by_input, const real *input, const real *states, const real *measured,
+        const real *deviation, const real *at_command, const real *drives, int d)
+{
+    if (!(passed > 0.0 && passed < 1.1)) {
+        return;
+    }
+    const real part = (real)passed;
+    real size = 0;
+    real agreement = 0;
+    for (int i = 0; i < d; ++i) {
+        real by_plan = 0;
+        real by_drives = 0;
+        for (int k = 0; k < d; ++k) {
+            const real effect = part * by_input[i * d + k] / deviation[d + i];
+            by_plan += effect * input[k];
+            by_drives += effect * ((real)0.5 * (at_command[k] + drives[k]));
+        }
+        const real start = states[d + i];
+        const real planned = start + part * (states[3 * d + i] - start);
+        const real missed = (measured[d + i] - planned) / deviation[d + i] - by_drives;
+        const real change = by_plan + by_drives;
+        size += change * change;
+        agreement += change * missed;
+    }
+    if (!(size > 0 && solver_is_finite_number(size) && solver_is_finite_number(agreement))) {
+        return;
+    }
+    if (self->unit == 0) {
+        self->unit = size;
+    }
+    const real ratio = size / self->unit;
+    const real weight = online_smaller(ratio, ONLINE_LARGEST_WEIGHT);
+    const real kept = EXP(-part * step_s / time_constant_s);
+    self->weight = kept * self->weight + weight;
+    self->weighted = kept * self->weighted + weight * self->estimate * (1 + agreement / size);
+    const real mean = (ONLINE_PRIOR_WEIGHT + self->weighted) / (ONLINE_PRIOR_WEIGHT + self->weight);
+    self->estimate = online_greater(ONLINE_LEAST, online_smaller(mean, ONLINE_LARGEST));
+}
+
+/* Whether a state within STATE_REACH standard deviations of some state of the trajectory reaches row . z =
+ * bound. */
+static inline MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *self, const real *row, real bound,
+        const real *deviation)
+{
+    const int d = online_trajectory_latent_dim(self);
+    real z[D] = {0};
+    real spread = 0;
+    real farthest = 0;
+    for (int i = 0; i < d; ++i) {
+        spread += row[i] * deviation[i] * (row[i] * deviation[i]);
+    }
+    for (int sample = 0; sample < online_trajectory_count(self); ++sample) {
+        online_trajectory_write_position(self, sample, z);
+        real along = 0;
+        for (int i = 0; i < d; ++i) {
+            along += z[i] * row[i];
+        }
+        const bool is_farther = sample == 0 || !(farthest > along);
+        farthest = is_farther ? along : farthest;
+    }
+    return farthest + ONLINE_STATE_REACH * SQRT(spread) >= bound;
+}
+
+static inline MAYBE_UNUSED online_instant online_trajectory_locate(online_trajectory *self, double time_s)
+{
+    const int count = online_trajectory_count(self);
+    int low = 0;
+    int high = count;
+    while (low < high) {
+        const int middle = low + (high - low) / 2;
+        /* Never so, but analysers of the C do not see it. */
+        if (middle >= count) {
+            break;
+        }
+        if (online_trajectory_time_s(self, middle) <= time_s + ONLINE_TIME_TOLERANCE_S) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    const int before = low > 0 && low <= count ? low - 1 : 0;
+    double share = 0.0;
+    if (before + 1 < count) {
+        const double start_s = online_trajectory_time_s(self, before);
+        share = (time_s - start_s) / (online_trajectory_time_s(self, before + 1) - start_s);
+        share = share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
+    }
+    return (online_instant){.sample = before, .share = (real)share};
+}
+
+/* Writes the mean latent input over a time: between two samples their mean, beyond the ends the end's. */
+static inline MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *self, double time_s,
+        double duration_s, real *restrict mean)
+{
+    const int d = online_trajectory_latent_dim(self);
+    const int last = online_trajectory_count(self) - 1;
+    const double first_s = online_trajectory_time_s(self, 0);
+    const double last_s = online_trajectory_time_s(self, last);
+    const double end_s = time_s + duration_s;
+    real input[D] = {0};
+    real next[D] = {0};
+    for (int i = 0; i < d; ++i) {
+        mean[i] = 0;
+    }
+    const double before_s = (first_s < end_s ? first_s : end_s) - time_s;
+    if (before_s > 0.0) {
+        online_trajectory_write_input(self, 0, input);
+        online_add_scaled((real)before_s, input, d, mean);
+    }
+    online_instant at = online_trajectory_locate(self, time_s);
+    bool has_input = false;
+    for (int sample = at.sample; sample < last; ++sample) {
+        const double start_s = online_trajectory_time_s(self, sample);
+        const double stop_s = online_trajectory_time_s(self, sample + 1);
+        if (start_s >= end_s) {
+            break;
+        }
+        const double from_s = start_s > time_s ? start_s : time_s;
+        const double span_s = (stop_s < end_s ? stop_s : end_s) - from_s;
+        if (span_s > 0.0) {
+            const real half_s = (real)(0.5 * span_s);
+            if (!has_input) {
+                online_trajectory_write_input(self, sample, input);
+            }
+            online_trajectory_write_input(self, sample + 1, next);
+            online_add_scaled(half_s, input, d, mean);
+            online_add_scaled(half_s, next, d, mean);
+            memcpy(input, next, sizeof(real[D]));
+            has_input = true;
+        }
+    }
+    const double after_s = end_s - (last_s > time_s ? last_s : time_s);
+    if (after_s > 0.0) {
+        online_trajectory_write_input(self, last, input);
+        online_add_scaled((real)after_s, input, d, mean);
+    }
+    for (int i = 0; i < d; ++i) {
+        mean[i] /= (real)duration_s;
+    }
+}
+
+static inline MAYBE_UNUSED int online_trajectory_phase_at(online_trajectory *self, double time_s)
+{
+    online_instant at = online_trajectory_locate(self, time_s);
+    return online_trajectory_phase(self, at.sample);
+}
+
+/* Writes the phases of the stages from a time on: the trajectory's, changed where the feet disagree. */
+static inline MAYBE_UNUSED online_contact online_trajectory_schedule(online_trajectory *self, double time_s,
+        double step_s, int measured, int horizon, int *restrict phases)
+{
+    for (int k = 0; k < horizon; ++k) {
+        phases[k] = online_trajectory_phase_at(self, time_s + ((double)k + 0.5) * step_s);
+    }
+    if (measured == ONLINE_NO_PHASE) {
+        return ONLINE_UNKNOWN;
+    }
+    if (measured == phases[0] || measured == online_trajectory_phase_at(self, time_s)) {
+        return ONLINE_AS_SCHEDULED;
+    }
+    int next = horizon;
+    int last = 0;
+    for (int k = horizon - 1; k >= 0; --k) {
+        if (phases[k] == measured) {
+            next = k;
+        }
+        if (online_trajectory_phase_at(self, time_s - (double)(k + 1) * step_s) == measured) {
+            last = k + 1;
+        }
+    }
+    if (next < horizon && (last == 0 || next <= last)) {
+        for (int k = 0; k < next; ++k) {
+            phases[k] = measured;
+        }
+        return ONLINE_EARLY;
+    }
+    phases[0] = measured;
+    return last > 0 ? ONLINE_LATE : ONLINE_UNKNOWN;
+}
+
+/* Writes (z, dz) of a sample. */
+static inline MAYBE_UNUSED void online_trajectory_write_state(online_trajectory *self, int sample,
+        real *restrict state)
+{
+    online_trajectory_write_position(self, sample, state);
+    online_trajectory_write_velocity(self, sample, state + online_trajectory_latent_dim(self));
+}
+
+/* Writes (z, dz) at a time. */
+static inline MAYBE_UNUSED void online_trajectory_state_at(online_trajectory *self, double time_s,
+        real *restrict state)
+{
+    const int d = online_trajectory_latent_dim(self);
+    const int last = online_trajectory_count(self) - 1;
+    online_instant at = online_trajectory_locate(self, time_s);
+    online_trajectory_write_state(self, at.sample, state);
+    if (at.sample < last) {
+        real later[X] = {0};
+        online_trajectory_write_state(self, at.sample + 1, later);
+        for (int i = 0; i < 2 * d; ++i) {
+            state[i] += at.share * (later[i] - state[i]);
+        }
+    }
+    if (time_s < online_trajectory_time_s(self, 0) || time_s > online_trajectory_time_s(self, last)) {
+        for (int i = d; i < 2 * d; ++i) {
+            state[i] = 0;
+        }
+    }
+}
+
+/* Whether a sample is in the window around another one: in its phase and near in time. */
+static inline MAYBE_UNUSED bool online_trajectory_is_beside(online_trajectory *self, int sample, int other)
+{
+    const double off_s = online_trajectory_time_s(self, other) - online_trajectory_time_s(self, sample);
+    return online_trajectory_phase(self, other) == online_trajectory_phase(self, sample)
+            && off_s <= ONLINE_HALF_WINDOW_S && off_s >= -ONLINE_HALF_WINDOW_S;
+}
+
+/* Writes the slope of the straight line through the velocities around a sample, within its phase. */
+static inline MAYBE_UNUSED void online_trajectory_write_acceleration(online_trajectory *self, int sample,
+        real *restrict slope)
+{
+    const int d = online_trajectory_latent_dim(self);
+    int first = sample;
+    int last = sample;
+    while (first > 0 && online_trajectory_is_beside(self, sample, first - 1)) {
+        first -= 1;
+    }
+    while (last + 1 < online_trajectory_count(self) && online_trajectory_is_beside(self, sample, last + 1)) {
+        last += 1;
+    }
+    /* A lone sample of its phase: its neighbours are all there is. */
+    const bool is_lone = first == last;
+    if (is_lone && first > 0) {
+        first -= 1;
+    }
+    if (is_lone && last + 1 < online_trajectory_count(self)) {
+        last += 1;
+    }
+    double mean_s = 0.0;
+    for (int other = first; other <= last; ++other) {
+        mean_s += online_trajectory_time_s(self, other);
+    }
+    mean_s /= (double)(last - first + 1);
+    for (int i = 0; i < d; ++i) {
+        slope[i] = 0;
+    }
+    double spread = 0.0;
+    real velocity[D] = {0};
+    for (int other = first; other <= last; ++other) {
+        const double off_s = online_trajectory_time_s(self, other) - mean_s;
+        spread += off_s * off_s;
+        online_trajectory_write_velocity(self, other, velocity);
+        online_add_scaled((real)off_s, velocity, d, slope);
+    }
+    for (int i = 0; i < d; ++i) {
+        slope[i] /= (real)spread;
+    }
+}
+
+/* Writes the standard deviation of each of (z, dz), never below a hundredth of the largest of its kind; still
+ * if that is a motion within which the trajectory stands still. */
+static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajectory *self, const real *still,
+        real *restrict deviation)
+{
+    const int d = online_trajectory_latent_dim(self);
+    real mean[X] = {0};
+    real state[X] = {0};
+    for (int sample = 0; sample < online_trajectory_count(self); ++sample) {
+        online_trajectory_write_state(self, sample, state);
+        online_add_scaled(1, state, 2 * d, mean);
+    }
+    for (int i = 0; i < 2 * d; ++i) {
+        mean[i] /= (real)online_trajectory_count(self);
+        deviation[i] = 0;
+    }
+    for (int sample = 0; sample < online_trajectory_count(self); ++sample) {
+        online_trajectory_write_state(self, sample, state);
+        for (int i = 0; i < 2 * d; ++i) {
+            deviation[i] += (state[i] - mean[i]) * (state[i] - mean[i]);
+        }
+    }
+    bool is_still = true;
+    for (int i = 0; i < 2 * d; ++i) {
+        deviation[i] = SQRT(deviation[i] / (real)online_trajectory_count(self));
+        is_still = is_still && (i >= d || deviation[i] < still[i]);
+    }
+    for (int half = 0; half < 2; ++half) {
+        real least = 0;
+        for (int i = half * d; i < (half + 1) * d; ++i) {
+            least = online_greater(deviation[i], least);
+        }
+        const real lowest = ONLINE_DEVIATION_FLOOR * least;
+        least = least > 0 ? lowest : 1;
+        for (int i = half * d; i < (half + 1) * d; ++i) {
+            const real own = online_greater(deviation[i], least);
+            deviation[i] = is_still ? still[i] : own;
+        }
     }
 }
 

@@ -223,7 +223,8 @@ static inline int solver_program_at(solver_program *self, int stage)
 
 static inline int solver_shape_first_link(solver_shape *self)
 {
-    return self->input + self->soft + (self->soft > 0 ? 1 : 0);
+    const int slack = self->soft > 0 ? 1 : 0;
+    return self->input + self->soft + slack;
 }
 
 /* Rows of a stage; a slack's own t >= 0 follows its soft rows. */
@@ -243,25 +244,6 @@ static inline real *solver_program_bounds_mut(solver_program *self, int stage)
 {
     const int first = solver_program_at(self, stage) * solver_shape_memory(&self->shape);
     return self->rows + first;
-}
-
-/* Moves the horizon on by one stage: the second becomes the first, and the first the last, whose data have to be
- * written then. Inputs, slacks and multipliers stay as a guess at the next solution. */
-static inline void solver_program_shift(solver_program *self)
-{
-    const int rows = solver_shape_rows(&self->shape);
-    const int memory = solver_shape_memory(&self->shape);
-    const int last = solver_program_at(self, self->stages_len - 1);
-    const int fresh = self->first;
-    if (last != fresh) {
-        memcpy(self->stages[fresh].v, self->stages[last].v, sizeof(real[NU]));
-        self->stages[fresh].t = self->stages[last].t;
-        memcpy(self->stages[fresh].plain, self->stages[last].plain, sizeof(real[NU]));
-        for (int i = 2 * rows; i < 3 * rows; ++i) {
-            self->rows[fresh * memory + i] = self->rows[last * memory + i];
-        }
-        self->first = solver_program_at(self, 1);
-    }
 }
 
 static inline solver_products solver_products_zeros(void)
@@ -696,6 +678,25 @@ static inline bool solver_program_prepare(solver_program *self)
         solver_stage_pull(stage, linear, by_v);
     }
     return true;
+}
+
+/* Moves the horizon on by one stage: the second becomes the first, and the first the last, whose data have to be
+ * written then. Inputs, slacks and multipliers stay as a guess at the next solution. */
+static inline void solver_program_shift(solver_program *self)
+{
+    const int rows = solver_shape_rows(&self->shape);
+    const int memory = solver_shape_memory(&self->shape);
+    const int last = solver_program_at(self, self->stages_len - 1);
+    const int fresh = self->first;
+    if (last != fresh) {
+        memcpy(self->stages[fresh].v, self->stages[last].v, sizeof(real[NU]));
+        self->stages[fresh].t = self->stages[last].t;
+        memcpy(self->stages[fresh].plain, self->stages[last].plain, sizeof(real[NU]));
+        for (int i = 2 * rows; i < 3 * rows; ++i) {
+            self->rows[fresh * memory + i] = self->rows[last * memory + i];
+        }
+        self->first = solver_program_at(self, 1);
+    }
 }
 
 /* out += M x, each row summed in the order of its entries; four rows at a time, as their sums do not wait for each

@@ -23,7 +23,7 @@ int main(int argc, char **argv)
         memcpy(c.stance_joints, numbers, sizeof c.stance_joints);
         memcpy(c.stance_attitude, numbers + 12, sizeof c.stance_attitude);
         memcpy(c.stance_feet, flags, sizeof c.stance_feet);
-        c.plan_phase = flags[4];
+        c.plan.phase = flags[4];
         const int is_lifted = lift(&c, u_lat, losses, found);
         const int same = is_lifted == flags[5] && (!is_lifted || memcmp(found, wanted, sizeof found) == 0);
         if (!same && different < 3) {

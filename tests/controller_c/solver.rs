@@ -338,7 +338,7 @@ fn constructs_outside_the_subset_are_named_with_their_place() {
         };
         let unit = Unit {
             prefix: "test",
-            roots: &["count"],
+            users: "test_count()",
             ..Unit::default()
         };
         let fault = translate(&[source], &unit).expect_err(body);

@@ -1,8 +1,10 @@
 //! The result of a control step, and that of one without a trusted plan: first the last good plan, shifted, for as many
 //! stages as the settings allow; then a hold, in which the posture stays, the torque fades, the joints are damped.
 
+use super::control_model::{clamped_joint, clamped_torque};
 use super::controller::Controller;
-use super::lift::StanceState;
+use super::dense::{Real, first_undefined};
+use super::settings::FallbackSettings;
 use crate::robot::JOINT_DIM;
 
 /// Makes [`Status`] of a table: code, word, and text that begins with the word.
@@ -151,94 +153,126 @@ impl Command {
     }
 }
 
-#[derive(Debug, Clone, Default)]
+/// What stays from step to step. C is made of it.
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Memory {
-    pub measured: Vec<f64>,
-    pub input: Vec<f64>,
-    pub stance: Option<StanceState>,
-    pub joint_velocity: [f64; JOINT_DIM],
+    /// Of the present measurement, zero unless it is believed.
+    pub joint_velocity: [Real; 12],
     /// Feed-forward part of the last torques, without a hold's damping.
-    pub feed_forward_nm: [f64; JOINT_DIM],
+    pub feed_forward_nm: [Real; 12],
     /// Posture of the last plan, or the one to hold.
-    pub joint_position: Option<[f64; JOINT_DIM]>,
-    pub command_s: Option<f64>,
+    pub joint_position: [Real; 12],
+    pub has_position: bool,
+    pub command_s: f64,
+    pub has_command: bool,
     /// Measurements in a row that were not believed.
     pub disbelieved: usize,
 }
 
 impl Memory {
-    pub(super) fn new(latent_dim: usize) -> Self {
-        Self {
-            measured: vec![0.0; 2 * latent_dim],
-            input: vec![0.0; latent_dim],
-            ..Self::default()
+    /// Takes the joint velocities of a measurement, if all its numbers are finite; whether they are.
+    pub(super) fn accepts(&mut self, time_s: f64, x: &[Real], dx: &[Real]) -> bool {
+        let is_finite = first_undefined(x, 18) + first_undefined(dx, 18) == 36;
+        let is_accepted = is_finite && time_s.is_finite();
+        for i in 0..12 {
+            self.joint_velocity[i] = if is_accepted { dx[i] } else { 0.0 };
+        }
+        is_accepted
+    }
+
+    /// Whether a measurement is not believed: it jumps, and few did before. Its velocities must not become torques.
+    pub(super) fn refuses(&mut self, is_jump: bool, patience: usize) -> bool {
+        if !is_jump || self.disbelieved >= patience {
+            self.disbelieved = 0;
+            return false;
+        }
+        self.disbelieved += 1;
+        self.joint_velocity = [0.0; 12];
+        true
+    }
+
+    /// Keeps a posture, within the limits, for the command and for a hold.
+    pub(super) fn keep_posture(&mut self, joints: &[Real], lower: &[Real], upper: &[Real]) {
+        for i in 0..12 {
+            self.joint_position[i] = clamped_joint(joints[i], lower[i], upper[i]);
+        }
+        self.has_position = true;
+    }
+
+    /// Keeps the time of a command and awaits the next measurement.
+    pub(super) fn keep_time(&mut self, time_s: f64, step_s: f64) {
+        self.command_s = self.now_s(time_s, step_s);
+        self.has_command = self.command_s.is_finite();
+        self.joint_velocity = [0.0; 12];
+    }
+
+    /// A time, or where it is not known that of the last command, if there was one, and one stage.
+    pub(super) fn now_s(&self, time_s: f64, step_s: f64) -> f64 {
+        let next_s = self.command_s + step_s;
+        let is_known = time_s.is_finite() || !self.has_command;
+        if is_known { time_s } else { next_s }
+    }
+
+    /// Time since the last command, at most one stage, and one stage where it is not known or the clock stands still.
+    fn since_command(&self, time_s: f64, step_s: f64) -> f64 {
+        let passed_s = time_s - self.command_s;
+        let is_known = self.has_command && passed_s > 0.0 && passed_s <= step_s;
+        if is_known { passed_s } else { step_s }
+    }
+
+    /// Writes what holds the posture, without one the middle of the ranges: fading torques that damp the joints.
+    pub(super) fn hold(
+        &mut self,
+        fallback: &FallbackSettings,
+        time_s: f64,
+        step_s: f64,
+        limit: &[Real],
+        lower: &[Real],
+        upper: &[Real],
+        torque: &mut [Real],
+        joints: &mut [Real],
+    ) {
+        let fade = (-(self.since_command(time_s, step_s) as Real) / fallback.torque_decay_s).exp();
+        for i in 0..12 {
+            self.feed_forward_nm[i] *= fade;
+            let damping = fallback.damping_nm_s * self.joint_velocity[i];
+            torque[i] = clamped_torque(self.feed_forward_nm[i] - damping, limit[i]);
+            let kept = self.joint_position[i];
+            let middle = 0.5 * (lower[i] + upper[i]);
+            joints[i] = if self.has_position { kept } else { middle };
         }
     }
 }
 
 impl Controller {
     pub(super) fn fall_back(&mut self, time_s: f64, command: &mut Command) {
-        let now = self.time_or_one_stage_on(time_s);
-        let stages = (self.settings.fallback.plan_stages).min(self.settings.horizon);
-        let stage = now.and_then(|now| self.plan.stage_at(now));
-        match stage.filter(|&stage| stage < stages) {
-            Some(stage) if self.write_plan(stage, command) => command.source = Source::ShiftedPlan,
-            Some(_) | None => self.hold(now, self.since_last_command(time_s), command),
-        }
-    }
-
-    /// A time, or where it is not known that of the last command and one stage.
-    pub(super) fn time_or_one_stage_on(&self, time_s: f64) -> Option<f64> {
-        match time_s.is_finite() {
-            true => Some(time_s),
-            false => Some(self.memory.command_s? + self.settings.step_s),
-        }
-    }
-
-    /// Time since the last command, at most one stage, and one stage where it is not known or the clock stands still.
-    fn since_last_command(&self, time_s: f64) -> f64 {
         let step_s = self.settings.step_s;
-        let passed_s = (self.memory.command_s).map_or(step_s, |last_s| time_s - last_s);
-        match passed_s > 0.0 && passed_s <= step_s {
-            true => passed_s,
-            false => step_s,
+        let now_s = self.memory.now_s(time_s, step_s);
+        let stages = (self.settings.fallback.plan_stages).min(self.settings.horizon);
+        let stage = self.plan.time.stage_at(now_s, stages);
+        if stage < stages && self.write_plan(stage, command) {
+            command.source = Source::ShiftedPlan;
+            return;
         }
-    }
-
-    fn hold(&mut self, now: Option<f64>, passed_s: f64, command: &mut Command) {
-        let fallback = &self.settings.fallback;
-        let fade = (-passed_s / fallback.torque_decay_s).exp();
-        // Velocities of a measurement that was refused must not become torques.
-        let damping = match command.status {
-            Status::NotFinite | Status::WrongDimension | Status::MeasurementJump => 0.0,
-            _ => fallback.damping_nm_s,
-        };
-        for torque in &mut self.memory.feed_forward_nm {
-            *torque *= fade;
+        let [lower, upper] = self.plant.joint_limits();
+        if let Some(reference) = &self.reference
+            && now_s.is_finite()
+            && !self.memory.has_position
+        {
+            reference.state_at(now_s, &mut self.posture);
+            let (z, _) = self.posture.split_at(self.plant.latent_dim());
+            let joints = self.plant.decode_joints(z);
+            self.memory.keep_posture(&joints, &lower, &upper);
         }
-        let torque = std::array::from_fn(|joint| {
-            self.memory.feed_forward_nm[joint] - damping * self.memory.joint_velocity[joint]
-        });
-        command.torque_nm = self.plant.clamp_torque(torque);
+        let (fallback, robot) = (&self.settings.fallback, self.plant.robot());
+        let limit = robot.torque_limit_nm();
+        let (torque, joints) = (&mut command.torque_nm, &mut command.joint_position_rad);
+        (self.memory).hold(
+            fallback, time_s, step_s, limit, &lower, &upper, torque, joints,
+        );
         command.losses_nm = [0.0; JOINT_DIM];
-        if self.memory.joint_position.is_none() {
-            self.memory.joint_position = now.and_then(|now| self.reference_posture(now));
-        }
-        let middle = |(lower, upper): (f64, f64)| 0.5 * (lower + upper);
-        command.joint_position_rad = match self.memory.joint_position {
-            Some(position) => position,
-            None => self.plant.robot().joint_limit_rad().map(middle),
-        };
         command.joint_velocity_rad_s = [0.0; JOINT_DIM];
         command.u_lat.fill(0.0);
         command.source = Source::Hold;
-    }
-
-    fn reference_posture(&mut self, now: f64) -> Option<[f64; JOINT_DIM]> {
-        let d = self.plant.latent_dim();
-        let reference = self.reference.as_ref()?;
-        reference.state_at(now, &mut self.memory.measured);
-        let joints = self.plant.decode_joints(&self.memory.measured[..d]);
-        Some(self.plant.clamp_joints(joints))
     }
 }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::dense::Real;
+use super::dense::{Real, greater, smaller};
 use super::error::ControlError;
 use super::estimate::InputGivenState;
-use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM, joint_loss};
 
 /// Maps, limits and input statistics of a model on its robot, scale factors multiplied in: SI units on its side.
 #[derive(Debug, Clone)]
@@ -173,16 +173,23 @@ impl ControlModel {
     /// Losses of the joints, N m, over a time `step_s` from latent state `start` to `end` (both `(z, dz)`): at the mean
     /// decoded velocities, with their difference as acceleration. Zero without actuators, at most the torque limit.
     pub fn planned_losses(&self, start: &[f64], end: &[f64], step_s: f64) -> [f64; JOINT_DIM] {
-        if self.input_rule.actuators().is_none() {
+        let Some(actuators) = self.input_rule.actuators() else {
             return [0.0; JOINT_DIM];
-        }
+        };
         let [before, after] = [start, end].map(|state| {
             let (z, dz) = state.split_at(self.latent_dim());
             self.decode_joint_velocities(z, dz)
         });
-        let dq = std::array::from_fn(|joint| 0.5 * (before[joint] + after[joint]));
-        let ddq = std::array::from_fn(|joint| (after[joint] - before[joint]) / step_s);
-        self.clamp_torque(self.input_rule.losses(&dq, &ddq))
+        let limit = self.robot().torque_limit_nm();
+        std::array::from_fn(|i| {
+            planned_loss(
+                &actuators.of_joint(i),
+                before[i],
+                after[i],
+                step_s,
+                limit[i],
+            )
+        })
     }
 
     /// `u_lat = pinv(J_Eᵀ) s_u u` with the encoder's Jacobian at `x` if it is nonlinear and has full row rank there,
@@ -209,17 +216,10 @@ impl ControlModel {
         let limits = self.robot().joint_limit_rad();
         [limits.map(|limit| limit.0), limits.map(|limit| limit.1)]
     }
-
-    /// The joint positions within the robot's limits that are nearest to these; the lower limit for NaN.
-    pub(super) fn clamp_joints(&self, joints_rad: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
-        let limits = self.robot().joint_limit_rad();
-        std::array::from_fn(|joint| {
-            clamped_joint(joints_rad[joint], limits[joint].0, limits[joint].1)
-        })
-    }
 }
 
-fn clamped_torque(torque: Real, limit: Real) -> Real {
+/// The torque within a limit that is nearest to this one; zero for what is not a number.
+pub(super) fn clamped_torque(torque: Real, limit: Real) -> Real {
     if torque >= -limit {
         if torque > limit { limit } else { torque }
     } else if torque < 0.0 {
@@ -229,12 +229,26 @@ fn clamped_torque(torque: Real, limit: Real) -> Real {
     }
 }
 
-fn clamped_joint(position: Real, lower: Real, upper: Real) -> Real {
-    if position >= lower {
-        if position > upper { upper } else { position }
-    } else {
-        lower
+/// The position within the limits that is nearest to this one; the lower limit for what is not a number.
+pub(super) fn clamped_joint(position: Real, lower: Real, upper: Real) -> Real {
+    smaller(greater(position, lower), upper)
+}
+
+/// Loss of a joint over a time, N m, at the mean of its velocities at both ends with their difference as acceleration; at
+/// most the limit.
+fn planned_loss(of: &[Real; 3], before: Real, after: Real, step_s: Real, limit: Real) -> Real {
+    let dq = 0.5 * (before + after);
+    let ddq = (after - before) / step_s;
+    clamped_torque(joint_loss(of, dq, ddq), limit)
+}
+
+/// The largest violation of a limit by joint positions, in half ranges, or `largest` if that is more.
+pub(super) fn violation(q: &[Real], lower: &[Real], upper: &[Real], mut largest: Real) -> Real {
+    for i in 0..12 {
+        let outside = greater(q[i] - upper[i], lower[i] - q[i]);
+        largest = greater(outside / (0.5 * (upper[i] - lower[i])), largest);
     }
+    largest
 }
 
 /// `out += M v`, without allocating.

@@ -17,7 +17,7 @@ use super::problem::{ROW_MARGIN, StageRows, row_selection, stage_cost};
 use super::qp::QpSolver;
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelection};
-use super::stage::StageShape;
+use super::stage::{StageShape, write_weights};
 use super::trajectory::Trajectory;
 use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
 
@@ -29,7 +29,6 @@ pub(super) const SOFTENED_FROM: Real = 1.05 * ROW_MARGIN;
 /// trajectory, [`Controller::step_into`] turns each measurement into a [`Command`]. A step allocates nothing of its own
 /// and never fails: without a trusted plan the last good one is shifted and used for a few stages, then the posture is
 /// held with fading torques and damped joints until measurements make sense again. The status says why.
-/// the status says why. As soon as measurements make sense again, so do commands.
 #[derive(Debug)]
 pub struct Controller {
     pub(super) plant: ControlModel,
@@ -48,6 +47,11 @@ pub struct Controller {
     /// Latent state of the posture that is commanded.
     pub(super) posture: Vec<f64>,
     pub(super) memory: Memory,
+    /// Latent state of the last measurement that was believed, and latent input of the last command.
+    pub(super) measured: Vec<f64>,
+    pub(super) last_input: Vec<f64>,
+    /// What the plan's inputs are lifted for; none without a plan.
+    pub(super) stance: Option<StanceState>,
     pub(super) effectiveness: Effectiveness,
 }
 
@@ -85,7 +89,10 @@ impl Controller {
             engine,
             plan: Plan::new(d, settings.horizon, settings.step_s),
             posture: vec![0.0; 2 * d],
-            memory: Memory::new(d),
+            memory: Memory::default(),
+            measured: vec![0.0; 2 * d],
+            last_input: vec![0.0; d],
+            stance: None,
             effectiveness: Effectiveness::full(d),
             reference: None,
             near_rows: rows.clone(),
@@ -160,10 +167,9 @@ impl Controller {
         }
         let d = self.plant.latent_dim();
         let deviation = reference.deviation();
-        let weight = self.settings.velocity_weight;
-        let of_velocity = |i: usize| weight * (deviation[d + i] / deviation[i]).powi(2);
-        let mut state_weights = vec![1.0; d];
-        state_weights.extend((0..d).map(of_velocity));
+        let mut state_weights = vec![1.0; 2 * d];
+        let of_velocities = self.settings.velocity_weight;
+        write_weights(deviation, of_velocities, d, &mut state_weights);
         let rows = match row_selection(&self.plant, &self.settings) {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),
@@ -198,22 +204,20 @@ impl Controller {
         let reference = self.reference.as_ref();
         let deviation = reference.map_or(&[][..], |reference| &reference.deviation()[..d]);
         (0..self.settings.horizon).flat_map(move |stage| {
-            let ends = self
-                .plan
-                .end(stage)
-                .iter()
-                .zip(&self.horizon.stages[stage].end);
-            let scaled = ends.zip(deviation);
+            let end = &self.horizon.stages[stage].end;
+            let scaled = self.plan.end(stage).iter().zip(end).zip(deviation);
             scaled.map(|((planned, reference), scale)| (planned - reference) / scale)
         })
     }
 
     /// Forgets plan and past measurements, but not the reference.
     pub fn reset(&mut self) {
-        self.plan.start_s = None;
+        self.plan.time.is_made = false;
         self.horizon.forget();
         self.engine.forget();
-        self.memory = Memory::new(self.plant.latent_dim());
+        (self.memory, self.stance) = (Memory::default(), None);
+        self.measured.fill(0.0);
+        self.last_input.fill(0.0);
         self.effectiveness = Effectiveness::full(self.plant.latent_dim());
     }
 
@@ -243,13 +247,8 @@ impl Controller {
         };
         let dynamics = self.dynamics.as_mut();
         let contact = self.horizon.prepare(&inputs, dynamics, time_s, phase);
-        let Horizon {
-            programs,
-            shift,
-            is_new,
-            ..
-        } = &self.horizon;
-        self.engine.prepare(programs, *shift, is_new);
+        let made = &self.horizon;
+        (self.engine).prepare(&made.programs, made.shift, &made.is_new);
         Some(contact)
     }
 
@@ -282,8 +281,8 @@ impl Controller {
                 false => self.effectiveness.held = None,
             }
         }
-        self.memory.command_s = self.time_or_one_stage_on(measurement.time_s);
-        self.memory.input.copy_from_slice(&command.u_lat);
+        (self.memory).keep_time(measurement.time_s, self.settings.step_s);
+        self.last_input.copy_from_slice(&command.u_lat);
         command.solve_us = started.elapsed().as_secs_f64() * 1e6;
     }
 }

@@ -50,9 +50,24 @@ pub(super) fn solve_upper(factor: &[Real], dim: usize, b: &mut [Real]) {
     }
 }
 
+/// The first of these numbers that is infinite or undefined; `count` without one.
+pub(super) fn first_undefined(values: &[Real], count: usize) -> usize {
+    for i in 0..count {
+        if !values[i].is_finite() {
+            return i;
+        }
+    }
+    count
+}
+
 /// The larger of two numbers; the second if the first is not one.
 pub(super) fn greater(value: Real, other: Real) -> Real {
     if value > other { value } else { other }
+}
+
+/// The smaller of two numbers; the second if the first is not one.
+pub(super) fn smaller(value: Real, other: Real) -> Real {
+    if value < other { value } else { other }
 }
 
 /// `sum += factor values`.

@@ -15,7 +15,7 @@
 
 use super::control_model::ControlModel;
 use super::controller::Measurement;
-use super::dense::Real;
+use super::dense::{Real, greater, smaller};
 use super::linearise::StageModel;
 use super::plan::Plan;
 use super::settings::Effectiveness as Settings;
@@ -50,34 +50,40 @@ impl Share {
         }
     }
 
-    /// Takes what a measurement of latent velocities says after a part of the plan's first stage, with the velocities
-    /// at the stage's `start` and `end`, its `input`, and the latent input of the drives at the command and now.
+    /// Takes what the velocities of a measurement say after a part of the plan's first stage, or a little later,
+    /// with the `states` at the stage's beginning and end, its `input`, and the latent input of the drives at the
+    /// command and now.
     fn update(
         &mut self,
-        part: Real,
-        kept: Real,
+        passed: f64,
+        step_s: Real,
+        time_constant_s: Real,
         by_input: &[Real],
         input: &[Real],
-        start: &[Real],
-        end: &[Real],
-        velocity: &[Real],
+        states: &[Real],
+        measured: &[Real],
         deviation: &[Real],
         at_command: &[Real],
         drives: &[Real],
         d: usize,
     ) {
+        if !(passed > 0.0 && passed < 1.1) {
+            return;
+        }
+        let part = passed as Real;
         let mut size: Real = 0.0;
         let mut agreement: Real = 0.0;
         for i in 0..d {
             let mut by_plan: Real = 0.0;
             let mut by_drives: Real = 0.0;
             for k in 0..d {
-                let effect = part * by_input[i * d + k] / deviation[i];
+                let effect = part * by_input[i * d + k] / deviation[d + i];
                 by_plan += effect * input[k];
                 by_drives += effect * (0.5 * (at_command[k] + drives[k]));
             }
-            let planned = start[i] + part * (end[i] - start[i]);
-            let missed = (velocity[i] - planned) / deviation[i] - by_drives;
+            let start = states[d + i];
+            let planned = start + part * (states[3 * d + i] - start);
+            let missed = (measured[d + i] - planned) / deviation[d + i] - by_drives;
             let change = by_plan + by_drives;
             size += change * change;
             agreement += change * missed;
@@ -89,21 +95,12 @@ impl Share {
             self.unit = size;
         }
         let ratio = size / self.unit;
-        let weight = if ratio < LARGEST_WEIGHT {
-            ratio
-        } else {
-            LARGEST_WEIGHT
-        };
+        let weight = smaller(ratio, LARGEST_WEIGHT);
+        let kept = (-part * step_s / time_constant_s).exp();
         self.weight = kept * self.weight + weight;
         self.weighted = kept * self.weighted + weight * self.estimate * (1.0 + agreement / size);
         let mean = (PRIOR_WEIGHT + self.weighted) / (PRIOR_WEIGHT + self.weight);
-        self.estimate = if mean < LEAST {
-            LEAST
-        } else if mean > LARGEST {
-            LARGEST
-        } else {
-            mean
-        };
+        self.estimate = greater(LEAST, smaller(mean, LARGEST));
     }
 }
 
@@ -158,32 +155,27 @@ impl Effectiveness {
         }
     }
 
-    /// Takes a measurement with its latent velocities; `deviation` are the reference's standard deviations of them.
+    /// Takes a measurement with its latent state; `deviation` are the reference's standard deviations of it.
     pub(super) fn update(
         &mut self,
         (plant, plan): (&ControlModel, &Plan),
         settings: &Settings,
         measurement: &Measurement<'_>,
-        velocity: &[f64],
+        measured: &[f64],
         deviation: &[f64],
     ) {
-        let Some(share) = plan.share_of_first(measurement.time_s) else {
-            return;
-        };
         if !self.is_grounded || !self.take_drives(plant, settings, measurement) {
             return;
         }
-        let d = self.drives.len();
-        let (start, end) = (&plan.states[0][d..], &plan.end(0)[d..]);
-        let kept = (-share * plan.step_s / settings.time_constant_s).exp();
+        let (time, d) = (plan.time, self.drives.len());
         self.share.update(
-            share,
-            kept,
+            time.passed(measurement.time_s),
+            time.step_s,
+            settings.time_constant_s,
             &self.by_input,
             plan.input(0),
-            start,
-            end,
-            velocity,
+            &plan.states,
+            measured,
             deviation,
             &self.at_command,
             &self.drives,

@@ -8,8 +8,8 @@ use super::plan::Plan;
 use super::problem::StageRows;
 use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
-use super::stage::{StageQp, StageScale, StageShape, write_defect};
-use super::trajectory::{Contact, TIME_TOLERANCE_S, Trajectory};
+use super::stage::{StageQp, StageScale, StageShape, trust_reference, write_defect};
+use super::trajectory::{Contact, Trajectory, is_same_time, stages_between};
 
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
@@ -120,11 +120,16 @@ impl Horizon {
         let (step_s, phases) = (inputs.settings.step_s, &mut self.phases);
         let (reference, horizon) = (inputs.reference, phases.len());
         let contact = reference.schedule(time_s, step_s, measured, horizon, phases);
-        self.reuse(inputs.settings, time_s);
+        // Stages that the last step made for the instants of this one move to their new places.
+        let made = self.stages[0].made_for;
+        let shift = made.map(|made_s| stages_between(made_s, time_s, step_s, horizon));
+        self.shift = shift.unwrap_or(0);
+        self.stages.rotate_left(self.shift);
+        self.programs.rotate_left(self.shift);
         for index in 0..self.stages.len() {
             let start_s = time_s + index as f64 * inputs.settings.step_s;
             let stage = &self.stages[index];
-            let is_near = |made: f64| (made - start_s).abs() < TIME_TOLERANCE_S;
+            let is_near = |made_s| is_same_time(made_s, start_s);
             let is_made = stage.made_for.is_some_and(is_near) && stage.phase == self.phases[index];
             self.is_new[index] = !is_made;
             if !is_made {
@@ -142,23 +147,6 @@ impl Horizon {
             Contact::Early => Status::ContactEarly,
             Contact::Late => Status::ContactLate,
             Contact::Unknown => Status::ContactUnknown,
-        }
-    }
-
-    /// Moves stages that the last step made for the instants of this one to their new places.
-    fn reuse(&mut self, settings: &MpcSettings, time_s: f64) {
-        self.shift = 0;
-        let Some(first) = self.stages[0].made_for else {
-            return;
-        };
-        let passed = (time_s - first) / settings.step_s;
-        let shift = passed.round();
-        let is_whole = (passed - shift).abs() * settings.step_s < TIME_TOLERANCE_S;
-        if is_whole && shift >= 1.0 && shift < self.stages.len() as f64 {
-            let shift = shift as usize;
-            self.shift = shift;
-            self.stages.rotate_left(shift);
-            self.programs.rotate_left(shift);
         }
     }
 
@@ -236,13 +224,11 @@ impl Horizon {
         stage(x, u, model);
         let (next, by, d) = (&model.next, &model.by, input.len());
         write_defect(next, by, x, u, state, input, end, d, defect);
-        if trusts_reference && point.is_none() {
-            defect.fill(0.0);
-        } else if trusts_reference {
+        if trusts_reference && point.is_some() {
             stage(state, input, &mut self.nominal);
-            for row in 0..2 * d {
-                defect[row] += end[row] - self.nominal.next[row];
-            }
+        }
+        if trusts_reference {
+            trust_reference(point.is_some(), &self.nominal.next, end, d, defect);
         }
     }
 }

@@ -48,8 +48,8 @@ pub trait LatentDynamics: Debug + Send {
     /// Column of an entry: `z` in the first `latent_dim`, then `dz`, then `u`.
     fn column(&self, phase: usize, entry: usize) -> usize;
 
-    /// Writes `F(x, u)` and `(A B)`, row by row, for a stage of `step_s`. All else is memory: two states, two matrices
-    /// of the size of `(A B)`, the entries of a Jacobian.
+    /// Writes `F(x, u)` and `(A B)`, row by row, for a stage of `step_s`. The memory has room for two states, two matrices
+    /// of the size of `(A B)` and the entries of a Jacobian.
     fn step(
         &mut self,
         phase: usize,
@@ -59,13 +59,13 @@ pub trait LatentDynamics: Debug + Send {
         step_s: Real,
         next: &mut [Real],
         by: &mut [Real],
-        state: &mut [Real],
-        slope: &mut [Real],
-        sensitivity: &mut [Real],
-        slope_sensitivity: &mut [Real],
-        entries: &mut [Real],
+        memory: &mut [Real],
     ) {
         let width = 3 * d;
+        let (state, rest) = memory.split_at_mut(2 * d);
+        let (slope, others) = rest.split_at_mut(2 * d);
+        let (sensitivity, last) = others.split_at_mut(2 * d * width);
+        let (slope_sensitivity, entries) = last.split_at_mut(2 * d * width);
         for i in 0..2 * d {
             slope[i] = 0.0;
             next[i] = 0.0;
@@ -175,25 +175,12 @@ impl StageModel {
 
 /// Working memory of [`Lineariser::stage`].
 #[derive(Debug, Clone)]
-pub struct Lineariser {
-    state: Vec<f64>,
-    slope: Vec<f64>,
-    /// `S_i` and `K_i`, `2d × 3d`, row-major.
-    sensitivity: Vec<f64>,
-    slope_sensitivity: Vec<f64>,
-    entries: Vec<f64>,
-}
+pub struct Lineariser(Vec<f64>);
 
 impl Lineariser {
     /// Memory for a latent dimension.
     pub fn new(latent_dim: usize) -> Self {
-        Self {
-            state: vec![0.0; 2 * latent_dim],
-            slope: vec![0.0; 2 * latent_dim],
-            sensitivity: vec![0.0; 6 * latent_dim * latent_dim],
-            slope_sensitivity: vec![0.0; 6 * latent_dim * latent_dim],
-            entries: vec![0.0; 3 * latent_dim * latent_dim],
-        }
+        Self(vec![0.0; (4 + 15 * latent_dim) * latent_dim])
     }
 
     /// Writes `F(x, u)`, `A` and `B` at `x = (z, dz)` and `u` for a stage of `step_s` in a phase into `stage`.
@@ -205,19 +192,7 @@ impl Lineariser {
         step_s: f64,
         stage: &mut StageModel,
     ) {
-        dynamics.step(
-            phase,
-            x,
-            u,
-            u.len(),
-            step_s,
-            &mut stage.next,
-            &mut stage.by,
-            &mut self.state,
-            &mut self.slope,
-            &mut self.sensitivity,
-            &mut self.slope_sensitivity,
-            &mut self.entries,
-        );
+        let (next, by, memory) = (&mut stage.next, &mut stage.by, &mut self.0);
+        dynamics.step(phase, x, u, u.len(), step_s, next, by, memory);
     }
 }

@@ -1,93 +1,120 @@
-//! The last good plan, in latent units, and how long it may be trusted.
+//! The last good plan, in latent units, and how long it may be trusted. C is made of [`PlanTime`].
+
+use super::dense::{Real, greater};
 
 /// Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the stage's end is
 /// ahead of the motion and adds to the thrust; that of the middle takes from it.
 const POSTURE_SHARE: f64 = 0.9;
 
+/// Where the stages of a plan are in time.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct PlanTime {
+    /// Whether there is a plan.
+    pub is_made: bool,
+    pub start_s: f64,
+    pub step_s: f64,
+    /// Phase of the first stage.
+    pub phase: usize,
+}
+
+impl PlanTime {
+    /// Stages that have passed at a time; -1 without a plan.
+    pub(super) fn passed(&self, time_s: f64) -> f64 {
+        let passed = (time_s - self.start_s) / self.step_s;
+        if self.is_made { passed } else { -1.0 }
+    }
+
+    /// Whether a time belongs to a stage or is beyond the last.
+    pub(super) fn reaches(&self, time_s: f64) -> bool {
+        self.passed(time_s) > -0.5
+    }
+
+    /// The stage that a time belongs to, at most `most`; that as well for a time before the plan.
+    pub(super) fn stage_at(&self, time_s: f64, most: usize) -> usize {
+        // A time that is a stage's beginning but for rounding belongs to that stage.
+        let passed = self.passed(time_s) + 1e-6;
+        let is_within = self.reaches(time_s) && passed < most as f64;
+        if is_within { passed as usize } else { most }
+    }
+
+    /// The instant whose posture is commanded for a stage, s.
+    pub(super) fn posture_s(&self, stage: usize) -> f64 {
+        self.start_s + (stage as f64 + POSTURE_SHARE) * self.step_s
+    }
+
+    /// Whether a measured state is more than `most` of its deviations from what the states of a plan predict for its
+    /// time; not beyond their end.
+    pub(super) fn is_jump(
+        &self,
+        time_s: f64,
+        states: &[Real],
+        horizon: usize,
+        measured: &[Real],
+        deviation: &[Real],
+        d: usize,
+        most: Real,
+    ) -> bool {
+        let passed = self.passed(time_s);
+        if !(passed >= 0.0 && passed <= horizon as f64) {
+            return false;
+        }
+        let whole = passed as usize;
+        let before = if whole < horizon { whole } else { horizon - 1 };
+        let share = (passed - before as f64) as Real;
+        let mut largest: Real = 0.0;
+        for i in 0..2 * d {
+            let start = states[2 * d * before + i];
+            let predicted = start + share * (states[2 * d * (before + 1) + i] - start);
+            let change = (measured[i] - predicted) / deviation[i];
+            largest = greater(change.abs(), largest);
+        }
+        largest > most
+    }
+}
+
 /// Inputs and states of a solved horizon.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    pub(super) step_s: f64,
-    /// None without a plan.
-    pub(super) start_s: Option<f64>,
-    pub(super) phase: usize,
-    pub(super) inputs: Vec<Vec<f64>>,
+    pub(super) time: PlanTime,
+    latent_dim: usize,
+    pub(super) inputs: Vec<f64>,
     /// States at the beginning of each stage and at the end of the last.
-    pub(super) states: Vec<Vec<f64>>,
+    pub(super) states: Vec<f64>,
 }
 
 impl Plan {
     pub(super) fn new(latent_dim: usize, horizon: usize, step_s: f64) -> Self {
         Self {
-            step_s,
-            start_s: None,
-            phase: 0,
-            inputs: vec![vec![0.0; latent_dim]; horizon],
-            states: vec![vec![0.0; 2 * latent_dim]; horizon + 1],
+            time: PlanTime {
+                step_s,
+                ..PlanTime::default()
+            },
+            latent_dim,
+            inputs: vec![0.0; latent_dim * horizon],
+            states: vec![0.0; 2 * latent_dim * (horizon + 1)],
         }
-    }
-
-    /// Begins a new plan at a time with the state measured then; inputs and states follow.
-    pub(super) fn begin(&mut self, start_s: f64, phase: usize, state: &[f64]) {
-        self.start_s = Some(start_s);
-        self.phase = phase;
-        self.states[0].copy_from_slice(state);
-    }
-
-    /// Share of the first stage that has passed at a time; none before its end plus a tenth, at its beginning, or
-    /// without a plan.
-    pub(super) fn share_of_first(&self, time_s: f64) -> Option<f64> {
-        let share = (time_s - self.start_s?) / self.step_s;
-        (share > 0.0 && share < 1.1).then_some(share)
-    }
-
-    /// The stage that a time belongs to, counted from the plan's first; none before the plan or without one.
-    pub(super) fn stage_at(&self, time_s: f64) -> Option<usize> {
-        let passed = (time_s - self.start_s?) / self.step_s;
-        // A time that is a stage's beginning but for rounding belongs to that stage.
-        (passed > -0.5).then(|| (passed + 1e-6).floor().max(0.0) as usize)
-    }
-
-    /// The instant whose posture is commanded for a stage, s; none without a plan.
-    pub(super) fn posture_s(&self, stage: usize) -> Option<f64> {
-        Some(self.start_s? + (stage as f64 + POSTURE_SHARE) * self.step_s)
     }
 
     /// Input of a stage.
     pub fn input(&self, stage: usize) -> &[f64] {
-        &self.inputs[stage]
+        &self.inputs[stage * self.latent_dim..][..self.latent_dim]
     }
 
     /// State at the end of a stage.
     pub fn end(&self, stage: usize) -> &[f64] {
-        &self.states[stage + 1]
+        self.start(stage + 1)
+    }
+
+    /// State at the beginning of a stage.
+    pub(super) fn start(&self, stage: usize) -> &[f64] {
+        let width = 2 * self.latent_dim;
+        &self.states[stage * width..][..width]
     }
 
     /// State and input that the plan has at a time, beyond its end those of its last stage; none without a plan.
     pub(super) fn at(&self, time_s: f64) -> Option<(&[f64], &[f64])> {
-        let stage = self.stage_at(time_s)?.min(self.inputs.len() - 1);
-        Some((&self.states[stage], &self.inputs[stage]))
-    }
-
-    /// Largest deviation of a state from the one that the plan predicts for a time, in multiples of `deviation`; none
-    /// if the plan does not reach that far.
-    pub(super) fn normalised_innovation(
-        &self,
-        time_s: f64,
-        state: &[f64],
-        deviation: &[f64],
-    ) -> Option<f64> {
-        let passed = (time_s - self.start_s?) / self.step_s;
-        let stages = self.inputs.len();
-        if !(passed >= 0.0 && passed <= stages as f64) {
-            return None;
-        }
-        let before = (passed as usize).min(stages - 1);
-        let share = passed - before as f64;
-        let ends = self.states[before].iter().zip(self.end(before));
-        let predicted = ends.map(|(a, b)| a + share * (b - a));
-        let deviations = state.iter().zip(predicted).zip(deviation);
-        let deviations = deviations.map(|((x, at), scale)| ((x - at) / scale).abs());
-        Some(deviations.fold(0.0, f64::max))
+        let last = self.inputs.len() / self.latent_dim - 1;
+        let stage = self.time.stage_at(time_s, last);
+        (self.time.reaches(time_s)).then(|| (self.start(stage), self.input(stage)))
     }
 }

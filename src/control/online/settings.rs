@@ -68,11 +68,11 @@ pub struct FallbackSettings {
     /// How many stages of the last good plan may be used after a failure.
     pub plan_stages: usize,
     /// Time constant with which the feed-forward torque of a hold decays, s.
-    pub torque_decay_s: f64,
+    pub torque_decay_s: Real,
     /// Joint damping of a hold, N m s/rad, on measured joint velocities.
-    pub damping_nm_s: f64,
+    pub damping_nm_s: Real,
     /// Deviation from the prediction, in standard deviations of the reference, that is not believed at first.
-    pub jump_deviations: f64,
+    pub jump_deviations: Real,
     /// How many steps in a row a measurement is disbelieved before it is taken for true.
     pub jump_patience: usize,
 }

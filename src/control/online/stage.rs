@@ -91,6 +91,16 @@ pub(super) struct StageCost {
     pub slack: f64,
 }
 
+/// Writes weights of squared deviations of positions and velocities in units of `deviation`: one, and of velocities
+/// `weight` where these have the units of the positions.
+pub(super) fn write_weights(deviation: &[Real], weight: Real, d: usize, weights: &mut [Real]) {
+    for i in 0..d {
+        let ratio = deviation[d + i] / deviation[i];
+        weights[i] = 1.0;
+        weights[d + i] = weight * (ratio * ratio);
+    }
+}
+
 /// A stage's numbers; matrices are row-major.
 #[derive(Debug, Clone)]
 pub(super) struct StageQp {
@@ -289,6 +299,21 @@ pub(super) fn unscale(
     }
     for i in 0..2 * d {
         end[i] += deviation[i] * x[i];
+    }
+}
+
+/// Makes a defect that of a reference which is itself a trajectory: none about it, else less what `nominal`, the model's
+/// step from the reference, leaves of its end.
+pub(super) fn trust_reference(
+    is_about_plan: bool,
+    nominal: &[Real],
+    end: &[Real],
+    d: usize,
+    defect: &mut [Real],
+) {
+    for i in 0..2 * d {
+        let left = defect[i] + (end[i] - nominal[i]);
+        defect[i] = if is_about_plan { left } else { 0.0 };
     }
 }
 

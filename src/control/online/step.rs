@@ -3,6 +3,7 @@
 use nalgebra::SVector;
 
 use super::command::{Command, Source, Status};
+use super::control_model::violation;
 use super::controller::{Controller, Measurement, SOFTENED_FROM};
 use super::lift::StanceState;
 use super::stage::unscale;
@@ -19,42 +20,32 @@ impl Controller {
         if measurement.x.len() != STATE_DIM || measurement.dx.len() != STATE_DIM {
             return Err(Status::WrongDimension);
         }
-        let values = measurement.x.iter().chain(measurement.dx);
-        if !measurement.time_s.is_finite() || values.into_iter().any(|value| !value.is_finite()) {
+        let &Measurement { time_s, x, dx, .. } = measurement;
+        if !self.memory.accepts(time_s, x, dx) {
             return Err(Status::NotFinite);
         }
-        self.memory.joint_velocity = std::array::from_fn(|joint| measurement.dx[joint]);
         let Some(reference) = &self.reference else {
             // Nothing to follow yet: the robot stays as it is.
-            let measured = std::array::from_fn(|joint| measurement.x[joint]);
-            (self.memory.joint_position).get_or_insert(self.plant.clamp_joints(measured));
+            if !self.memory.has_position {
+                let [lower, upper] = self.plant.joint_limits();
+                self.memory.keep_posture(x, &lower, &upper);
+            }
             return Err(Status::NoReference);
         };
-        let (z, dz) = self.memory.measured.split_at_mut(self.plant.latent_dim());
-        self.plant.encode(measurement.x, z);
-        let (x, dx) = (measurement.x, measurement.dx);
+        let (d, horizon) = (self.plant.latent_dim(), self.settings.horizon);
+        let (z, dz) = self.measured.split_at_mut(d);
+        self.plant.encode(x, z);
         self.plant.encode_velocity(x, dx, dz);
-        let (measured, deviation) = (&self.memory.measured, reference.deviation());
-        let innovation = (self.plan).normalised_innovation(measurement.time_s, measured, deviation);
-        let fallback = &self.settings.fallback;
-        let is_jump =
-            |innovation: f64| innovation.is_nan() || innovation > fallback.jump_deviations;
-        if innovation.is_some_and(is_jump) {
-            self.memory.disbelieved += 1;
-            if self.memory.disbelieved <= fallback.jump_patience {
-                return Err(Status::MeasurementJump);
-            }
+        let (measured, deviation) = (&self.measured, reference.deviation());
+        let (plan, fallback) = (&self.plan, &self.settings.fallback);
+        let (states, most) = (&plan.states, fallback.jump_deviations);
+        let is_jump = (plan.time).is_jump(time_s, states, horizon, measured, deviation, d, most);
+        if self.memory.refuses(is_jump, fallback.jump_patience) {
+            return Err(Status::MeasurementJump);
         }
-        self.memory.disbelieved = 0;
         if let Some(settings) = &self.settings.effectiveness {
-            let d = self.plant.latent_dim();
-            self.effectiveness.update(
-                (&self.plant, &self.plan),
-                settings,
-                measurement,
-                &self.memory.measured[d..],
-                &reference.deviation()[d..],
-            );
+            let parts = (&self.plant, plan);
+            (self.effectiveness).update(parts, settings, measurement, measured, deviation);
         }
         self.stand_at(measurement.x);
         Ok(())
@@ -70,10 +61,9 @@ impl Controller {
         let (Some(contact), Some(reference)) = (prepared, &self.reference) else {
             return Status::NoReference;
         };
-        let deviation = reference.deviation();
-        let (measured, last_input) = (&self.memory.measured, &self.memory.input);
+        let (measured, deviation) = (&self.measured, reference.deviation());
         let horizon = &mut self.horizon;
-        horizon.begin((measured, deviation), last_input, &self.near_rows);
+        horizon.begin((measured, deviation), &self.last_input, &self.near_rows);
         let (outcome, iterations) = self.engine.solve(&horizon.programs, &horizon.start);
         command.iterations = iterations;
         match outcome {
@@ -84,20 +74,26 @@ impl Controller {
             Outcome::Unbounded | Outcome::NumericalFailure => return Status::NumericalFailure,
         }
         let (plan, phase) = (&mut self.plan, horizon.stages[0].phase);
-        plan.begin(measurement.time_s, phase, measured);
+        (plan.time.is_made, plan.time.phase) = (true, phase);
+        plan.time.start_s = measurement.time_s;
+        let d = measured.len() / 2;
+        plan.states[..2 * d].copy_from_slice(measured);
+        let [lower, upper] = self.plant.joint_limits();
         for (k, stage) in horizon.stages.iter().enumerate() {
+            let input = &mut plan.inputs[k * d..][..d];
+            let end = &mut plan.states[2 * (k + 1) * d..][..2 * d];
             let root = self.plant.phases()[stage.phase].latent_root.as_slice();
-            let (input, end) = (&mut plan.inputs[k], &mut plan.states[k + 1]);
             let (v, x) = self.engine.stage(k);
             input.copy_from_slice(&stage.input);
             end.copy_from_slice(&stage.end);
-            unscale(root, deviation, stage.input.len(), v, x, input, end);
+            unscale(root, deviation, d, v, x, input, end);
+            let joints = self.plant.decode_joints(&end[..d]);
+            command.slack = violation(&joints, &lower, &upper, command.slack);
         }
         let is_grounded = self.plant.phases()[phase].is_grounded;
         let first = &self.horizon.stages[0].model;
         self.effectiveness.begin(first, is_grounded);
-        command.slack = self.largest_violation();
-        self.memory.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
+        self.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
         if !self.write_plan(0, command) {
             return Status::LiftFailed;
         }
@@ -108,63 +104,46 @@ impl Controller {
         }
     }
 
-    /// Largest violation of a joint limit at the ends of the plan's stages, in half ranges, whichever rows it has.
-    fn largest_violation(&self) -> f64 {
-        let d = self.plant.latent_dim();
-        let limits = self.plant.robot().joint_limit_rad();
-        let mut largest = 0.0_f64;
-        for stage in 0..self.settings.horizon {
-            let joints = self.plant.decode_joints(&self.plan.end(stage)[..d]);
-            for (position, &(lower, upper)) in joints.iter().zip(limits) {
-                let outside = (position - upper).max(lower - position);
-                largest = largest.max(outside / (0.5 * (upper - lower)));
-            }
-        }
-        largest
-    }
-
     /// Writes a stage of the plan into the command; false if its input cannot be lifted.
     pub(super) fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
-        let (Some(reference), Some(stance), Some(time_s)) = (
-            &self.reference,
-            &mut self.memory.stance,
-            self.plan.posture_s(stage),
-        ) else {
+        let (Some(reference), Some(stance)) = (&self.reference, &mut self.stance) else {
             return false;
         };
+        let (plan, time_s) = (&self.plan, self.plan.time.posture_s(stage));
         reference.state_at(time_s, &mut self.posture);
         let (z, dz) = self.posture.split_at(self.plant.latent_dim());
-        command.u_lat.copy_from_slice(self.plan.input(stage));
+        command.u_lat.copy_from_slice(plan.input(stage));
         for input in &mut command.u_lat {
             *input /= self.effectiveness.share.estimate;
         }
-        command.phase = Some(self.plan.phase);
+        command.phase = Some(plan.time.phase);
         let mut joints = self.plant.decode_joints(z);
-        let in_flight = !self.plant.phases()[self.plan.phase].is_grounded;
+        let in_flight = !self.plant.phases()[plan.time.phase].is_grounded;
         if in_flight && self.settings.swing_turn > 0.0 {
             let error = stance.attitude_rad[1] - reference.attitude_at(time_s)[1];
             let turn_rad = self.settings.swing_turn * error;
-            joints = self.plant.turned_legs(&joints, turn_rad);
+            self.plant.robot().turn_legs(turn_rad, &mut joints);
         }
-        command.joint_position_rad = self.plant.clamp_joints(joints);
+        let [lower, upper] = self.plant.joint_limits();
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
-        let (start, end) = (&self.plan.states[stage], self.plan.end(stage));
+        let (start, end) = (plan.start(stage), plan.end(stage));
         stance.losses_nm = self.plant.planned_losses(start, end, self.settings.step_s);
         let stance = *stance;
         let Ok(torque) = self.lift(&command.u_lat, &stance) else {
             return false;
         };
-        command.torque_nm = self.plant.clamp_torque(torque);
+        self.memory.keep_posture(&joints, &lower, &upper);
+        self.memory.feed_forward_nm = self.plant.clamp_torque(torque);
+        command.joint_position_rad = self.memory.joint_position;
+        command.torque_nm = self.memory.feed_forward_nm;
         command.losses_nm = stance.losses_nm;
-        self.memory.feed_forward_nm = command.torque_nm;
-        self.memory.joint_position = Some(command.joint_position_rad);
         command.inconsistency = self.inconsistency(command);
         true
     }
 
     /// `|F_lift − G τ| / |F_lift|` of a command's torques at the links, with force and moment as they are lifted.
     fn inconsistency(&self, command: &Command) -> Option<f64> {
-        let stance = self.memory.stance.as_ref()?;
+        let stance = self.stance.as_ref()?;
         if !stance.feet.contains(&true) {
             return None;
         }

@@ -6,7 +6,7 @@
 use super::dense::{MOST_LATENT, MOST_STATE, Real, add_scaled, greater};
 
 /// Times closer than this are the same, s.
-pub(super) const TIME_TOLERANCE_S: f64 = 1e-9;
+const TIME_TOLERANCE_S: f64 = 1e-9;
 /// Half width of the window in which velocities are fitted by a straight line, s.
 const HALF_WINDOW_S: f64 = 0.016 + 1e-9;
 /// Smallest standard deviation against the largest of the same kind.
@@ -189,11 +189,8 @@ pub(super) trait Trajectory {
             for i in half * d..(half + 1) * d {
                 least = greater(deviation[i], least);
             }
-            least = if least > 0.0 {
-                DEVIATION_FLOOR * least
-            } else {
-                1.0
-            };
+            let lowest = DEVIATION_FLOOR * least;
+            least = if least > 0.0 { lowest } else { 1.0 };
             for i in half * d..(half + 1) * d {
                 let own = greater(deviation[i], least);
                 deviation[i] = if is_still { still[i] } else { own };
@@ -217,11 +214,8 @@ pub(super) trait Trajectory {
             for i in 0..d {
                 along += z[i] * row[i];
             }
-            farthest = if sample > 0 && farthest > along {
-                farthest
-            } else {
-                along
-            };
+            let is_farther = sample == 0 || !(farthest > along);
+            farthest = if is_farther { along } else { farthest };
         }
         farthest + STATE_REACH * spread.sqrt() >= bound
     }
@@ -313,6 +307,21 @@ pub(super) trait Trajectory {
             Contact::Unknown
         }
     }
+}
+
+/// Whether times are the same but for rounding.
+pub(super) fn is_same_time(time_s: f64, other_s: f64) -> bool {
+    let off_s = time_s - other_s;
+    off_s < TIME_TOLERANCE_S && off_s > -TIME_TOLERANCE_S
+}
+
+/// By how many of its stages a horizon that begins at a time moves on to begin at another: 0 unless they are whole.
+pub(super) fn stages_between(from_s: f64, to_s: f64, step_s: f64, horizon: usize) -> usize {
+    let passed = (to_s - from_s) / step_s;
+    let whole = (passed + 0.5).floor();
+    let is_whole = is_same_time((passed - whole) * step_s, 0.0);
+    let is_within = is_whole && whole >= 1.0 && whole < horizon as f64;
+    if is_within { whole as usize } else { 0 }
 }
 
 /// Scale of `(z, dz)` for a trajectory that stands still: the change of each latent alone that moves some joint by

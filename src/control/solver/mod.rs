@@ -48,6 +48,7 @@
 #![allow(
     clippy::needless_range_loop,
     clippy::assign_op_pattern,
+    clippy::manual_div_ceil,
     clippy::neg_cmp_op_on_partial_ord,
     clippy::too_many_arguments
 )]

@@ -89,7 +89,8 @@ impl Shape {
     }
 
     pub(super) fn first_link(&self) -> usize {
-        self.input + self.soft + usize::from(self.soft > 0)
+        let slack = if self.soft > 0 { 1 } else { 0 };
+        self.input + self.soft + slack
     }
 
     /// Numbers that a stage's rows need of [`Program::rows`].

@@ -296,7 +296,7 @@ pub(super) fn subtract_multiple<T: Real, const N: usize>(
 /// `out += factor row` of rows of `NU` numbers and zeros.
 #[inline(always)]
 fn add_wide<T: Real, const NU: usize>(factor: T, row: &[T; WIDE], out: &mut [T; WIDE]) {
-    for j in 0..NU.div_ceil(4) * 4 {
+    for j in 0..(NU + 3) / 4 * 4 {
         out[j] += factor * row[j];
     }
 }

@@ -15,7 +15,7 @@ use crate::mpc::shared::{NO_PHASE, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE, tor
 use crate::mpc::{
     ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings,
 };
-use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, WrenchFrame};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, WrenchFrame};
 
 #[derive(Template)]
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
@@ -282,8 +282,13 @@ const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
 
 fn online(name: &str) -> String {
     renamed(ONLINE, |word| {
-        (word == "online_share").then(|| format!("{name}_{word}"))
+        is_state(word).then(|| format!("{name}_{word}"))
     })
+}
+
+/// Whether a word is the type of a part of the controller's own state.
+fn is_state(word: &str) -> bool {
+    STATE.contains(&format!("}} {word};"))
 }
 
 /// A stage of the horizon's solver and the controller's own state, for the header of a controller.
@@ -292,9 +297,8 @@ pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
         "real" => Some(real.to_owned()),
         "NX" => Some(format!("2 * {upper}_LATENT_DIM")),
         "NU" => Some(format!("{upper}_LATENT_DIM")),
-        _ if word == "online_share" || word.starts_with("solver_") => {
-            Some(format!("{name}_{word}"))
-        }
+        "bool" => Some("int32_t".to_owned()),
+        _ if is_state(word) || word.starts_with("solver_") => Some(format!("{name}_{word}")),
         _ => None,
     };
     renamed(STAGE, rename) + &renamed(STATE, rename)

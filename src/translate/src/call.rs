@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use syn::{Expr, Lit};
+use syn::Expr;
 
 use crate::Found;
 use crate::expression::Value;
@@ -37,11 +37,6 @@ impl Writer<'_> {
                 let text = format!("(real){}", value.at_least(15));
                 Ok(Value::new(text, Type::Real, 15))
             }
-            ("usize", "from") => {
-                let value = self.value(here, &call.args[0])?;
-                let text = format!("{} ? 1 : 0", value.at_least(4));
-                Ok(Value::new(text, Type::Int, 3))
-            }
             ("", "part" | "part_mut") => {
                 let Some(ty) = expected else {
                     let what = "a part without a type in its `let`";
@@ -75,14 +70,6 @@ impl Writer<'_> {
         {
             self.lengths.insert((of.clone(), name.to_string()));
             return Ok(Value::new(format!("{}_len", receiver.text), Type::Int, 16));
-        }
-        if method == "div_ceil"
-            && let [Expr::Lit(by)] = call.args.iter().collect::<Vec<_>>().as_slice()
-            && let Lit::Int(by) = &by.lit
-            && let Ok(by) = by.base10_parse::<u32>()
-        {
-            let text = format!("({} + {}) / {by}", receiver.at_least(12), by - 1);
-            return Ok(Value::new(text, Type::Int, 13));
         }
         if let Some(value) = of_libm(&receiver, &method) {
             return Ok(value);

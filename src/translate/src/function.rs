@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::Found;
 use crate::items::{Function, Items};
 use crate::statement::Lines;
 use crate::text::{comment, wrapped};
 use crate::types::Type;
-use crate::{Fault, Found};
 
 /// What the functions need, and their text, callees first.
 pub(crate) struct Writer<'a> {
@@ -47,19 +47,6 @@ impl<'a> Writer<'a> {
             constants: BTreeSet::new(),
             lengths: BTreeSet::new(),
         }
-    }
-
-    pub(crate) fn root(&mut self, path: &str) -> Found<()> {
-        let (owner, name) = path.split_once("::").unwrap_or(("", path));
-        let items = self.items;
-        let key = (owner.to_owned(), name.to_owned());
-        let (key, function) = items.functions.get_key_value(&key).ok_or_else(|| Fault {
-            path: path.to_owned(),
-            line: 0,
-            message: "no such function".to_owned(),
-        })?;
-        self.function(&key.0, name, function, BTreeMap::new())?;
-        Ok(())
     }
 
     /// A type with lengths as C has them; the structs and constants that it names are needed.

@@ -1,5 +1,5 @@
 //! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in. In: sources, a
-//! prefix for names, the functions that the C is for. Out: these, what they call, the types and constants that they
+//! prefix for names, the C that calls functions of them. Out: these, what they call, the types and constants that they
 //! need, with comments. `cargo run -p romc-translate` writes `templates/controller_c/`; `tests/controller_c.rs`
 //! compares it byte for byte. Read `function` first.
 //!
@@ -28,6 +28,7 @@ mod statement;
 mod text;
 mod types;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::{fmt, fs};
 
@@ -71,10 +72,8 @@ impl std::error::Error for Fault {}
 pub struct Unit<'a> {
     /// Before every name: `solver` for `solver_solve` and `SOLVER_WIDE`.
     pub prefix: &'a str,
-    /// Functions that the C is for, as `Type::function` or `function`.
-    pub roots: &'a [&'a str],
-    /// Constants that whoever includes the C reads.
-    pub constants: &'a [&'a str],
+    /// C that includes it: the functions that it calls and the constants that it names are those that are needed.
+    pub users: &'a str,
     /// Structs that nothing changes, which are `const` wherever they are pointed to.
     pub fixed: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
@@ -101,15 +100,24 @@ pub struct Translated {
     pub source: String,
 }
 
-/// Translates the functions of a unit, and all that they need.
+/// Translates the functions that a unit is for, and all that they need.
 pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Fault> {
     let items = items::Items::read(sources, unit)?;
     let mut writer = function::Writer::new(&items);
-    for root in unit.roots {
-        writer.root(root)?;
+    let is_other = |letter: char| !letter.is_ascii_alphanumeric() && letter != '_';
+    let words = unit.users.split_inclusive(is_other);
+    let words: BTreeSet<&str> = words
+        .flat_map(|word| [word, word.trim_end_matches(is_other)])
+        .collect();
+    for ((owner, name), function) in &items.functions {
+        if words.contains(format!("{}(", items.name(&[owner, name])).as_str()) {
+            writer.function(owner, name, function, BTreeMap::new())?;
+        }
     }
-    for name in unit.constants {
-        writer.constant(name);
+    for name in items.constants.keys() {
+        if words.contains(items.constant_name(name).as_str()) {
+            writer.constant(name);
+        }
     }
     writer.finish(unit)
 }
@@ -128,13 +136,13 @@ fn file(root: &Path, path: String) -> Result<Source, Fault> {
     Ok(Source { path, text })
 }
 
-/// The sources of a folder of `src/control`.
-fn read(root: &Path, folder: &str) -> Result<Vec<Source>, Fault> {
-    let folder = format!("src/control/{folder}");
-    let entries = fs::read_dir(root.join(&folder)).map_err(|error| fault(&folder, error))?;
+/// The files of a folder whose names end so.
+fn read(root: &Path, folder: &str, end: &str) -> Result<Vec<Source>, Fault> {
+    let entries = fs::read_dir(root.join(folder)).map_err(|error| fault(folder, error))?;
     let names = entries.flatten().map(|entry| entry.file_name());
     let mut paths: Vec<String> = names
         .map(|name| format!("{folder}/{}", name.to_string_lossy()))
+        .filter(|path| path.ends_with(end))
         .collect();
     paths.sort();
     paths.into_iter().map(|path| file(root, path)).collect()
@@ -149,51 +157,14 @@ fn head(what: &str) -> String {
 
 /// The C of the structured solver and of the controller, as paths below the workspace's folder and texts.
 pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
-    let mut texts = solver_of(&read(root, "solver")?)?.to_vec();
+    let mut texts = solver_of(&read(root, "src/control/solver", ".rs")?)?.to_vec();
+    let templates = read(root, "templates/controller_c", ".askama")?;
+    let users: String = templates.into_iter().map(|file| file.text).collect();
     let unit = Unit {
         prefix: "online",
-        roots: &[
-            "Trajectory::state_at",
-            "Trajectory::mean_input",
-            "Trajectory::write_deviations",
-            "Trajectory::comes_near",
-            "Trajectory::schedule",
-            "Trajectory::write_acceleration",
-            "LatentDynamics::step",
-            "LatentDynamics::write_gain",
-            "write_still",
-            "write_expected",
-            "add_correction",
-            "turn_force",
-            "scale_dynamics",
-            "write_pyramid",
-            "unscale",
-            "write_defect",
-            "clamped_torque",
-            "clamped_joint",
-            "Share::unknown",
-            "Share::update",
-            "write_torque",
-            "free_optimum",
-            "write_limits",
-            "write_foot",
-            "write_hessian",
-            "change_rows",
-            "add_wrench",
-            "write_force_map",
-            "write_world_axes",
-        ],
-        constants: &[
-            "CURVATURE",
-            "GAP",
-            "LIFT_ITERATIONS",
-            "MOST_TURN_RAD",
-            "POSTURE_SHARE",
-            "SLACK_PRICE",
-            "SOFTENED_FROM",
-        ],
-        fixed: &["LegShape"],
-        header: &["Share"],
+        users: &users,
+        fixed: &["LegShape", "FallbackSettings"],
+        header: &["Share", "Memory", "PlanTime"],
         elsewhere: &[
             ("MOST_LATENT", "D"),
             ("MOST_STATE", "X"),
@@ -201,9 +172,10 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             ("SQRT_HALF", "SQRT_HALF"),
         ],
         attribute: "MAYBE_UNUSED ",
+        ..Unit::default()
     };
-    let mut sources = read(root, "online")?;
-    sources.push(file(root, "src/robot/leg.rs".to_owned())?);
+    let mut sources = read(root, "src/control/online", ".rs")?;
+    sources.extend(read(root, "src/robot", ".rs")?);
     let Translated { header, source } = translate(&sources, &unit)?;
     let state = head("state of the controller's own steps.") + &header;
     let steps = head("the controller's own steps.") + &source;
@@ -216,12 +188,7 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
 pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Fault> {
     let unit = Unit {
         prefix: "solver",
-        roots: &[
-            "Program::bounds_mut",
-            "Program::shift",
-            "Program::prepare",
-            "Program::solve",
-        ],
+        users: "solver_program_bounds_mut(), solver_program_shift(), solver_program_prepare(), solver_program_solve()",
         header: &["Stage"],
         elsewhere: &[("is_linked", "LINKED")],
         ..Unit::default()
