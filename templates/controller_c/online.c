@@ -70,6 +70,10 @@ typedef struct {
     real share;
 } online_instant;
 
+/* A kind of rows. What its rows are, where they stand in a stage and what the settings make of them is stated here alone,
+ * for both solvers and for the controller in C. */
+typedef enum { ONLINE_MOTOR_TORQUE, ONLINE_TORQUE_RATE, ONLINE_JOINT_ANGLE, ONLINE_BODY_FRICTION } online_kind;
+
 /* A leg in the frame of its plane at the zero posture. */
 typedef struct {
     /* Shares of forward, normal and up, in the body's axes, that stay as the first joint turns. */
@@ -93,6 +97,9 @@ typedef struct {
     /* Thigh times calf times their sum, m^3, which bounds |det J|. */
     real volume;
 } online_leg_shape;
+
+/* How a latent input becomes joint torques, each way with its number for interfaces without enumerations. */
+typedef enum { ONLINE_TRANSPOSE, ONLINE_CONSISTENT } online_lift;
 
 /* Where the foot is and how the joints move it, in the frame of the leg's plane. */
 typedef struct {
@@ -573,16 +580,16 @@ static inline MAYBE_UNUSED void online_add_correction(const real *gain, const re
     }
 }
 
-/* Writes the rows (mu F_z, F_x, F_y) of a force 3 x d turned by a rotation; both row-major. */
-static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *force, real coefficient, int d,
-        real *restrict out)
+/* Writes the rows (mu F_z, F_x, F_y) of a force along x, y and z turned by a rotation, row-major. */
+static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *x, const real *y, const real *z,
+        real coefficient, int d, real *restrict out)
 {
     for (int row = 0; row < 3; ++row) {
         const real *turned = rotation + 3 * ((row + 2) % 3);
         for (int j = 0; j < d; ++j) {
-            real sum = turned[0] * force[j];
-            sum += turned[1] * force[d + j];
-            sum += turned[2] * force[2 * d + j];
+            real sum = turned[0] * x[j];
+            sum += turned[1] * y[j];
+            sum += turned[2] * z[j];
             out[row * d + j] = row == 0 ? coefficient * sum : sum;
         }
     }
@@ -607,6 +614,34 @@ static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real
             a[2 * i * d + j] = factor * row[j] * deviation[j];
         }
     }
+}
+
+/* What the settings make of a kind, zero if stages have no such rows: the limit that rows for a limit of one are divided
+ * by, the friction coefficient of cones. */
+static inline MAYBE_UNUSED real online_row_size(online_kind kind, const online_settings *settings)
+{
+    /* The consistent lift keeps the torque limits by itself. */
+    if (kind == ONLINE_MOTOR_TORQUE && settings->lift == (int)ONLINE_CONSISTENT) {
+        return 0;
+    }
+    if (kind == ONLINE_TORQUE_RATE) {
+        return settings->torque_rate_nm_s * (real)settings->step_s;
+    }
+    if (kind == ONLINE_BODY_FRICTION) {
+        return settings->body_friction;
+    }
+    return 1;
+}
+
+/* Writes the rotation R_y(pitch) R_x(roll) from the body frame to an upright frame with the same heading. */
+static inline MAYBE_UNUSED void online_write_upright(const real *attitude, real rotation[restrict 3][3])
+{
+    const real sr = SIN(attitude[0]);
+    const real cr = COS(attitude[0]);
+    const real sp = SIN(attitude[1]);
+    const real cp = COS(attitude[1]);
+    real rows[3][3] = {{cp, sp * sr, sp * cr}, {0, cr, -sr}, {-sp, cp * sr, cp * cr}};
+    memcpy(rotation, rows, sizeof(real[3][3]));
 }
 
 /* Writes row C_p; returns row . input. */

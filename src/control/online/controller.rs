@@ -29,7 +29,6 @@ pub(super) const SOFTENED_FROM: Real = 1.05 * ROW_MARGIN;
 /// trajectory, [`Controller::step_into`] turns each measurement into a [`Command`]. A step allocates nothing of its own
 /// and never fails: without a trusted plan the last good one is shifted and used for a few stages, then the posture is
 /// held with fading torques and damped joints until measurements make sense again. The status says why.
-/// the status says why. As soon as measurements make sense again, so do commands.
 #[derive(Debug)]
 pub struct Controller {
     pub(super) plant: ControlModel,
@@ -295,7 +294,7 @@ fn program(
     settings: &MpcSettings,
 ) -> Result<(Horizon, Box<dyn StageSolver>), ControlError> {
     let (solver, length) = (settings.solver, settings.horizon);
-    let shape = StageShape::of(latent_dim, rows, solver.friction());
+    let shape = StageShape::of(latent_dim, rows, solver);
     let cost = stage_cost(state_weights, settings);
     let engine = solver.of_horizon(length, shape, &cost, settings.qp)?;
     Ok((Horizon::new(length, &shape), engine))

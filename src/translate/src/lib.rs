@@ -79,7 +79,8 @@ pub struct Unit<'a> {
     pub fixed: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
     pub header: &'a [&'a str],
-    /// Constants of the Rust, and methods that state a condition, that whoever includes the C defines, with their names there.
+    /// Constants, structs and methods that state a condition, that whoever includes the C defines, with their names
+    /// there; a struct keeps its own.
     pub elsewhere: &'a [(&'a str, &'a str)],
     /// What stands before the type of every function, with a space.
     pub attribute: &'a str,
@@ -166,6 +167,8 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "add_correction",
             "turn_force",
             "scale_dynamics",
+            "row_size",
+            "write_upright",
             "write_pyramid",
             "unscale",
             "write_defect",
@@ -192,13 +195,14 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             "SLACK_PRICE",
             "SOFTENED_FROM",
         ],
-        fixed: &["LegShape"],
+        fixed: &["LegShape", "Settings"],
         header: &["Share"],
         elsewhere: &[
             ("MOST_LATENT", "D"),
             ("MOST_STATE", "X"),
             ("MOST_SQUARE", "D * D"),
             ("SQRT_HALF", "SQRT_HALF"),
+            ("Settings", ""),
         ],
         attribute: "MAYBE_UNUSED ",
     };
