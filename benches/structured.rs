@@ -145,7 +145,7 @@ fn read_loop<const NU: usize>(reader: &mut Reader, horizon: usize) -> Loop<NU> {
 /// The rows without those that the others imply; opposite rows come first, in pairs.
 fn needed<const NU: usize>(rows: Vec<([f64; NU], f64)>) -> Vec<([f64; NU], f64)> {
     let numbered = rows.iter().enumerate().map(|(joint, (row, bound))| Row {
-        kind: Kind::JointAngle,
+        kind: Kind::JointRange,
         joint,
         row: row.to_vec(),
         bound: *bound,

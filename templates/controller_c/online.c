@@ -72,7 +72,7 @@ typedef struct {
 
 /* A kind of rows. What its rows are, where they stand in a stage and what the settings make of them is stated here alone,
  * for both solvers and for the controller in C. */
-typedef enum { ONLINE_MOTOR_TORQUE, ONLINE_TORQUE_RATE, ONLINE_JOINT_ANGLE, ONLINE_BODY_FRICTION } online_kind;
+typedef enum { ONLINE_MOTOR_TORQUE, ONLINE_TORQUE_RATE, ONLINE_JOINT_RANGE, ONLINE_BODY_FRICTION } online_kind;
 
 /* A leg in the frame of its plane at the zero posture. */
 typedef struct {

@@ -5,7 +5,7 @@ use romc::mpc::problem::{Kind, Row};
 
 fn row(joint: usize, row: &[f64], bound: f64) -> Row {
     Row {
-        kind: Kind::JointAngle,
+        kind: Kind::JointRange,
         joint,
         row: row.to_vec(),
         bound,

@@ -71,7 +71,7 @@ pub enum Kind {
     /// `± T_i (u − u⁻) ≤ 1`.
     TorqueRate,
     /// `± D_i z / q_half,i ≤ …`.
-    JointAngle,
+    JointRange,
     /// `F u` over the robot's weight.
     BodyFriction,
 }
@@ -101,7 +101,7 @@ impl Kind {
                 (limit, 1.0, sign / limit)
             }),
             Self::TorqueRate => self.rows_of(&plant.lift, &both, |_, _| (1.0, 1.0, 0.0)),
-            Self::JointAngle => self.rows_of(&plant.decoder, &both, |joint, sign| {
+            Self::JointRange => self.rows_of(&plant.decoder, &both, |joint, sign| {
                 let (lower, upper) = robot.joint_limit_rad()[joint];
                 let half = 0.5 * (upper - lower);
                 let limit = if sign > 0.0 { upper } else { lower };
@@ -235,7 +235,7 @@ impl StageRows {
                 RowSelection::All => of(Kind::MotorTorque),
             },
             link: of(Kind::TorqueRate),
-            soft: of(Kind::JointAngle),
+            soft: of(Kind::JointRange),
             cones: of(Kind::BodyFriction),
         }
     }
