@@ -1,5 +1,5 @@
 //! The rooms of `src` and of the crates in it import only what the table of ARCHITECTURE.md allows, and only from rows above
-//! their own; a setting of the controller and an elementary function stand in few files.
+//! their own; a setting of the controller, a kind of rows and an elementary function stand in few files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -272,53 +272,119 @@ fn rooms_import_only_what_the_table_of_architecture_allows() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Files below a folder that name a word, but for unit tests and documentation.
-fn naming(folder: &Path, word: &str, found: &mut Vec<PathBuf>) {
+/// Files below a folder with an identifier that is looked for, but for unit tests, documentation and what is generated.
+fn naming(folder: &Path, is_meant: &dyn Fn(&str) -> bool, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a readable folder") {
         let path = entry.expect("an entry").path();
         if path.is_symlink() {
             continue; // a crate's link to the templates
         } else if path.is_dir() {
-            naming(&path, word, found);
+            naming(&path, is_meant, found);
         } else if let Ok(text) = fs::read_to_string(&path)
             && !path.ends_with("readme.askama")
+            && !text
+                .lines()
+                .next()
+                .unwrap_or_default()
+                .contains("@generated")
         {
             let is_end = |c: char| !(c.is_alphanumeric() || c == '_');
             let code = text.split("\n#[cfg(test)]\nmod tests").next();
-            if code.is_some_and(|code| code.split(is_end).any(|found| found == word)) {
+            if code.is_some_and(|code| code.split(is_end).any(is_meant)) {
                 found.push(path);
             }
         }
     }
 }
 
+/// The same in the sources of all languages.
+fn naming_anywhere(is_meant: &dyn Fn(&str) -> bool) -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found = Vec::new();
+    for folder in ["src", "templates", "python/src", "python/python"] {
+        naming(&root.join(folder), is_meant, &mut found);
+    }
+    found
+}
+
 #[test]
 fn an_elementary_function_is_named_in_few_files() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut found = Vec::new();
-    for word in ["tan", "Tan"] {
-        naming(&src, word, &mut found);
-    }
-    found.sort();
-    found.dedup();
+    naming(&src, &|word| ["tan", "Tan"].contains(&word), &mut found);
     assert!((1..=8).contains(&found.len()), "{found:?}");
 }
 
 #[test]
 fn a_setting_of_the_controller_stands_in_at_most_four_files() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for setting in [
         "swing_turn",
         "lift_prior_weight",
         "joint_penalty",
         "effectiveness_time_s",
         "drive_stiffness_nm_rad",
+        "torque_rate_nm_s",
+        "body_friction",
     ] {
-        let mut found = Vec::new();
-        for folder in ["src", "templates", "python/src", "python/python"] {
-            naming(&root.join(folder), setting, &mut found);
-        }
+        let found = naming_anywhere(&|word| word == setting);
         assert!((1..=4).contains(&found.len()), "{setting}: {found:?}");
+    }
+}
+
+/// `TorqueRate`, `TORQUE_RATES` and `torque_rates` in one spelling, behind an underscore.
+fn spelled(identifier: &str) -> String {
+    let is_upper = !identifier.contains(|c: char| c.is_lowercase());
+    let mut out = "_".to_owned();
+    for c in identifier.chars() {
+        if c.is_uppercase() && !is_upper && out.len() > 1 {
+            out.push('_');
+        }
+        out.extend(c.to_lowercase());
+    }
+    out
+}
+
+/// Names that a kind of rows had in the layouts of the solvers and in the C, where it must not come back, besides the
+/// name that it has in `enum Kind`.
+const EARLIER_NAMES: [(&str, &[&str]); 4] = [
+    ("MotorTorque", &["torque_row", "torque_bound", "n_torque"]),
+    (
+        "TorqueRate",
+        &["rate_row", "rate_bound", "rate_at_reference", "n_rate"],
+    ),
+    ("JointRange", &["joint_row", "joint_bound", "n_joint"]),
+    (
+        "BodyFriction",
+        &["write_friction", "friction_shape", "has_pyramid"],
+    ),
+];
+
+/// A file names a kind by an identifier in which the kind's name stands, in any spelling, from the beginning of a word
+/// on: `TorqueRate`, `torque_rate_nm_s`, `UPPER_TORQUE_RATES`. A flag of the command line and its range are no part of
+/// the kind; `data` knows no control problem, its rows and rates are those of regressions.
+#[test]
+fn a_kind_of_rows_stands_in_at_most_four_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let problem = fs::read_to_string(root.join("src/control/online/problem.rs")).expect("text");
+    let (_, kinds) = problem.split_once("pub enum Kind {").expect("the kinds");
+    let kinds = kinds.split_once('}').expect("their end").0.lines();
+    let kinds: Vec<&str> = kinds
+        .filter_map(|line| line.trim().strip_suffix(','))
+        .filter(|line| !line.starts_with("//"))
+        .collect();
+    assert!(kinds.len() >= EARLIER_NAMES.len(), "{kinds:?}");
+    for kind in kinds {
+        let earlier = EARLIER_NAMES.iter().find(|(name, _)| *name == kind);
+        let earlier = earlier.map_or(&[][..], |(_, names)| names);
+        let mut names = vec![spelled(kind)];
+        names.extend(earlier.iter().map(|name| spelled(name)));
+        let mut found = naming_anywhere(&|word| {
+            let word = spelled(word);
+            names.iter().any(|name| word.contains(name))
+        });
+        let others = ["src/cli", "src/model/limits", "src/data"].map(|folder| root.join(folder));
+        found.retain(|path| !others.iter().any(|folder| path.starts_with(folder)));
+        assert!((1..=4).contains(&found.len()), "{kind}: {found:?}");
     }
 }
 

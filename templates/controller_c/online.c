@@ -87,6 +87,10 @@ typedef struct {
     real share;
 } online_instant;
 
+/* A kind of rows. What its rows are, where they stand in a stage and what the settings make of them is stated here alone,
+ * for both solvers and for the controller in C. */
+typedef enum { ONLINE_MOTOR_TORQUE, ONLINE_TORQUE_RATE, ONLINE_JOINT_RANGE, ONLINE_BODY_FRICTION } online_kind;
+
 /* A leg in the frame of its plane at the zero posture. */
 typedef struct {
     /* Shares of forward, normal and up, in the body's axes, that stay as the first joint turns. */
@@ -110,6 +114,9 @@ typedef struct {
     /* Thigh times calf times their sum, m^3, which bounds |det J|. */
     real volume;
 } online_leg_shape;
+
+/* How a latent input becomes joint torques, each way with its number for interfaces without enumerations. */
+typedef enum { ONLINE_TRANSPOSE, ONLINE_CONSISTENT } online_lift;
 
 /* Where the foot is and how the joints move it, in the frame of the leg's plane. */
 typedef struct {
@@ -512,6 +519,23 @@ static inline MAYBE_UNUSED real online_planned_loss(const real *of, real before,
     return online_clamped_torque(online_joint_loss(of, dq, ddq), limit);
 }
 
+/* What the settings make of a kind, zero if stages have no such rows: the limit that rows for a limit of one are divided
+ * by, the friction coefficient of cones. */
+static inline MAYBE_UNUSED real online_row_size(online_kind kind, const online_settings *settings)
+{
+    /* The consistent lift keeps the torque limits by itself. */
+    if (kind == ONLINE_MOTOR_TORQUE && settings->lift == (int)ONLINE_CONSISTENT) {
+        return 0;
+    }
+    if (kind == ONLINE_TORQUE_RATE) {
+        return settings->torque_rate_nm_s * (real)settings->step_s;
+    }
+    if (kind == ONLINE_BODY_FRICTION) {
+        return settings->body_friction;
+    }
+    return 1;
+}
+
 /* Writes sigma^-1 A sigma and sigma^-1 B C_p of derivatives (A B), 2d x 3d; all row-major but C_p, lower triangular,
  * column by column. */
 static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *root, const real *deviation, int d,
@@ -570,16 +594,16 @@ static inline MAYBE_UNUSED void online_trust_reference(bool is_about_plan, const
     }
 }
 
-/* Writes the rows (mu F_z, F_x, F_y) of a force 3 x d turned by a rotation; both row-major. */
-static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *force, real coefficient, int d,
-        real *restrict out)
+/* Writes the rows (mu F_z, F_x, F_y) of a force along x, y and z turned by a rotation, row-major. */
+static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *x, const real *y, const real *z,
+        real coefficient, int d, real *restrict out)
 {
     for (int row = 0; row < 3; ++row) {
         const real *turned = rotation + 3 * ((row + 2) % 3);
         for (int j = 0; j < d; ++j) {
-            real sum = turned[0] * force[j];
-            sum += turned[1] * force[d + j];
-            sum += turned[2] * force[2 * d + j];
+            real sum = turned[0] * x[j];
+            sum += turned[1] * y[j];
+            sum += turned[2] * z[j];
             out[row * d + j] = row == 0 ? coefficient * sum : sum;
         }
     }
@@ -816,6 +840,17 @@ static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real
             torque[i] += deviation[12 * i + j] * y[j];
         }
     }
+}
+
+/* Writes the rotation R_y(pitch) R_x(roll) from the body frame to an upright frame with the same heading. */
+static inline MAYBE_UNUSED void online_write_upright(const real *attitude, real rotation[restrict 3][3])
+{
+    const real sr = SIN(attitude[0]);
+    const real cr = COS(attitude[0]);
+    const real sp = SIN(attitude[1]);
+    const real cp = COS(attitude[1]);
+    real rows[3][3] = {{cp, sp * sr, sp * cr}, {0, cr, -sr}, {-sp, cp * sr, cp * cr}};
+    memcpy(rotation, rows, sizeof(real[3][3]));
 }
 
 /* Writes weights of squared deviations of positions and velocities in units of deviation: one, and of velocities

@@ -463,16 +463,16 @@ fn stage_rows_keep_only_what_can_be_active() {
         romc::mpc::controller(&model(Equations::Linear), MpcSettings::default()).expect("complete");
     let rows = controller.stage_rows();
     assert!(
-        !rows.torque.is_empty() && rows.torque.len() < 16,
+        !rows.input.is_empty() && rows.input.len() < 16,
         "{} of 16 torque rows",
-        rows.torque.len()
+        rows.input.len()
     );
     assert!(
-        !rows.joint.is_empty() && rows.joint.len() < 16,
+        !rows.soft.is_empty() && rows.soft.len() < 16,
         "{} of 16 joint rows",
-        rows.joint.len()
+        rows.soft.len()
     );
-    for row in rows.torque.iter().chain(&rows.joint) {
+    for row in rows.input.iter().chain(&rows.soft) {
         assert_ne!(row.joint % 3, 0, "hip abduction is not in the encoder");
     }
 }

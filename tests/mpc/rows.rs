@@ -1,10 +1,11 @@
 //! Which rows can be active at all.
 
 use romc::mpc::needed_rows;
-use romc::mpc::problem::Row;
+use romc::mpc::problem::{Kind, Row};
 
 fn row(joint: usize, row: &[f64], bound: f64) -> Row {
     Row {
+        kind: Kind::JointRange,
         joint,
         row: row.to_vec(),
         bound,

@@ -1,6 +1,6 @@
 //! The stages as one program over cones, for clarabel, and the choice between it and the structured solver. Unknowns
 //! are, by stage, the input, the state that it leads to and a slack for soft rows. Rows are the dynamics of all stages
-//! (zero cone), then rows on the input, rates, soft rows and `t >= 0` stage by stage (nonnegative), then the friction
+//! (zero cone), then rows on the input, links, soft rows and `t >= 0` stage by stage (nonnegative), then the
 //! cones. The pattern is laid out once; a step overwrites values.
 
 use std::fmt::Debug;
@@ -8,7 +8,7 @@ use std::fmt::Debug;
 use super::error::ControlError;
 use super::qp::{Cone, ConeProgram, QpSettings, QpSolver, position, sparse};
 use super::settings::Solver;
-use super::stage::{CONE_ROWS, FrictionShape, StageCost, StageQp, StageShape};
+use super::stage::{CONE_ROWS, StageCost, StageQp, StageShape};
 use super::structured::structured;
 use crate::solver::Outcome;
 
@@ -100,7 +100,7 @@ impl Layout {
 
     fn inequalities(&self) -> usize {
         let shape = &self.shape;
-        shape.input_rows + shape.rate_rows + shape.soft_rows + self.slacks()
+        shape.input_rows + shape.link_rows + shape.soft_rows + self.slacks()
     }
 
     fn input_row(&self, stage: usize) -> usize {
@@ -126,15 +126,15 @@ impl Layout {
             for i in 0..nx {
                 block(dynamics + i, state + i, 1, -1.0, &[1.0]);
             }
-            let rate = self.input_row(k) + self.shape.input_rows;
+            let link = self.input_row(k) + self.shape.input_rows;
             if k > 0 {
                 let before = input - self.width();
                 block(dynamics, before + nu, nx, 1.0, &stage.a);
-                block(rate, before, nu, -1.0, &stages[k - 1].rate.entries);
+                block(link, before, nu, -1.0, &stages[k - 1].link.entries);
             }
             block(self.input_row(k), input, nu, 1.0, &stage.input.entries);
-            block(rate, input, nu, 1.0, &stage.rate.entries);
-            let soft = rate + self.shape.rate_rows;
+            block(link, input, nu, 1.0, &stage.link.entries);
+            let soft = link + self.shape.link_rows;
             block(soft, state, nu, 1.0, &stage.soft.entries);
             if self.slacks() > 0 {
                 for row in soft..=soft + self.shape.soft_rows {
@@ -148,7 +148,7 @@ impl Layout {
     /// Right-hand sides; the state that the first stage starts from is on the right of its dynamics.
     fn write_bounds(&self, stages: &[StageQp], start: &Start, b: &mut [f64]) {
         let nx = self.shape.states;
-        let mut before = &start.rate_before[..];
+        let mut before = &start.link_before[..];
         for (k, stage) in stages.iter().enumerate() {
             for row in 0..nx {
                 let mut right = -stage.c[row];
@@ -165,11 +165,11 @@ impl Layout {
                 next += 1;
             };
             stage.input.bounds.iter().copied().for_each(&mut push);
-            for row in 0..self.shape.rate_rows {
-                push(stage.rate.bounds[row] - stage.rate_at_reference[row] + before[row]);
+            for row in 0..self.shape.link_rows {
+                push(stage.link.bounds[row] - stage.link_at_reference[row] + before[row]);
             }
             stage.soft.bounds.iter().copied().for_each(&mut push);
-            before = &stage.rate_at_reference;
+            before = &stage.link_at_reference;
             let cones = &stage.cones.bounds;
             b[self.cone_row(k)..][..cones.len()].copy_from_slice(cones);
         }
@@ -196,8 +196,8 @@ impl Layout {
 pub(super) struct Start {
     /// The scaled state before the first stage.
     pub state: Vec<f64>,
-    /// Rows of the rates at the input before the first stage.
-    pub rate_before: Vec<f64>,
+    /// Rows of the links at the input before the first stage.
+    pub link_before: Vec<f64>,
 }
 
 pub(super) trait StageSolver: Debug + Send {
@@ -218,13 +218,6 @@ pub(super) trait StageSolver: Debug + Send {
 }
 
 impl Solver {
-    pub(super) fn friction(self) -> FrictionShape {
-        match self {
-            Self::Clarabel => FrictionShape::Cone,
-            Self::Riccati => FrictionShape::Pyramid,
-        }
-    }
-
     pub(super) fn of_horizon(
         self,
         horizon: usize,

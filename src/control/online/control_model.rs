@@ -212,7 +212,8 @@ impl ControlModel {
         std::array::from_fn(|joint| clamped_torque(torque_nm[joint], limits[joint]))
     }
 
-    pub(super) fn joint_limits(&self) -> [[f64; JOINT_DIM]; 2] {
+    /// Lower and upper limits of the joints, rad.
+    pub fn joint_limits(&self) -> [[f64; JOINT_DIM]; 2] {
         let limits = self.robot().joint_limit_rad();
         [limits.map(|limit| limit.0), limits.map(|limit| limit.1)]
     }

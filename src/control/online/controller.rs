@@ -294,7 +294,7 @@ fn program(
     settings: &MpcSettings,
 ) -> Result<(Horizon, Box<dyn StageSolver>), ControlError> {
     let (solver, length) = (settings.solver, settings.horizon);
-    let shape = StageShape::of(latent_dim, rows, solver.friction());
+    let shape = StageShape::of(latent_dim, rows, solver);
     let cost = stage_cost(state_weights, settings);
     let engine = solver.of_horizon(length, shape, &cost, settings.qp)?;
     Ok((Horizon::new(length, &shape), engine))

@@ -5,10 +5,10 @@ use super::conic::Start;
 use super::control_model::ControlModel;
 use super::linearise::{LatentDynamics, Lineariser, StageModel};
 use super::plan::Plan;
-use super::problem::StageRows;
+use super::problem::{StageRows, to_upright, turn_force};
 use super::reference::Reference;
 use super::settings::{Drift, Linearisation, MpcSettings};
-use super::stage::{StageQp, StageScale, StageShape, trust_reference, write_defect};
+use super::stage::{CONE_ROWS, StageQp, StageScale, StageShape, trust_reference, write_defect};
 use super::trajectory::{Contact, Trajectory, is_same_time, stages_between};
 
 #[derive(Debug, Clone)]
@@ -37,7 +37,7 @@ pub(super) struct Horizon {
     pub shift: usize,
     pub is_new: Vec<bool>,
     pub start: Start,
-    /// Rows of the friction cone `(μ F_z, F_x, F_y) / weight` of a stage.
+    /// Rows `(μ F_z, F_x, F_y)` of a cone of a stage.
     force: Vec<f64>,
     lineariser: Lineariser,
     nominal: StageModel,
@@ -75,7 +75,7 @@ impl Horizon {
             is_new: vec![true; length],
             start: Start {
                 state: vec![0.0; shape.states],
-                rate_before: vec![0.0; shape.rate_rows],
+                link_before: vec![0.0; shape.link_rows],
             },
             force: vec![0.0; 3 * latent_dim],
             lineariser: Lineariser::new(latent_dim),
@@ -101,11 +101,9 @@ impl Horizon {
             *out = (measured[i] - first.state[i]) / deviation[i];
         }
         let rows = first.rows.as_ref().unwrap_or(rows);
-        for (out, rate) in self.start.rate_before.iter_mut().zip(&rows.rate) {
-            *out = 0.0;
-            for (entry, input) in rate.row.iter().zip(last_input) {
-                *out += entry * input;
-            }
+        for (out, link) in self.start.link_before.iter_mut().zip(&rows.link) {
+            let terms = link.row.iter().zip(last_input);
+            *out = terms.fold(0.0, |sum, (entry, input)| sum + entry * input);
         }
     }
 
@@ -180,14 +178,24 @@ impl Horizon {
         let rows = stage.rows.as_ref().unwrap_or(inputs.rows);
         let losses_nm = plant.planned_losses(&stage.state, &stage.end, step_s);
         program.write_rows(rows, &losses_nm, &stage.end, &scale);
-        if let Some(friction) = &rows.friction {
+        let (cones, _) = rows.cones.as_chunks::<CONE_ROWS>();
+        for (number, [x, y, z]) in cones.iter().enumerate() {
+            self.force.fill(0.0);
             if phase.is_grounded {
                 let attitude = inputs.reference.attitude_at(start_s + 0.5 * step_s);
-                friction.turned(attitude, &mut self.force);
-            } else {
-                self.force.fill(0.0);
+                let rotation = to_upright(plant.input_rule().wrench_frame(), attitude);
+                let (rotation, d) = (rotation.as_flattened(), stage.input.len());
+                turn_force(
+                    rotation,
+                    &x.row,
+                    &y.row,
+                    &z.row,
+                    x.bound,
+                    d,
+                    &mut self.force,
+                );
             }
-            program.write_friction(&self.force, &scale);
+            program.write_cone((number, cones.len()), &self.force, &scale);
         }
     }
 

@@ -31,13 +31,11 @@ use super::dense::{
     MOST_LATENT, MOST_SQUARE, Real, add_scaled, factorise, solve_lower, solve_upper,
 };
 use super::error::ControlError;
-use super::problem::upright;
+use super::problem::to_upright;
 use super::qp::QpSettings;
-use super::settings::MpcSettings;
-use super::stage::{
-    CONE_ROWS, FrictionShape, PYRAMID_ROWS, SQRT_HALF, StageCost, StageQp, StageShape,
-};
-use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM};
+use super::settings::{MpcSettings, Solver};
+use super::stage::{CONE_ROWS, PYRAMID_ROWS, SQRT_HALF, StageCost, StageQp, StageShape};
+use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM, WrenchFrame};
 use crate::solver::Outcome;
 
 const LIFT_ITERATIONS: u32 = 60;
@@ -91,8 +89,8 @@ const BROKEN: LiftFailure = LiftFailure::Solver(Outcome::NumericalFailure);
 /// The consistent lift of one model on its robot, with its own persistent solver.
 #[derive(Debug)]
 pub struct ConsistentLift {
-    solver: Box<dyn StageSolver>,
-    friction: FrictionShape,
+    engine: Box<dyn StageSolver>,
+    solver: Solver,
     qp: StageQp,
     /// `pinv(W_eᵀ) s_u` and `A`, row by row.
     projection: Vec<f64>,
@@ -110,17 +108,12 @@ impl ConsistentLift {
     /// Prepares the lift, for the solver that the settings name.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Result<Self, ControlError> {
         let d = plant.latent_dim();
-        let friction = settings.solver.friction();
-        let (pyramids, cones) = match friction {
-            FrictionShape::Cone => (0, FOOT_DIM),
-            FrictionShape::Pyramid => (FOOT_DIM, 0),
-        };
         let shape = StageShape {
             inputs: JOINT_DIM,
-            input_rows: 2 * JOINT_DIM + PYRAMID_ROWS * pyramids,
-            cones,
+            input_rows: 2 * JOINT_DIM,
             ..StageShape::default()
         };
+        let shape = shape.with_cones(FOOT_DIM, settings.solver);
         let cost = StageCost {
             state: Vec::new(),
             terminal: 1.0,
@@ -133,8 +126,8 @@ impl ConsistentLift {
             ..settings.qp
         };
         let mut lift = Self {
-            solver: settings.solver.of_horizon(1, shape, &cost, qp)?,
-            friction,
+            engine: settings.solver.of_horizon(1, shape, &cost, qp)?,
+            solver: settings.solver,
             qp: StageQp::zeros(&shape),
             projection: vec![0.0; d * STATE_DIM],
             scaled_map: vec![0.0; d * JOINT_DIM],
@@ -203,9 +196,9 @@ impl ConsistentLift {
     fn write_rows(&mut self, torque: &Torque, losses_nm: &Torque, forces: &FootForces) {
         let (friction, weight_n) = (self.foot_friction, self.weight_n);
         let down = forces.iter().flatten().count();
-        let pyramids = match self.friction {
-            FrictionShape::Cone => 0,
-            FrictionShape::Pyramid => down,
+        let pyramids = match self.solver {
+            Solver::Clarabel => 0,
+            Solver::Riccati => down,
         };
         let rows = &mut self.qp.input;
         rows.resize(2 * JOINT_DIM + PYRAMID_ROWS * pyramids, JOINT_DIM);
@@ -214,10 +207,10 @@ impl ConsistentLift {
         let mut first = 2 * JOINT_DIM;
         for leg in 0..FOOT_DIM {
             let force = forces[leg].map(|force| force.transpose());
-            match (self.friction, &force) {
-                (FrictionShape::Cone, _) => self.write_cone(leg, torque, force.as_ref()),
-                (FrictionShape::Pyramid, None) => {}
-                (FrictionShape::Pyramid, Some(force)) => {
+            match (self.solver, &force) {
+                (Solver::Clarabel, _) => self.write_cone(leg, torque, force.as_ref()),
+                (Solver::Riccati, None) => {}
+                (Solver::Riccati, Some(force)) => {
                     let rows = &mut self.qp.input;
                     let entries = &mut rows.entries[first * JOINT_DIM..];
                     let (force, bounds) = (force.as_slice(), &mut rows.bounds[first..]);
@@ -264,15 +257,15 @@ impl ConsistentLift {
             change_rows(&hessian, deviation, count, &mut rows.entries);
         }
         let stages = std::slice::from_ref(&self.qp);
-        self.solver.forget();
-        self.solver.prepare(stages, 0, &[true]);
-        let (outcome, iterations) = self.solver.solve(stages, &Start::default());
+        self.engine.forget();
+        self.engine.prepare(stages, 0, &[true]);
+        let (outcome, iterations) = self.engine.solve(stages, &Start::default());
         self.iterations = iterations;
         if outcome != Outcome::Solved {
             return Err(LiftFailure::Solver(outcome));
         }
         let mut v = [0.0; JOINT_DIM];
-        v.copy_from_slice(self.solver.stage(0).0);
+        v.copy_from_slice(self.engine.stage(0).0);
         solve_upper(&hessian, JOINT_DIM, &mut v);
         for j in 0..JOINT_DIM {
             y[j] += v[j];
@@ -442,7 +435,7 @@ pub fn foot_forces(
     stance: &StanceState,
 ) -> Option<[Option<Matrix3<f64>>; FOOT_DIM]> {
     let [roll, pitch, _] = stance.attitude_rad;
-    let turned = upright([roll, pitch]);
+    let turned = to_upright(WrenchFrame::Body, [roll, pitch]);
     let rotation = Matrix3::from_fn(|row, col| turned[row][col]);
     let mut forces = [None; FOOT_DIM];
     for leg in Leg::down(stance.feet) {

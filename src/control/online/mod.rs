@@ -40,7 +40,7 @@ mod trajectory;
 /// Numbers that the controller in C shares, which are no settings.
 pub mod shared {
     pub use crate::online::lift::torque_deviation;
-    pub use crate::online::structured::{RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
+    pub use crate::online::structured::{LINK_SOFTNESS, LINK_TOLERANCE, TOLERANCE};
     pub use crate::online::trajectory::NO_PHASE;
 }
 

@@ -45,7 +45,7 @@ use super::control_model::ControlModel;
 use super::dense::Real;
 use super::qp::{Cone, ConeProgram, QpSettings, QpSolver, sparse};
 use super::reference::Reference;
-use super::settings::{Lift, MpcSettings, RowSelection};
+use super::settings::{Lift, MpcSettings, RowSelection, Settings};
 use super::stage::StageCost;
 use super::trajectory::Trajectory;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
@@ -62,70 +62,141 @@ const INPUT_REACH: f64 = 10.0;
 /// plans may be that far off, commands are clamped and are not.
 pub(super) const ROW_MARGIN: Real = 0.02;
 
+/// A kind of rows. What its rows are, where they stand in a stage and what the settings make of them is stated here alone,
+/// for both solvers and for the controller in C.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// `± T_i (u + ℓ) / τ_max,i ≤ 1`.
+    MotorTorque,
+    /// `± T_i (u − u⁻) ≤ 1`.
+    TorqueRate,
+    /// `± D_i z / q_half,i ≤ …`.
+    JointRange,
+    /// `F u` over the robot's weight.
+    BodyFriction,
+}
+
+/// What the settings make of a kind, zero if stages have no such rows: the limit that rows for a limit of one are divided
+/// by, the friction coefficient of cones.
+fn row_size(kind: Kind, settings: &Settings) -> Real {
+    // The consistent lift keeps the torque limits by itself.
+    if kind == Kind::MotorTorque && settings.lift == Lift::Consistent as i32 {
+        return 0.0;
+    }
+    if kind == Kind::TorqueRate {
+        return settings.torque_rate_nm_s * settings.step_s as Real;
+    }
+    if kind == Kind::BodyFriction {
+        return settings.body_friction;
+    }
+    1.0
+}
+
+impl Kind {
+    fn rows(self, plant: &ControlModel, size: f64, selection: RowSelection) -> Vec<Row> {
+        let (robot, both) = (plant.robot(), [1.0, -1.0]);
+        let mut rows = match self {
+            Self::MotorTorque => self.rows_of(&plant.lift, &both, |joint, sign| {
+                let limit = robot.torque_limit_nm()[joint];
+                (limit, 1.0, sign / limit)
+            }),
+            Self::TorqueRate => self.rows_of(&plant.lift, &both, |_, _| (1.0, 1.0, 0.0)),
+            Self::JointRange => self.rows_of(&plant.decoder, &both, |joint, sign| {
+                let (lower, upper) = robot.joint_limit_rad()[joint];
+                let half = 0.5 * (upper - lower);
+                let limit = if sign > 0.0 { upper } else { lower };
+                (half, sign * (limit - plant.decoder_bias[joint]) / half, 0.0)
+            }),
+            Self::BodyFriction => {
+                let force = plant.lift.rows(JOINT_DIM, 3) / (robot.mass_kg() * GRAVITY_M_S2);
+                return self.rows_of(&force, &[1.0], |_, _| (1.0, size, 0.0));
+            }
+        };
+        rows.retain(|row| row.row.iter().any(|entry| *entry != 0.0));
+        // Which rows are needed does not depend on the size.
+        if selection == RowSelection::Needed {
+            rows.retain(|row| self != Self::MotorTorque || is_reachable(plant, row));
+            rows = needed_rows(rows, ROW_MARGIN);
+        }
+        for entry in rows.iter_mut().flat_map(|row| &mut row.row) {
+            *entry /= size;
+        }
+        rows
+    }
+
+    /// Each joint's row of a matrix over `of`'s first value, with these signs, bound and loss share.
+    fn rows_of(
+        self,
+        matrix: &DMatrix<f64>,
+        signs: &[f64],
+        of: impl Fn(usize, f64) -> (f64, f64, f64),
+    ) -> Vec<Row> {
+        let joints = 0..matrix.nrows().min(JOINT_DIM);
+        let sides = joints.flat_map(|joint| signs.iter().map(move |&sign| (joint, sign)));
+        let row = |(joint, sign): (usize, f64)| {
+            let (size, bound, per_loss) = of(joint, sign);
+            Row {
+                kind: self,
+                joint,
+                row: matrix.row(joint).iter().map(|e| sign * e / size).collect(),
+                bound,
+                per_loss,
+            }
+        };
+        sides.map(row).collect()
+    }
+}
+
+/// Whether settings ask for rows that link stages, or for cones.
+pub fn has_links_or_cones(settings: &MpcSettings) -> bool {
+    let size = |kind| row_size(kind, &Settings::from(settings));
+    size(Kind::TorqueRate) > 0.0 || size(Kind::BodyFriction) > 0.0
+}
+
 /// A row `row · v ≤ bound` on latent inputs or latent positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// The joint it belongs to.
+    /// Its kind.
+    pub kind: Kind,
+    /// The joint or axis it belongs to.
     pub joint: usize,
     /// Coefficients, `latent_dim`.
     pub row: Vec<f64>,
-    /// Right-hand side.
+    /// Right-hand side; the coefficient of a cone.
     pub bound: f64,
-    /// What a loss of 1 N m in the joint takes from the right-hand side; zero but for torque limits.
+    /// What a loss of 1 N m in the joint takes from the right-hand side.
     pub per_loss: f64,
 }
 
-/// The constraint rows that every stage has, decided once.
-#[derive(Debug, Clone, PartialEq)]
+/// The constraint rows of every stage by their place in it, decided once: those that can be active.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct StageRows {
-    /// `± T_i u / τ_max,i ≤ 1`, those that can be active.
-    pub torque: Vec<Row>,
-    /// `± D_i z / q_half,i ≤ …`, those that can be active.
-    pub joint: Vec<Row>,
-    /// Torque rows of which the rate is limited, and by how much per stage; empty if it is not.
-    pub rate: Vec<Row>,
-    /// Friction of the body force, if it is constrained.
-    pub friction: Option<BodyFriction>,
+    /// On the input; pairs of opposite rows first.
+    pub input: Vec<Row>,
+    /// On the difference of the input from that of the stage before.
+    pub link: Vec<Row>,
+    /// On the positions at the stage's end, softened by one slack.
+    pub soft: Vec<Row>,
+    /// Three per cone: force along x, y and z of the model's frame, to be turned upright, in contact.
+    pub cones: Vec<Row>,
 }
 
-/// Rows of the body force that a latent input is lifted to.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BodyFriction {
-    /// Friction coefficient.
-    pub coefficient: f64,
-    /// Force over the robot's weight along x, y and z of the model's frame, `3 × latent_dim` row-major.
-    pub force: Vec<f64>,
-    /// The model's frame.
-    pub frame: WrenchFrame,
-}
-
-impl BodyFriction {
-    fn new(plant: &ControlModel, coefficient: f64) -> Self {
-        let weight = plant.robot().mass_kg() * GRAVITY_M_S2;
-        let force = plant.lift.rows(JOINT_DIM, 3).transpose() / weight;
-        Self {
-            coefficient,
-            force: force.as_slice().to_vec(),
-            frame: plant.input_rule().wrench_frame(),
-        }
-    }
-
-    /// Writes the cone's rows `(μ F_z, F_x, F_y)` of the force turned upright into `out`.
-    pub(crate) fn turned(&self, attitude_rad: [f64; 2], out: &mut [f64]) {
-        let rotation = to_upright(self.frame, attitude_rad);
-        let (rotation, d) = (rotation.as_flattened(), self.force.len() / 3);
-        turn_force(rotation, &self.force, self.coefficient, d, out);
-    }
-}
-
-/// Writes the rows `(μ F_z, F_x, F_y)` of a force `3 × d` turned by a rotation; both row-major.
-fn turn_force(rotation: &[Real], force: &[Real], coefficient: Real, d: usize, out: &mut [Real]) {
+/// Writes the rows `(μ F_z, F_x, F_y)` of a force along x, y and z turned by a rotation, row-major.
+pub(super) fn turn_force(
+    rotation: &[Real],
+    x: &[Real],
+    y: &[Real],
+    z: &[Real],
+    coefficient: Real,
+    d: usize,
+    out: &mut [Real],
+) {
     for row in 0..3 {
         let turned = &rotation[3 * ((row + 2) % 3)..];
         for j in 0..d {
-            let mut sum: Real = turned[0] * force[j];
-            sum += turned[1] * force[d + j];
-            sum += turned[2] * force[2 * d + j];
+            let mut sum: Real = turned[0] * x[j];
+            sum += turned[1] * y[j];
+            sum += turned[2] * z[j];
             out[row * d + j] = if row == 0 { coefficient * sum } else { sum };
         }
     }
@@ -138,37 +209,51 @@ impl StageRows {
     /// torque rows that no input within `INPUT_REACH` standard deviations of the training inputs reaches in any phase.
     /// Plans may pass these limits, by 2 %, an input unlike any in training or large losses; clamped commands do not.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Self {
-        Self::selected(plant, settings, row_selection(plant, settings))
+        Self::of_settings(plant, settings, row_selection(plant, settings))
     }
 
-    fn selected(plant: &ControlModel, settings: &MpcSettings, selection: RowSelection) -> Self {
-        let select = |rows: Vec<Row>| match selection {
-            RowSelection::All => rows,
-            RowSelection::Needed => needed_rows(rows, ROW_MARGIN),
+    /// All rows for sizes of one, for settings that are chosen when a controller runs.
+    pub fn of_all_kinds(plant: &ControlModel) -> Self {
+        Self::of_sizes(plant, row_selection(plant, &MpcSettings::default()), |_| {
+            1.0
+        })
+    }
+
+    fn of_settings(plant: &ControlModel, of: &MpcSettings, selection: RowSelection) -> Self {
+        let settings = Settings::from(of);
+        Self::of_sizes(plant, selection, |kind| row_size(kind, &settings))
+    }
+
+    fn of_sizes(plant: &ControlModel, selection: RowSelection, size: impl Fn(Kind) -> f64) -> Self {
+        let of = |kind: Kind| match size(kind) {
+            size if size > 0.0 => kind.rows(plant, size, selection),
+            _ => Vec::new(),
         };
-        let mut torque = match settings.lift {
-            Lift::Consistent => Vec::new(),
-            Lift::Transpose => torque_rows(plant),
-        };
-        if selection == RowSelection::Needed {
-            torque.retain(|row| is_reachable(plant, row));
-            torque = pairs_first(select(torque));
-        }
-        let mut rate = Vec::new();
-        if let Some(limit) = settings.torque_rate_nm_s {
-            // Which rows are needed does not depend on the rate: they are chosen for 1 N m a stage.
-            rate = select(both_sides(plant, |_| 1.0, 0.0));
-            for entry in rate.iter_mut().flat_map(|row| &mut row.row) {
-                *entry /= limit * settings.step_s;
-            }
-        }
-        let friction = settings.body_friction;
         Self {
-            torque,
-            rate,
-            joint: select(joint_rows(plant)),
-            friction: friction.map(|coefficient| BodyFriction::new(plant, coefficient)),
+            input: match selection {
+                RowSelection::Needed => pairs_first(of(Kind::MotorTorque)),
+                RowSelection::All => of(Kind::MotorTorque),
+            },
+            link: of(Kind::TorqueRate),
+            soft: of(Kind::JointRange),
+            cones: of(Kind::BodyFriction),
         }
+    }
+
+    /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes there.
+    pub(super) fn with_maps_of(&self, plant: &ControlModel, of: &MpcSettings) -> Option<Self> {
+        let rows = Self::of_settings(plant, of, RowSelection::All);
+        let shape = |rows: &Self| [rows.input.len(), rows.link.len(), rows.soft.len()];
+        (shape(&rows) == shape(self)).then_some(rows)
+    }
+
+    /// The same without the soft rows that no state within `STATE_REACH` of the reference's own standard deviations of
+    /// some state of it reaches. Limits are soft and commanded positions clamped: all that is given up is that a plan
+    /// from far away bends around limits that its reference is nowhere near.
+    pub(crate) fn near(mut self, reference: &Reference) -> Self {
+        let deviation = reference.deviation();
+        (self.soft).retain(|row| reference.comes_near(&row.row, row.bound, deviation));
+        self
     }
 }
 
@@ -183,10 +268,10 @@ pub(super) fn stage_cost(state_weights: &[f64], settings: &MpcSettings) -> Stage
 }
 
 /// The rows with both sides of a limit first, side by side; else the order stays.
-fn pairs_first(rows: Vec<Row>) -> Vec<Row> {
-    let is_paired = |row: &&Row| rows.iter().any(|other| other.is_opposite(row));
-    let (paired, single): (Vec<_>, Vec<_>) = rows.iter().partition(is_paired);
-    paired.into_iter().chain(single).cloned().collect()
+fn pairs_first(mut rows: Vec<Row>) -> Vec<Row> {
+    let all = rows.clone();
+    rows.sort_by_key(|row| !all.iter().any(|other| other.is_opposite(row)));
+    rows
 }
 
 /// How many pairs of opposite rows come first.
@@ -200,7 +285,8 @@ pub fn pairs(rows: &[Row]) -> usize {
 impl Row {
     fn is_opposite(&self, other: &Row) -> bool {
         let opposite = other.row.iter().map(|entry| -entry);
-        self.joint == other.joint && self.row.iter().copied().eq(opposite)
+        (self.kind, self.joint) == (other.kind, other.joint)
+            && self.row.iter().copied().eq(opposite)
     }
 }
 
@@ -209,24 +295,6 @@ pub(super) fn row_selection(plant: &ControlModel, settings: &MpcSettings) -> Row
     match plant.is_nonlinear() {
         true => RowSelection::All,
         false => settings.rows,
-    }
-}
-
-impl StageRows {
-    /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes there.
-    pub(super) fn with_maps_of(&self, plant: &ControlModel, of: &MpcSettings) -> Option<Self> {
-        let rows = Self::selected(plant, of, RowSelection::All);
-        let shape = |rows: &Self| (rows.torque.len(), rows.rate.len(), rows.joint.len());
-        (shape(&rows) == shape(self)).then_some(rows)
-    }
-
-    /// The same without the joint rows that no state within `STATE_REACH` of the reference's own standard deviations of
-    /// some state of it reaches. Limits are soft and commanded positions clamped: all that is given up is that a plan
-    /// from far away bends around limits that its reference is nowhere near.
-    pub(crate) fn near(mut self, reference: &Reference) -> Self {
-        let deviation = reference.deviation();
-        (self.joint).retain(|row| reference.comes_near(&row.row, row.bound, deviation));
-        self
     }
 }
 
@@ -239,63 +307,28 @@ fn is_reachable(plant: &ControlModel, row: &Row) -> bool {
     })
 }
 
-/// Both sides of every torque limit; joints that the lift does not reach have none.
-fn torque_rows(plant: &ControlModel) -> Vec<Row> {
-    let limits = plant.robot().torque_limit_nm();
-    both_sides(plant, |joint| limits[joint], 1.0)
-}
-
-/// Both sides of a limit (N m) on the torque of each joint, from which losses take `loss_share`.
-fn both_sides(plant: &ControlModel, limit: impl Fn(usize) -> f64, loss_share: f64) -> Vec<Row> {
-    rows_of(&plant.lift, |joint, sign| {
-        (limit(joint), 1.0, loss_share * sign / limit(joint))
-    })
-}
-
-/// Both sides of every joint limit, divided by half the joint's range.
-fn joint_rows(plant: &ControlModel) -> Vec<Row> {
-    let limits = plant.robot().joint_limit_rad();
-    rows_of(&plant.decoder, |joint, sign| {
-        let (lower, upper) = limits[joint];
-        let half = 0.5 * (upper - lower);
-        let limit = if sign > 0.0 { upper } else { lower };
-        (half, sign * (limit - plant.decoder_bias[joint]) / half, 0.0)
-    })
-}
-
-/// Each joint's row of a matrix over `of`'s first value, with both signs, bound and loss share; no rows of zeros.
-fn rows_of(matrix: &DMatrix<f64>, of: impl Fn(usize, f64) -> (f64, f64, f64)) -> Vec<Row> {
-    let sides = (0..JOINT_DIM).flat_map(|joint| [1.0, -1.0].map(|sign| (joint, sign)));
-    let rows = sides.map(|(joint, sign)| {
-        let (size, bound, per_loss) = of(joint, sign);
-        Row {
-            joint,
-            row: matrix.row(joint).iter().map(|e| sign * e / size).collect(),
-            bound,
-            per_loss,
-        }
-    });
-    rows.filter(|row| row.row.iter().any(|entry| *entry != 0.0))
-        .collect()
-}
-
 /// Rotation that turns a lifted force upright: none is needed for one in world axes.
 pub fn to_upright(frame: WrenchFrame, attitude: [f64; 2]) -> [[f64; 3]; 3] {
+    let mut rotation = [[0.0; 3]; 3];
     match frame {
-        WrenchFrame::Body => upright(attitude),
-        WrenchFrame::World => upright([0.0; 2]),
+        WrenchFrame::Body => write_upright(&attitude, &mut rotation),
+        WrenchFrame::World => write_upright(&[0.0; 2], &mut rotation),
     }
+    rotation
 }
 
-/// Rotation from the body frame to an upright frame with the same heading, `R_y(pitch) R_x(roll)`, row-major.
-pub(crate) fn upright(attitude: [f64; 2]) -> [[f64; 3]; 3] {
-    let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) =
-        (attitude[0].sin_cos(), attitude[1].sin_cos());
-    [
-        [cos_pitch, sin_pitch * sin_roll, sin_pitch * cos_roll],
-        [0.0, cos_roll, -sin_roll],
-        [-sin_pitch, cos_pitch * sin_roll, cos_pitch * cos_roll],
-    ]
+/// Writes the rotation `R_y(pitch) R_x(roll)` from the body frame to an upright frame with the same heading.
+fn write_upright(attitude: &[Real], rotation: &mut [[Real; 3]; 3]) {
+    let sr = attitude[0].sin();
+    let cr = attitude[0].cos();
+    let sp = attitude[1].sin();
+    let cp = attitude[1].cos();
+    let rows: [[Real; 3]; 3] = [
+        [cp, sp * sr, sp * cr],
+        [0.0, cr, -sr],
+        [-sp, cp * sr, cp * cr],
+    ];
+    *rotation = rows;
 }
 
 /// The rows without those that follow from the others to within `margin`, in the same order: tried from the last to the

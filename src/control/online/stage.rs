@@ -11,19 +11,12 @@
 use super::dense::{MOST_LATENT, Real};
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows, pairs};
+use super::settings::Solver;
 
 pub(super) const PYRAMID_ROWS: usize = 4;
 pub(super) const CONE_ROWS: usize = 3;
 /// Share of a friction cone's radius that the pyramid inside it has along an axis.
 pub(super) const SQRT_HALF: Real = std::f64::consts::FRAC_1_SQRT_2;
-
-/// How the friction cone `‖(F_x, F_y)‖ <= μ F_z` is stated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FrictionShape {
-    Cone,
-    /// By the pyramid `|F_x|, |F_y| <= μ F_z / √2` inside it.
-    Pyramid,
-}
 
 /// Rows `entries v <= bounds`.
 #[derive(Debug, Clone, Default)]
@@ -56,26 +49,31 @@ pub(super) struct StageShape {
     /// How many pairs of opposite rows come first among them.
     pub pairs: usize,
     pub soft_rows: usize,
-    pub rate_rows: usize,
+    pub link_rows: usize,
     pub cones: usize,
 }
 
 impl StageShape {
-    pub(super) fn of(latent_dim: usize, rows: &StageRows, friction: FrictionShape) -> Self {
-        let forces = usize::from(rows.friction.is_some());
-        let (pyramids, cones) = match friction {
-            FrictionShape::Cone => (0, forces),
-            FrictionShape::Pyramid => (forces, 0),
-        };
-        Self {
+    pub(super) fn of(latent_dim: usize, rows: &StageRows, solver: Solver) -> Self {
+        let shape = Self {
             states: 2 * latent_dim,
             inputs: latent_dim,
-            input_rows: rows.torque.len() + PYRAMID_ROWS * pyramids,
-            pairs: pairs(&rows.torque),
-            soft_rows: rows.joint.len(),
-            rate_rows: rows.rate.len(),
-            cones,
+            input_rows: rows.input.len(),
+            pairs: pairs(&rows.input),
+            soft_rows: rows.soft.len(),
+            link_rows: rows.link.len(),
+            cones: 0,
+        };
+        shape.with_cones(rows.cones.len() / CONE_ROWS, solver)
+    }
+
+    /// With cones `‖(F_x, F_y)‖ <= μ F_z` or in their place the pyramids `|F_x|, |F_y| <= μ F_z / √2` inside them.
+    pub(super) fn with_cones(mut self, count: usize, solver: Solver) -> Self {
+        match solver {
+            Solver::Clarabel => self.cones = count,
+            Solver::Riccati => self.input_rows += PYRAMID_ROWS * count,
         }
+        self
     }
 }
 
@@ -112,9 +110,9 @@ pub(super) struct StageQp {
     /// `E` and `e`.
     pub soft: Rows,
     /// `L` and `l`.
-    pub rate: Rows,
-    /// `o`: the rates' rows at the reference's input.
-    pub rate_at_reference: Vec<f64>,
+    pub link: Rows,
+    /// `o`: the links' rows at the reference's input.
+    pub link_at_reference: Vec<f64>,
     /// `K` and `k`, three rows per cone, its axis first.
     pub cones: Rows,
 }
@@ -138,8 +136,8 @@ impl StageQp {
             c: vec![0.0; nx],
             input: Rows::zeros(shape.input_rows, nu),
             soft: Rows::zeros(shape.soft_rows, nu),
-            rate: Rows::zeros(shape.rate_rows, nu),
-            rate_at_reference: vec![0.0; shape.rate_rows],
+            link: Rows::zeros(shape.link_rows, nu),
+            link_at_reference: vec![0.0; shape.link_rows],
             cones: Rows::zeros(CONE_ROWS * shape.cones, nu),
         }
     }
@@ -158,7 +156,7 @@ impl StageQp {
         }
     }
 
-    /// Rows of torques, rates and joints; `end` is the reference state at the stage's end.
+    /// Rows but for cones; `end` is the reference state at the stage's end.
     pub(super) fn write_rows(
         &mut self,
         rows: &StageRows,
@@ -167,18 +165,18 @@ impl StageQp {
         scale: &StageScale<'_>,
     ) {
         let dim = scale.input.len();
-        for (number, row) in rows.torque.iter().enumerate() {
+        for (number, row) in rows.input.iter().enumerate() {
             let entries = &mut self.input.entries[number * dim..][..dim];
             let at_reference = scale.row(&row.row, entries);
             let bound = row.bound - row.per_loss * losses_nm[row.joint];
             self.input.bounds[number] = bound - at_reference;
         }
-        for (number, row) in rows.rate.iter().enumerate() {
-            let entries = &mut self.rate.entries[number * dim..][..dim];
-            self.rate_at_reference[number] = scale.row(&row.row, entries);
-            self.rate.bounds[number] = row.bound;
+        for (number, row) in rows.link.iter().enumerate() {
+            let entries = &mut self.link.entries[number * dim..][..dim];
+            self.link_at_reference[number] = scale.row(&row.row, entries);
+            self.link.bounds[number] = row.bound;
         }
-        for (number, Row { row, bound, .. }) in rows.joint.iter().enumerate() {
+        for (number, Row { row, bound, .. }) in rows.soft.iter().enumerate() {
             let mut at_reference = 0.0;
             for col in 0..dim {
                 self.soft.entries[number * dim + col] = row[col] * scale.deviation[col];
@@ -188,23 +186,28 @@ impl StageQp {
         }
     }
 
-    /// Friction of the force with rows `(μ F_z, F_x, F_y)`, all zero without contact, as a cone or as the last rows on
-    /// the input. Without contact slacks are strictly inside.
-    pub(super) fn write_friction(&mut self, force: &[f64], scale: &StageScale<'_>) {
+    /// A cone of the force with rows `(μ F_z, F_x, F_y)`, all zero without contact, as it is or, of `count`, among the
+    /// last rows on the input. Without contact slacks are strictly inside.
+    pub(super) fn write_cone(
+        &mut self,
+        (cone, count): (usize, usize),
+        force: &[f64],
+        scale: &StageScale<'_>,
+    ) {
         let dim = scale.input.len();
-        for (number, bound) in self.cones.bounds.iter_mut().enumerate() {
-            let row = &mut self.cones.entries[number * dim..][..dim];
+        if self.cones.bounds.is_empty() {
+            let first = self.input.bounds.len() - PYRAMID_ROWS * (count - cone);
+            let rows = &mut self.input.entries[first * dim..];
+            let bounds = &mut self.input.bounds[first..];
+            return write_pyramid(force, scale.root, scale.input, dim, rows, bounds);
+        }
+        for number in 0..CONE_ROWS {
+            let row = &mut self.cones.entries[(CONE_ROWS * cone + number) * dim..][..dim];
             let force_row = &force[number * dim..][..dim];
             let is_free = number == 0 && force.iter().all(|entry| *entry == 0.0);
             let at_reference = scale.row(force_row, row);
             row.iter_mut().for_each(|entry| *entry = -*entry);
-            *bound = if is_free { 1.0 } else { at_reference };
-        }
-        if self.cones.bounds.is_empty() {
-            let first = self.input.bounds.len() - PYRAMID_ROWS;
-            let rows = &mut self.input.entries[first * dim..];
-            let bounds = &mut self.input.bounds[first..];
-            write_pyramid(force, scale.root, scale.input, dim, rows, bounds);
+            self.cones.bounds[CONE_ROWS * cone + number] = if is_free { 1.0 } else { at_reference };
         }
     }
 }

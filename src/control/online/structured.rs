@@ -11,10 +11,10 @@ use crate::solver::{Cost, Links, Outcome, Program, Report, RowMatrices, Settings
 pub const TOLERANCE: f64 = 1e-9;
 /// Gap between primal and dual cost, relative to the cost, at which they end as well.
 const GAP: Real = 1e-8;
-/// [`TOLERANCE`] if torque rates are limited: their rows tie all stages together, each is as good as the worst.
-pub const RATE_TOLERANCE: f64 = 1e-12;
+/// [`TOLERANCE`] with rows that link stages: they tie all together, each is as good as the worst.
+pub const LINK_TOLERANCE: f64 = 1e-12;
 /// How soft the rows of such a program are within a step, see [`Links`].
-pub const RATE_SOFTNESS: f64 = 1e-8;
+pub const LINK_SOFTNESS: f64 = 1e-8;
 /// Most latent coordinates that the solver is compiled for.
 pub const MAX_STRUCTURED_DIM: usize = 8;
 
@@ -26,15 +26,15 @@ pub(super) fn structured(
     cost: &StageCost,
     settings: QpSettings,
 ) -> Result<Box<dyn StageSolver>, ControlError> {
-    let (is_linked, is_lift) = (shape.rate_rows > 0, shape.states == 0);
+    let (is_linked, is_lift) = (shape.link_rows > 0, shape.states == 0);
     let settings = Settings {
         max_iterations: settings.max_iterations,
-        tolerance: if is_linked { RATE_TOLERANCE } else { TOLERANCE },
+        tolerance: if is_linked { LINK_TOLERANCE } else { TOLERANCE },
         // Of a lift torques are at stake: the largest product alone decides.
         gap: if is_linked || is_lift { 0.0 } else { GAP },
         accepted_residual: settings.accepted_residual,
     };
-    // Programs with rates, which are rare, do with narrow vectors; of these fewer dimensions are compiled.
+    // Programs with links, which are rare, do with narrow vectors; of these fewer dimensions are compiled.
     let is_wide = has_avx2() && !is_linked;
     let multiple = if is_wide || is_linked { 2 } else { 4 };
     let inputs = shape.inputs.next_multiple_of(multiple);
@@ -58,7 +58,7 @@ pub(super) fn structured(
     }
 }
 
-/// Memory of a program of at most `NX` states and `NU` inputs: `WIDE` with AVX2, `LINKED` with torque rates.
+/// Memory of a program of at most `NX` states and `NU` inputs: `WIDE` with AVX2, `LINKED` with rows that link stages.
 #[derive(Debug)]
 pub(super) struct Structured<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
 {
@@ -67,11 +67,11 @@ pub(super) struct Structured<const NX: usize, const NU: usize, const WIDE: bool,
     inputs: usize,
     stages: Vec<Stage<f64, NX, NU>>,
     memory: Vec<f64>,
-    /// Rows on the inputs, on the states and of the rates, those of a stage one after the other.
+    /// Rows on the inputs, on the states and of the links, those of a stage one after the other.
     input_rows: Vec<[f64; NU]>,
     soft_rows: Vec<[f64; NU]>,
-    rate_rows: Vec<[f64; NU]>,
-    rate_gains: Vec<[[f64; NU]; NU]>,
+    link_rows: Vec<[f64; NU]>,
+    link_gains: Vec<[[f64; NU]; NU]>,
     first: usize,
     shape: Shape,
     cost: Cost<f64, NX, NU>,
@@ -94,7 +94,7 @@ impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
         let shape = Shape {
             input: of.input_rows,
             soft: of.soft_rows,
-            link: of.rate_rows,
+            link: of.link_rows,
             pairs: of.pairs,
         };
         let mut state = [0.0; NX];
@@ -112,8 +112,8 @@ impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
             memory: vec![0.0; horizon * shape.memory()],
             input_rows: vec![[0.0; NU]; horizon * shape.input],
             soft_rows: vec![[0.0; NU]; horizon * shape.soft],
-            rate_rows: vec![[0.0; NU]; horizon * shape.link],
-            rate_gains: vec![[[0.0; NU]; NU]; if shape.link > 0 { horizon } else { 0 }],
+            link_rows: vec![[0.0; NU]; horizon * shape.link],
+            link_gains: vec![[[0.0; NU]; NU]; if shape.link > 0 { horizon } else { 0 }],
             first: 0,
             shape,
             cost: Cost {
@@ -140,9 +140,9 @@ impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
                 soft: &self.soft_rows,
             },
             links: Links {
-                rows: &self.rate_rows,
-                gains: &mut self.rate_gains,
-                softness: RATE_SOFTNESS,
+                rows: &self.link_rows,
+                gains: &mut self.link_gains,
+                softness: LINK_SOFTNESS,
             },
             cost: self.cost,
         }
@@ -170,23 +170,23 @@ impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
         for (matrix, count, rows) in [
             (&mut self.input_rows, shape.input, &qp.input),
             (&mut self.soft_rows, shape.soft, &qp.soft),
-            (&mut self.rate_rows, shape.link, &qp.rate),
+            (&mut self.link_rows, shape.link, &qp.link),
         ] {
             write_rows(&mut matrix[place * count..][..count], rows, nu);
         }
     }
 
-    /// Bounds of the rates: those of a stage depend on the stage before.
-    fn write_rate_bounds(&mut self, stages: &[StageQp], start: &Start) {
+    /// Bounds of the links: those of a stage depend on the stage before.
+    fn write_link_bounds(&mut self, stages: &[StageQp], start: &Start) {
         let (count, memory) = (self.shape.rows(), self.shape.memory());
-        let mut before = &start.rate_before[..];
+        let mut before = &start.link_before[..];
         for (index, stage) in stages.iter().enumerate() {
             let first = self.place(index) * memory + count - self.shape.link;
             for row in 0..self.shape.link {
                 self.memory[first + row] =
-                    stage.rate.bounds[row] - stage.rate_at_reference[row] + before[row];
+                    stage.link.bounds[row] - stage.link_at_reference[row] + before[row];
             }
-            before = &stage.rate_at_reference;
+            before = &stage.link_at_reference;
         }
     }
 }
@@ -222,7 +222,7 @@ impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool> Sta
         if !self.has_gains {
             return (Outcome::NumericalFailure, 0);
         }
-        self.write_rate_bounds(stages, start);
+        self.write_link_bounds(stages, start);
         let mut x0 = [0.0; NX];
         x0[..self.states].copy_from_slice(&start.state);
         let (is_warm, settings) = (self.is_warm, self.settings);

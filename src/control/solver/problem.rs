@@ -101,7 +101,7 @@ impl Shape {
 
 /// Numbers per row: bound, slack, multiplier, weight, target, residual, the change of slack and multiplier, and the
 /// slack's inverse.
-pub(super) const ROW_NUMBERS: usize = 9;
+pub const ROW_NUMBERS: usize = 9;
 
 /// Coefficients of the rows; stages may share them.
 #[derive(Debug, Clone, Copy)]

@@ -19,13 +19,11 @@ use crate::deploy::emit::{EmitOptions, compiled};
 use crate::deploy::{EmitError, PlannedJump};
 use crate::equations::Equations;
 use crate::files::EmittedFile;
+use crate::mpc::ControlModel;
+use crate::mpc::interface::{Accepts, SETTINGS, Setting};
 use crate::mpc::problem::StageRows;
-use crate::mpc::{ControlModel, MpcSettings};
-use crate::solver::Shape;
+use crate::solver::ROW_NUMBERS;
 use source::{Numbers, Source};
-
-/// Rows of the friction pyramid and of the slack.
-const OTHER_ROWS: usize = 5;
 
 struct Facts<'a> {
     controller: controller::Facts<'a>,
@@ -35,7 +33,8 @@ struct Facts<'a> {
     torque_limit: String,
     limits: &'a [(f64, f64)],
     f: &'static str,
-    max_rows: usize,
+    /// Macros that compile rows which link stages, each with the words for what it compiles.
+    switches: Vec<(&'static str, &'static str)>,
     row_numbers: usize,
     solver_stage: String,
     n_phases: usize,
@@ -69,13 +68,7 @@ pub fn emit(
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let (model, precision) = (equations.model(), options.precision);
     let plant = plant(model)?;
-    // Rates are chosen when it runs: the rows are those of 1 N m a stage.
-    let unit_rate = MpcSettings {
-        torque_rate_nm_s: Some(1.0),
-        step_s: 1.0,
-        ..MpcSettings::default()
-    };
-    let rows = StageRows::new(&plant, &unit_rate);
+    let rows = StageRows::of_all_kinds(&plant);
     let entries = compiled(equations, options, Units::Si)?;
     let own = |phase: &&PhaseInterface| phase.identifier.eq_ignore_ascii_case("controller");
     if let Some(phase) = entries.phases.iter().find(own) {
@@ -126,21 +119,21 @@ impl<'a> Facts<'a> {
             Precision::Double => ("double", ""),
             Precision::Single => ("float", "f"),
         };
-        let one_row = Shape {
-            input: 1,
-            ..Shape::default()
-        };
         let limits = plant.robot().torque_limit_nm();
+        let switch = |setting: &Setting| match setting.accepts {
+            Accepts::Compiled(name, what) => Some((name, what)),
+            _ => None,
+        };
         Self {
             solver_stage: source::stage(controller.name, &controller.upper, real),
-            row_numbers: one_row.memory(),
+            row_numbers: ROW_NUMBERS,
             controller,
             banner: format!("/* {provenance} */"),
             real,
             torque_limit: Numbers(Precision::Double).vector(limits),
             limits: plant.robot().joint_limit_rad(),
             f,
-            max_rows: rows.torque.len() + rows.joint.len() + OTHER_ROWS,
+            switches: SETTINGS.iter().filter_map(switch).collect(),
             n_phases: plant.phases().len(),
             has_given_state: (plant.phases().iter()).all(|phase| phase.given_state.is_some()),
             rows,

@@ -10,12 +10,12 @@ use super::Facts;
 use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
-use crate::mpc::problem::{Row, StageRows, pairs};
-use crate::mpc::shared::{NO_PHASE, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE, torque_deviation};
+use crate::mpc::problem::{Row, pairs};
+use crate::mpc::shared::{LINK_SOFTNESS, LINK_TOLERANCE, NO_PHASE, TOLERANCE, torque_deviation};
 use crate::mpc::{
     ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings,
 };
-use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, WrenchFrame};
+use crate::robot::{GRAVITY_M_S2, Leg, LegShape, WrenchFrame};
 
 #[derive(Template)]
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
@@ -23,7 +23,7 @@ pub(super) struct Source<'a> {
     facts: &'a Facts<'a>,
     /// Of the stage problem: twice the latent dimension, as one number, which Eva wants of the length of an array.
     n_states: usize,
-    n_torque_pairs: usize,
+    n_paired: usize,
     max_nnz: usize,
     has_actuators: bool,
     given_state: String,
@@ -34,9 +34,13 @@ pub(super) struct Source<'a> {
     functions: String,
     lift_functions: String,
     online: String,
-    constants: String,
+    numbers: Numbers,
+    plant: &'a ControlModel,
+    phase_of_feet: String,
+    is_grounded: String,
+    input_mean: String,
+    input_root: String,
     legs: String,
-    hips: String,
     arm_from: String,
     torque_mean: String,
     torque_deviation: String,
@@ -61,7 +65,9 @@ impl<'a> Source<'a> {
         precision: Precision,
     ) -> Result<Self, MpcError> {
         let (numbers, phases) = (Numbers(precision), plant.phases());
-        let robot = plant.robot();
+        let (robot, feet) = (plant.robot(), plant.phase_of_feet.iter());
+        let root =
+            |phase: &ControlPhase| numbers.rows(&phase.latent_root.transpose(), facts.latent_dim);
         let mpc = MpcSettings::default();
         let of_given = |part: fn(&InputGivenState) -> &DMatrix<f64>| {
             let given = phases.iter().filter_map(|phase| phase.given_state.as_ref());
@@ -78,7 +84,7 @@ impl<'a> Source<'a> {
         Ok(Self {
             facts,
             n_states: 2 * facts.latent_dim,
-            n_torque_pairs: pairs(&facts.rows.torque),
+            n_paired: 2 * pairs(&facts.rows.input),
             max_nnz: (entries.phases.iter())
                 .map(|phase| phase.pattern.len())
                 .fold(1, usize::max),
@@ -88,12 +94,16 @@ impl<'a> Source<'a> {
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: solver_numbers(precision, mpc.qp.accepted_residual),
-            functions: of_horizon(facts.name),
+            functions: of_horizon(FUNCTIONS, facts.name),
             lift_functions: of_lift(),
-            online: online(facts.name),
-            constants: constants(plant, facts.rows, numbers),
+            online: of_horizon(ONLINE, facts.name),
+            numbers,
+            plant,
+            phase_of_feet: integers(feet.map(|phase| phase.unwrap_or(NO_PHASE) as i64)),
+            is_grounded: integers(phases.iter().map(|phase| i64::from(phase.is_grounded))),
+            input_mean: numbers.matrix(phases.iter().map(|phase| &phase.latent_mean)),
+            input_root: nested(phases.iter().map(root)),
             legs: nested(Leg::ALL.map(|leg| numbers.leg(&robot.geometry(leg).shape))),
-            hips: numbers.matrix(robot.hip_position_m),
             arm_from: numbers.matrix(match plant.input_rule().wrench_frame() {
                 WrenchFrame::Body => [[0.0; 3]; 4],
                 WrenchFrame::World => robot.hip_position_m,
@@ -107,89 +117,14 @@ impl<'a> Source<'a> {
     }
 }
 
-fn constants(plant: &ControlModel, rows: &StageRows, numbers: Numbers) -> String {
-    let (robot, phases) = (plant.robot(), plant.phases());
-    let (d, limits) = (plant.latent_dim(), robot.joint_limit_rad());
-    let row_matrix = |rows: &[Row]| numbers.matrix(rows.iter().map(|row| &row.row));
-    let root = |phase: &ControlPhase| numbers.rows(&phase.latent_root.transpose(), d);
-    let (torque, joint, rate) = (
-        rows.torque.iter(),
-        rows.joint.iter(),
-        row_matrix(&rows.rate),
-    );
-    let feet = plant.phase_of_feet.iter();
-    let force = plant.lift.rows(JOINT_DIM, 3) / (robot.mass_kg() * GRAVITY_M_S2);
-    let [encoder, projection] = [&plant.encoder, &plant.projection].map(|m| numbers.rows(m, d));
-    let [decoder, lift] = [&plant.decoder, &plant.lift].map(|m| numbers.rows(m, JOINT_DIM));
-    let encoder_bias = numbers.vector(&plant.encoder_bias);
-    let decoder_bias = numbers.vector(plant.decoder_bias.iter().take(JOINT_DIM));
-    let force = numbers.rows(&force, 3);
-    let phase_of_feet = integers(feet.map(|phase| phase.unwrap_or(NO_PHASE) as i64));
-    let is_grounded = integers(phases.iter().map(|phase| i64::from(phase.is_grounded)));
-    let input_mean = numbers.matrix(phases.iter().map(|phase| &phase.latent_mean));
-    let input_root = nested(phases.iter().map(root));
-    let torque_rows = row_matrix(&rows.torque);
-    let torque_bound = numbers.vector(torque.clone().map(|row| row.bound));
-    let torque_per_loss = numbers.vector(torque.clone().map(|row| row.per_loss));
-    let torque_joint = integers(torque.map(|row| row.joint as i64));
-    let joint_rows = row_matrix(&rows.joint);
-    let joint_bound = numbers.vector(joint.map(|row| row.bound));
-    let joint_lower = numbers.vector(limits.iter().map(|limit| limit.0));
-    let joint_upper = numbers.vector(limits.iter().map(|limit| limit.1));
-    let torque_limit = numbers.vector(robot.torque_limit_nm());
-    let mut out = format!(
-        "\
-/* W_e s_x and b_e. */
-static const real ENCODER[D][S] = {encoder};
-static const real ENCODER_BIAS[D] = {encoder_bias};
-/* Rows of W_d / s_x and b_d / s_x for the joints. */
-static const real DECODER[12][D] = {decoder};
-static const real DECODER_BIAS[12] = {decoder_bias};
-/* Rows of W_e^T / s_u for torques, and for the force over the robot's weight. */
-static const real LIFT[12][D] = {lift};
-static const real FORCE[3][D] = {force};
-/* pinv(W_e^T) s_u. */
-static const real PROJECTION[D][S] = {projection};
-/* Phase of each foot pattern, bit k for foot k; ONLINE_NO_PHASE for none. */
-static const int PHASE_OF_FEET[16] = {phase_of_feet};
-static const int IS_GROUNDED[N_PHASES] = {is_grounded};
-/* Mean of the training's latent inputs by phase, and lower Cholesky factor of their covariance, column by column. */
-static const real INPUT_MEAN[N_PHASES][D] = {input_mean};
-static const real INPUT_ROOT[N_PHASES][D][D] = {input_root};
-/* Torque limits that can be active, first N_TORQUE_PAIRS with both sides, row and -row: row . u_lat <= bound - per_loss *
- * loss of the joint. */
-static const real TORQUE_ROWS[][D] = {torque_rows};
-static const real TORQUE_BOUND[] = {torque_bound};
-static const real TORQUE_PER_LOSS[] = {torque_per_loss};
-static const int TORQUE_JOINT[] = {torque_joint};
-/* Torques whose rates can be limited, with both signs: row . (u_lat - the one before) <= rate * step. */
-static const real RATE_ROWS[][D] = {rate};
-/* Joint limits that can be active: row . z <= bound. */
-static const real JOINT_ROWS[][D] = {joint_rows};
-static const real JOINT_BOUND[] = {joint_bound};
-static const real JOINT_LOWER[12] = {joint_lower};
-static const real JOINT_UPPER[12] = {joint_upper};
-static const real TORQUE_LIMIT[12] = {torque_limit};
-"
-    );
-    if let Some(actuators) = plant.input_rule().actuators() {
-        out += "/* What the joints take. */\n";
-        for (name, (_, values)) in ["VISCOUS", "DRY", "ARMATURE"].iter().zip(actuators.named()) {
-            let values = numbers.vector(values);
-            out += &format!("static const real {name}[12] = {values};\n");
-        }
-    }
-    out
-}
-
 /// Where iterations end. In single precision rounding ends the progress earlier; torques of a lift would be off by 0.1 N m
-/// with the complementarity of a plan, and weights of rows of rates have to stay far below the inverse of rounding.
+/// with the complementarity of a plan, and weights of rows that link stages have to stay far below the inverse of rounding.
 fn solver_numbers(precision: Precision, accepted_residual: f64) -> [(&'static str, f64); 5] {
     [
         ("TOLERANCE", TOLERANCE, 1e-4),
         ("LIFT_TOLERANCE", TOLERANCE, 1e-6),
-        ("RATE_TOLERANCE", RATE_TOLERANCE, 1e-5),
-        ("RATE_SOFTNESS", RATE_SOFTNESS, 1e-4),
+        ("LINK_TOLERANCE", LINK_TOLERANCE, 1e-5),
+        ("LINK_SOFTNESS", LINK_SOFTNESS, 1e-4),
         ("ACCEPTED_RESIDUAL", accepted_residual, 1e-3),
     ]
     .map(|(name, double, single)| match precision {
@@ -238,9 +173,17 @@ impl Numbers {
         format!("{{{}}}", fields.join(",\n     "))
     }
 
-    fn rows(self, matrix: &DMatrix<f64>, count: usize) -> String {
+    fn limits(self, rows: &[Row]) -> String {
+        nested(rows.iter().map(|of| {
+            let [bound, per_loss] = [of.bound, of.per_loss].map(|number| self.one(number));
+            let (row, joint, kind) = (self.vector(&of.row), of.joint, of.kind as i32);
+            format!("{{{joint}, {kind}, {bound}, {per_loss}, {row}}}")
+        }))
+    }
+
+    fn rows(self, matrix: &DMatrix<f64>, most: usize) -> String {
         let row = |i| (0..matrix.ncols()).map(move |j| matrix[(i, j)]);
-        self.matrix((0..count).map(row))
+        self.matrix((0..matrix.nrows().min(most)).map(row))
     }
 
     /// Rows of vectors; one row of zeros if there are none.
@@ -280,12 +223,6 @@ const FUNCTIONS: &str = include_str!("../../../templates/controller_c/solver.c")
 const STATE: &str = include_str!("../../../templates/controller_c/online_state.h");
 const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
 
-fn online(name: &str) -> String {
-    renamed(ONLINE, |word| {
-        is_state(word).then(|| format!("{name}_{word}"))
-    })
-}
-
 /// Whether a word is the type of a part of the controller's own state.
 fn is_state(word: &str) -> bool {
     STATE.contains(&format!("}} {word};"))
@@ -304,9 +241,11 @@ pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
     renamed(STAGE, rename) + &renamed(STATE, rename)
 }
 
-fn of_horizon(name: &str) -> String {
-    renamed(FUNCTIONS, |word| {
-        (word == "solver_stage").then(|| format!("{name}_{word}"))
+fn of_horizon(text: &str, name: &str) -> String {
+    renamed(text, |word| match word {
+        "online_settings" => Some(format!("{name}_controller_settings")),
+        _ if is_state(word) || word == "solver_stage" => Some(format!("{name}_{word}")),
+        _ => None,
     })
 }
 

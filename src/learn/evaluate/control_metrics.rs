@@ -4,6 +4,7 @@ use super::along_recording::{control_samples, set_reference};
 use super::prediction::{prediction_error, recorded_stages, uninformed};
 use super::verdict::failure;
 use super::*;
+use crate::mpc::problem::has_links_or_cones;
 use crate::mpc::{MAX_STRUCTURED_DIM, MpcSettings, Solver, Status};
 use crate::robot::input_rule::rotation;
 
@@ -142,9 +143,7 @@ pub fn control_metrics(
     recording: &Recording,
     mut settings: MpcSettings,
 ) -> Result<ControlMetrics> {
-    let has_links_or_cones =
-        settings.torque_rate_nm_s.is_some() || settings.body_friction.is_some();
-    if model.latent_dim() <= MAX_STRUCTURED_DIM && !has_links_or_cones {
+    if model.latent_dim() <= MAX_STRUCTURED_DIM && !has_links_or_cones(&settings) {
         settings.solver = Solver::Riccati;
     }
     let stages = recorded_stages(model, recording, settings.step_s)?;

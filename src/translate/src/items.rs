@@ -92,7 +92,12 @@ impl<'a> Items<'a> {
                 message: error.to_string(),
             })?;
             for item in &file.items {
-                let _ = items.add(source, item);
+                let _ = match item {
+                    Item::Macro(item) if item.mac.path.is_ident("settings") => {
+                        items.add_settings(source, item)
+                    }
+                    _ => items.add(source, item),
+                };
             }
         }
         Ok(items)
@@ -203,6 +208,27 @@ impl<'a> Items<'a> {
         Ok(())
     }
 
+    /// The settings that C has: `name: type,` behind an arrow, or behind `|` for more of one row.
+    fn add_settings(&mut self, source: usize, table: &syn::ItemMacro) -> Found<()> {
+        let table = table.mac.tokens.to_string();
+        let words: Vec<&str> = table.split_whitespace().collect();
+        let (docs, mut fields) = (Vec::new(), Vec::new());
+        for words in words.windows(5) {
+            if let ["=>" | "|", name, ":", ty, ","] = *words
+                && let Ok(ty) = syn::parse_str(ty)
+            {
+                let (ty, name) = (self.ty(source, &ty, "")?, name.to_owned());
+                fields.push(Field {
+                    docs: Vec::new(),
+                    name,
+                    ty,
+                });
+            }
+        }
+        (self.structs).insert("Settings".to_owned(), Struct { docs, fields });
+        Ok(())
+    }
+
     fn add_function(
         &mut self,
         source: usize,
@@ -285,7 +311,7 @@ impl<'a> Items<'a> {
                     "Self" if owner == "Real" => Type::Real,
                     "Self" => Type::Named(owner.to_owned()),
                     "f64" => Type::Double,
-                    "usize" | "u32" => Type::Int,
+                    "usize" | "u32" | "i32" => Type::Int,
                     "bool" => Type::Bool,
                     name => Type::Named(self.with_sizes(source, name, last)?),
                 }
@@ -389,7 +415,7 @@ impl Writer<'_> {
 
     /// A struct or enum, behind those that its fields are made of.
     fn write_type(&self, name: &str, out: &mut String, written: &mut BTreeSet<String>) {
-        if !written.insert(name.to_owned()) {
+        if self.items.unit.elsewhere(name).is_some() || !written.insert(name.to_owned()) {
             return;
         }
         let c_name = self.items.name(&[name]);

@@ -78,7 +78,8 @@ pub struct Unit<'a> {
     pub fixed: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
     pub header: &'a [&'a str],
-    /// Constants of the Rust, and methods that state a condition, that whoever includes the C defines, with their names there.
+    /// Constants, structs and methods that state a condition, that whoever includes the C defines, with their names
+    /// there; a struct keeps its own.
     pub elsewhere: &'a [(&'a str, &'a str)],
     /// What stands before the type of every function, with a space.
     pub attribute: &'a str,
@@ -163,13 +164,14 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
     let unit = Unit {
         prefix: "online",
         users: &users,
-        fixed: &["LegShape", "FallbackSettings"],
+        fixed: &["LegShape", "FallbackSettings", "Settings"],
         header: &["Share", "Memory", "PlanTime"],
         elsewhere: &[
             ("MOST_LATENT", "D"),
             ("MOST_STATE", "X"),
             ("MOST_SQUARE", "D * D"),
             ("SQRT_HALF", "SQRT_HALF"),
+            ("Settings", ""),
         ],
         attribute: "MAYBE_UNUSED ",
         ..Unit::default()
