@@ -1155,8 +1155,8 @@ static inline MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *
         for (int i = 0; i < d; ++i) {
             along += z[i] * row[i];
         }
-        const bool is_farther = sample == 0 || !(farthest > along);
-        farthest = is_farther ? along : farthest;
+        const bool is_less = sample > 0 && farthest > along;
+        farthest = is_less ? farthest : along;
     }
     return farthest + ONLINE_STATE_REACH * SQRT(spread) >= bound;
 }

@@ -172,7 +172,6 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             ("SQRT_HALF", "SQRT_HALF"),
         ],
         attribute: "MAYBE_UNUSED ",
-        ..Unit::default()
     };
     let mut sources = read(root, "src/control/online", ".rs")?;
     sources.extend(read(root, "src/robot", ".rs")?);
