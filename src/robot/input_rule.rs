@@ -187,11 +187,7 @@ impl Actuators {
     /// [`joint_loss`] of every joint at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2).
     #[must_use]
     pub fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
-        std::array::from_fn(|i| joint_loss(&self.of_joint(i), dq[i], ddq[i]))
-    }
-
-    /// Viscous friction, dry friction and armature of a joint.
-    pub fn of_joint(&self, joint: usize) -> [f64; 3] {
-        [&self.viscous, &self.dry, &self.armature].map(|values| values[joint])
+        let of = |joint: usize| self.named().map(|(_, values)| values[joint]);
+        std::array::from_fn(|i| joint_loss(&of(i), dq[i], ddq[i]))
     }
 }

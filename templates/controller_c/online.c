@@ -504,6 +504,17 @@ static inline MAYBE_UNUSED bool online_is_same_time(double time_s, double other_
     return off_s < ONLINE_TIME_TOLERANCE_S && off_s > -ONLINE_TIME_TOLERANCE_S;
 }
 
+/* Moves torques that are with the losses beyond the limits to these. */
+static inline MAYBE_UNUSED void online_keep_limits(const real *limit_nm, const real *losses_nm, real *restrict torque)
+{
+    for (int i = 0; i < 12; ++i) {
+        const real least = -limit_nm[i] - losses_nm[i];
+        const real most = limit_nm[i] - losses_nm[i];
+        torque[i] = torque[i] < least ? least : torque[i];
+        torque[i] = torque[i] > most ? most : torque[i];
+    }
+}
+
 /* b dq + c tanh(dq / v) + I ddq of a joint with these b, c and I, N m, at dq (rad/s) and ddq (rad/s^2). */
 static inline MAYBE_UNUSED real online_joint_loss(const real *of, real dq, real ddq)
 {
@@ -729,6 +740,15 @@ static inline MAYBE_UNUSED void online_write_defect(const real *next, const real
             sum += row[2 * d + j] * (input[j] - u[j]);
         }
         defect[i] = sum;
+    }
+}
+
+/* Writes torques, N m, of a joint PD with two gains that holds a posture and, behind it, joint velocities. */
+static inline MAYBE_UNUSED void online_write_drives(const real *gains, const real *held, const real *x,
+        const real *dx, real *restrict torque)
+{
+    for (int i = 0; i < 12; ++i) {
+        torque[i] = gains[0] * (held[i] - x[i]) + gains[1] * (held[12 + i] - dx[i]);
     }
 }
 
@@ -1170,8 +1190,8 @@ static inline MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *
         for (int i = 0; i < d; ++i) {
             along += z[i] * row[i];
         }
-        const bool is_farther = sample == 0 || !(farthest > along);
-        farthest = is_farther ? along : farthest;
+        const bool is_less = sample > 0 && farthest > along;
+        farthest = is_less ? farthest : along;
     }
     return farthest + ONLINE_STATE_REACH * SQRT(spread) >= bound;
 }

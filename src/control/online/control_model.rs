@@ -181,15 +181,8 @@ impl ControlModel {
             self.decode_joint_velocities(z, dz)
         });
         let limit = self.robot().torque_limit_nm();
-        std::array::from_fn(|i| {
-            planned_loss(
-                &actuators.of_joint(i),
-                before[i],
-                after[i],
-                step_s,
-                limit[i],
-            )
-        })
+        let of = |joint: usize| actuators.named().map(|(_, values)| values[joint]);
+        std::array::from_fn(|i| planned_loss(&of(i), before[i], after[i], step_s, limit[i]))
     }
 
     /// `u_lat = pinv(J_Eᵀ) s_u u` with the encoder's Jacobian at `x` if it is nonlinear and has full row rank there,

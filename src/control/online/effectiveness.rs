@@ -104,6 +104,13 @@ impl Share {
     }
 }
 
+/// Writes torques, N m, of a joint PD with two gains that holds a posture and, behind it, joint velocities.
+fn write_drives(gains: &[Real; 2], held: &[Real], x: &[Real], dx: &[Real], torque: &mut [Real]) {
+    for i in 0..12 {
+        torque[i] = gains[0] * (held[i] - x[i]) + gains[1] * (held[12 + i] - dx[i]);
+    }
+}
+
 /// The estimate with what the motors hold.
 #[derive(Debug, Clone)]
 pub(super) struct Effectiveness {
@@ -133,10 +140,8 @@ impl Effectiveness {
     pub(super) fn begin(&mut self, model: &StageModel, is_grounded: bool) {
         self.is_grounded = is_grounded;
         let d = self.drives.len();
-        for i in 0..d {
-            for k in 0..d {
-                self.by_input[i * d + k] = model.b(d + i, k);
-            }
+        for (i, row) in self.by_input.chunks_exact_mut(d).enumerate() {
+            row.copy_from_slice(&model.by[(d + i) * 3 * d + 2 * d..][..d]);
         }
     }
 
@@ -190,23 +195,20 @@ impl Effectiveness {
         settings: &Settings,
         measurement: &Measurement<'_>,
     ) -> bool {
-        let Some([joints, rates]) = &self.held else {
+        let Some(held) = &self.held else {
             return false;
         };
-        let (x, dx) = (measurement.x, measurement.dx);
-        let torque: [f64; JOINT_DIM] = std::array::from_fn(|joint| {
-            settings.stiffness_nm_rad * (joints[joint] - x[joint])
-                + settings.damping_nm_s_rad * (rates[joint] - dx[joint])
-        });
+        let (x, dx, mut torque) = (measurement.x, measurement.dx, [0.0; JOINT_DIM]);
+        let gains = [settings.stiffness_nm_rad, settings.damping_nm_s_rad];
+        write_drives(&gains, held.as_flattened(), x, dx, &mut torque);
         let state: [f64; STATE_DIM] = std::array::from_fn(|i| x[i]);
         let rule = plant.input_rule();
         let Ok(wrench) = rule.wrench(&state, &torque, measurement.feet) else {
             return false;
         };
-        let input: [f64; STATE_DIM] = std::array::from_fn(|i| match i.checked_sub(JOINT_DIM) {
-            None => torque[i],
-            Some(axis) => wrench[axis],
-        });
+        let mut input = [0.0; STATE_DIM];
+        input[..JOINT_DIM].copy_from_slice(&torque);
+        input[JOINT_DIM..].copy_from_slice(wrench.as_slice());
         plant.project(x, &input, &mut self.drives);
         true
     }

@@ -180,10 +180,8 @@ impl ConsistentLift {
             self.constrain(deviation, &mut y)?;
             write_torque(mean, deviation, &y, &mut torque);
         }
-        Ok(std::array::from_fn(|joint| {
-            let (loss, limit) = (stance.losses_nm[joint], self.limit_nm[joint]);
-            torque[joint].clamp(-limit - loss, limit - loss)
-        }))
+        keep_limits(&self.limit_nm, &stance.losses_nm, &mut torque);
+        Ok(torque)
     }
 
     /// Interior-point iterations of the last lift; zero if no constraint was active.
@@ -374,6 +372,16 @@ fn write_limits(
         }
         rows[12 * number + joint] = sign / limit_nm[joint];
         bounds[number] = 1.0 - sign * ((torque[joint] + losses_nm[joint]) / limit_nm[joint]);
+    }
+}
+
+/// Moves torques that are with the losses beyond the limits to these.
+fn keep_limits(limit_nm: &[Real], losses_nm: &[Real], torque: &mut [Real]) {
+    for i in 0..12 {
+        let least = -limit_nm[i] - losses_nm[i];
+        let most = limit_nm[i] - losses_nm[i];
+        torque[i] = if torque[i] < least { least } else { torque[i] };
+        torque[i] = if torque[i] > most { most } else { torque[i] };
     }
 }
 

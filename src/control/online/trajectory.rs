@@ -214,8 +214,8 @@ pub(super) trait Trajectory {
             for i in 0..d {
                 along += z[i] * row[i];
             }
-            let is_farther = sample == 0 || !(farthest > along);
-            farthest = if is_farther { along } else { farthest };
+            let is_less = sample > 0 && farthest > along;
+            farthest = if is_less { farthest } else { along };
         }
         farthest + STATE_REACH * spread.sqrt() >= bound
     }

@@ -174,7 +174,6 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
             ("Settings", ""),
         ],
         attribute: "MAYBE_UNUSED ",
-        ..Unit::default()
     };
     let mut sources = read(root, "src/control/online", ".rs")?;
     sources.extend(read(root, "src/robot", ".rs")?);
