@@ -35,7 +35,7 @@ use drivers::{Build, Workshop, contents};
 use functions::{Function, Random, functions as functions_of};
 use nalgebra::DVector;
 use romc::equations::Equations;
-use romc::ir::Interpreter;
+use romc::ir::{Interpreter, Statement};
 use romc::lower::CompiledModel;
 use romc::lower::{Form, Map, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
@@ -182,6 +182,25 @@ fn generated_code_of_random_models_equals_the_interpreter() {
             Build::exact()
         }
     });
+}
+
+#[test]
+fn generated_code_of_a_large_polynomial_equals_the_interpreter() {
+    let mut case = Case::new(vec![models::cubic()], 50, Form::Automatic);
+    // Zeros have the sign of the interpreter's.
+    for (function, points) in case.functions.iter().zip(&mut case.points) {
+        points[..function.input_len()].fill(0.0);
+    }
+    case.interpret();
+    let is_of_lanes = |s: &Statement| matches!(s, Statement::Lanes { .. });
+    let mut programs = case.functions.iter().map(|function| &function.program);
+    assert!(programs.any(|program| program.statements().iter().any(is_of_lanes)));
+    check_all("cubic", &[case], |_| {
+        tools::thorough_or(Build::all(), Build::exact())
+    });
+    let workshop = Workshop::new(&[models::cubic()], Form::Automatic);
+    workshop.run_c_selftest(&Build::c_plain(), "cubic");
+    workshop.run_rust_selftest("cubic");
 }
 
 #[test]

@@ -21,7 +21,9 @@ fn all_models() -> Vec<(ReducedModel, Form)> {
     let shipped = models::shipped().into_iter().map(of(Form::Automatic));
     let random = (0..12).map(models::random).map(of(Form::Automatic));
     let tables = (1000..1004).map(models::random).map(of(Form::Tables));
-    let nonlinear = (0..3).map(models::random_nonlinear);
+    let nonlinear = (0..3)
+        .map(models::random_nonlinear)
+        .chain([models::cubic()]);
     let nonlinear = nonlinear.map(of(Form::Automatic));
     shipped
         .chain(random)

@@ -288,6 +288,20 @@ impl ExprPool {
         }
     }
 
+    /// The factors of a product, each as often as its exponent says; nothing unless that is an integer from 0 to `most`.
+    pub fn repeated_factors(&self, expr: ExprId, most: usize) -> Option<Vec<ExprId>> {
+        let mut factors = Vec::new();
+        for &factor in self.factors_of(expr) {
+            let (base, exponent) = match self.node(factor) {
+                Node::Power(base, exponent) => (*base, self.as_integer(*exponent)?),
+                _ => (factor, 1),
+            };
+            let times = usize::try_from(exponent).ok()?;
+            factors.extend((times <= most).then(|| std::iter::repeat_n(base, times))?);
+        }
+        Some(factors)
+    }
+
     /// The operands of the top level, left to right.
     pub fn children(&self, expr: ExprId) -> impl Iterator<Item = ExprId> + '_ {
         let symbol = self.as_symbol(expr);

@@ -278,18 +278,9 @@ fn state_index(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<usize
 
 /// Indices into (z, dz), rising, each as often as its power.
 fn monomial(pool: &ExprPool, latent_dim: usize, expr: ExprId) -> Option<Vec<usize>> {
-    let mut indices = Vec::new();
-    for &factor in pool.factors_of(expr) {
-        let (base, power) = match pool.node(factor) {
-            Node::Power(base, exponent) => {
-                let power = pool.as_number(*exponent)?.as_integer()?;
-                (*base, usize::try_from(power).ok()?)
-            }
-            _ => (factor, 1),
-        };
-        let index = state_index(pool, latent_dim, base)?;
-        indices.extend(std::iter::repeat_n(index, power));
-    }
+    let bases = pool.repeated_factors(expr, usize::MAX)?.into_iter();
+    let indices = bases.map(|base| state_index(pool, latent_dim, base));
+    let mut indices: Vec<usize> = indices.collect::<Option<_>>()?;
     indices.sort_unstable();
     Some(indices)
 }

@@ -118,6 +118,7 @@ fn is_transcendental(program: &Program) -> bool {
             | Statement::Select(_)
             | Statement::Accumulate { .. }
             | Statement::Scaled { .. }
+            | Statement::Lanes { .. }
             | Statement::Call { .. } => false,
         });
     own || program.callees().iter().any(is_transcendental)

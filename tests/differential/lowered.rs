@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use romc::equations::Equations;
 use romc::ir::{Binary, Interpreter, ProgramBuilder, Statement, Unary};
-use romc::lower::{CompiledModel, Form, Map, dynamics};
+use romc::lower::{CompiledModel, Form, Map, dynamics, dynamics_jacobian};
 use romc::model::{
     Activation, AffineMap, FeetRule, Layer, Library, Phase, ReducedModel, Scaling, StateMap,
 };
@@ -74,6 +74,20 @@ fn polynomials_take_fewer_products_than_their_terms_one_by_one() {
     let products = program.statements().iter().filter(is_product).count();
     // One by one: ten with coefficients, fifteen between variables.
     assert!(products + 4 <= 10 + 15, "{products}");
+}
+
+#[test]
+fn sums_of_vectors_equal_one_operation_after_the_other() {
+    let model = super::models::cubic();
+    let inputs = [0.9, 1.3, -0.2].map(|x: f64| (0..5).map(|k| x - 0.4 * f64::from(k)).collect());
+    let [found, expected] = [Form::Automatic, Form::StraightLine].map(|form| {
+        let (program, _) = dynamics_jacobian(&Equations::of(&model), 0, form).expect("lowers");
+        Interpreter::new(&program).results(&inputs).concat()
+    });
+    assert_eq!(found.len(), expected.len());
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a - b).abs() <= 1e-13 * b.abs().max(100.0), "{a} {b}");
+    }
 }
 
 /// The model of an encoder alone.

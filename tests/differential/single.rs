@@ -125,7 +125,8 @@ fn single_precision_of_shipped_models_equals_the_interpreter() {
 fn single_precision_of_random_models_equals_the_interpreter() {
     let random = (0..n_models_a_program() / 2).map(models::random);
     let nonlinear = (0..2).map(models::random_nonlinear);
-    let models: Vec<ReducedModel> = random.chain(nonlinear).collect();
+    let cubic = [models::cubic()];
+    let models: Vec<ReducedModel> = random.chain(nonlinear).chain(cubic).collect();
     check(&models, Form::Automatic, 50);
 }
 

@@ -4,7 +4,7 @@ use super::dialect::{Dialect, Index, Role, Span};
 use super::ident::Ident;
 use super::printer::Text;
 use super::translate::Translator;
-use crate::ir::{Binary, ValueId};
+use crate::ir::{Binary, LANES, ValueId, Vector, alternating};
 
 /// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
 struct MatrixStorage {
@@ -119,6 +119,49 @@ impl Translator<'_> {
         });
     }
 
+    /// A loop over the lanes, which compilers vectorise, or one lane after the other without its zeros.
+    pub(super) fn lanes(
+        &mut self,
+        first: usize,
+        start: Option<Vector>,
+        terms: &[(Vector, ValueId)],
+    ) {
+        let dialect = self.printer.dialect;
+        let zero = dialect.constant(0.0);
+        let weights = terms.iter().map(|&(_, weight)| self.named(weight));
+        let weights: Vec<Text> = weights.collect();
+        let sum = |numbers: Vec<Text>| {
+            let mut numbers = numbers.into_iter();
+            let first = start.and_then(|_| numbers.next());
+            let products = numbers.zip(&weights).map(|(number, weight)| {
+                let is_zero = number.text == zero.text;
+                (!is_zero).then(|| dialect.binary(Binary::Mul, &number, weight, true))
+            });
+            let add = |a: Text, b: Text| dialect.binary(Binary::Add, &a, &b, true);
+            alternating(first, products, add).unwrap_or_else(|| zero.clone())
+        };
+        let vectors = || start.iter().chain(terms.iter().map(|(vector, _)| vector));
+        if dialect.spelling.loops_over_lanes {
+            let i = self.locals.mint("i");
+            let number = |vector: &Vector| {
+                let span = self.span(vector);
+                dialect.element(&span.array, &Index::variable(&i).shifted(span.offset))
+            };
+            let sum = sum(vectors().map(number).collect());
+            let home = self.declared(LANES, "y");
+            let target = dialect.element(&home.array, &Index::variable(&i));
+            let printer = &mut self.printer;
+            printer.looped(&i, LANES, |body| body.assign(&target, &sum));
+            self.allocate(first, home);
+            return;
+        }
+        for lane in 0..LANES {
+            let numbers = vectors().map(|vector| self.read(vector[lane]));
+            let sum = sum(numbers.collect());
+            self.define(first + lane, sum);
+        }
+    }
+
     pub(super) fn call(&mut self, first: usize, callee: usize, arguments: &[ValueId]) {
         let program = &self.program.callees()[callee];
         let (mut read, mut written) = (Vec::new(), Vec::new());
@@ -156,7 +199,7 @@ impl Translator<'_> {
         if !values.iter().enumerate().all(follows) {
             return None;
         }
-        let whole = self.arrays.iter().find(|known| known.array == *array)?;
+        let whole = self.arrays.get(array)?;
         Some(Span {
             offset,
             len: values.len(),
@@ -172,15 +215,14 @@ impl Translator<'_> {
     }
 
     fn copied(&mut self, values: &[ValueId]) -> Span {
-        let known = self.copies.iter().find(|(copied, _)| copied == values);
-        if let Some((_, span)) = known {
+        if let Some(span) = self.copies.get(values) {
             return span.clone();
         }
         let array = self.locals.mint("a");
         let elements: Vec<Text> = values.iter().map(|&value| self.read(value)).collect();
         self.printer.let_array(&array, &elements);
         let span = Span::whole(&array, values.len(), false);
-        self.copies.push((values.to_vec(), span.clone()));
+        self.copies.insert(values.to_vec(), span.clone());
         span
     }
 
@@ -188,7 +230,7 @@ impl Translator<'_> {
         let array = self.locals.mint(wanted);
         self.printer.declare(&array, len);
         let span = Span::whole(&array, len, false);
-        self.arrays.push(span.clone());
+        self.arrays.insert(array, span.clone());
         span
     }
 

@@ -1,12 +1,12 @@
 //! Names in generated code, and the constant tables that are called by them.
 
-use std::collections::BTreeSet;
+use std::collections::HashMap;
 use std::fmt;
 
 use crate::ir::{FUNCTIONS, Table};
 
 /// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct Ident(String);
 
 impl Ident {
@@ -22,14 +22,14 @@ impl fmt::Display for Ident {
 }
 
 pub(crate) struct Namer {
-    used: BTreeSet<String>,
+    used: HashMap<String, usize>, // with the last number behind the name, or 1
 }
 
 impl Namer {
     /// A scope in which names of functions are taken, and the `reserved` words of the target, separated by blanks.
     pub(crate) fn new(reserved: &str) -> Self {
         let used = reserved.split_whitespace().chain(FUNCTIONS);
-        let used = used.map(str::to_owned).collect();
+        let used = used.map(|name| (name.to_owned(), 1)).collect();
         Self { used }
     }
 
@@ -43,11 +43,13 @@ impl Namer {
             base.insert(0, 'v');
         }
         let mut name = base.clone();
-        let mut number = 1;
-        while !self.used.insert(name.clone()) {
+        let mut number = self.used.get(&base).copied().unwrap_or(1);
+        while self.used.contains_key(&name) {
             number += 1;
             name = format!("{base}{number}");
         }
+        self.used.insert(base, number);
+        self.used.entry(name.clone()).or_insert(1);
         Ident(name)
     }
 }

@@ -1,5 +1,7 @@
 //! Programs to the text of a function's body: names and nested expressions; the tree of operations stays.
 
+use std::collections::HashMap;
+
 use super::dialect::{Dialect, Function, Index, Parameter, Role, Span};
 use super::ident::{Ident, Namer, Tables};
 use super::interface::{FunctionSpec, computes_angles};
@@ -22,8 +24,8 @@ pub(super) struct Translator<'a> {
     pub n_uses: Vec<usize>,
     pub spelled: Vec<Option<Text>>, // a name, an element, or an expression to be nested once
     pub printer: Printer<'a>,
-    pub arrays: Vec<Span>,
-    pub copies: Vec<(Vec<ValueId>, Span)>,
+    pub arrays: HashMap<Ident, Span>,
+    pub copies: HashMap<Vec<ValueId>, Span>,
     pub lane: Option<Ident>,
 }
 
@@ -101,6 +103,7 @@ fn vectorises(statement: &Statement) -> bool {
         Statement::Select(_)
         | Statement::Accumulate { .. }
         | Statement::Scaled { .. }
+        | Statement::Lanes { .. }
         | Statement::Call { .. } => false,
     }
 }
@@ -123,8 +126,9 @@ impl<'a> Translator<'a> {
             n_uses[value.index()] += 1;
         }
         let arrays = inputs.iter().chain(&outputs);
+        let whole = |p: &Parameter| (p.name.clone(), Span::whole(&p.name, p.len, true));
         Self {
-            arrays: arrays.map(|p| Span::whole(&p.name, p.len, true)).collect(),
+            arrays: arrays.map(whole).collect(),
             spelled: vec![None; program.n_values()],
             program,
             tables,
@@ -134,7 +138,7 @@ impl<'a> Translator<'a> {
             locals,
             n_uses,
             printer,
-            copies: Vec::new(),
+            copies: HashMap::new(),
             lane: None,
         }
     }
@@ -175,6 +179,7 @@ impl<'a> Translator<'a> {
             Statement::SinCos { arguments } => self.sin_cos(first, arguments),
             Statement::Accumulate { table, weights } => self.accumulate(first, *table, weights),
             Statement::Scaled { base, groups } => self.scaled(first, base.as_deref(), groups),
+            Statement::Lanes { start, terms } => self.lanes(first, *start, terms),
             Statement::Call { callee, arguments } => self.call(first, *callee, arguments),
         }
     }
@@ -192,8 +197,8 @@ impl<'a> Translator<'a> {
     }
 
     /// Nests an operation into its only use, or gives it a name.
-    fn define(&mut self, value: usize, text: Text) {
-        if self.n_uses[value] <= 1 && text.depth < DEEPEST {
+    pub(super) fn define(&mut self, value: usize, text: Text) {
+        if text.depth == 0 || self.n_uses[value] <= 1 && text.depth < DEEPEST {
             self.spell(value, text);
         } else {
             self.name(value, &text);

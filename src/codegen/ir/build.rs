@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::operation::{Binary, Unary};
-use super::program::{Program, ResultEntry, Slot, Statement, Table, ValueId};
+use super::program::{LANES, Program, ResultEntry, Slot, Statement, Table, ValueId, Vector};
 
 /// A number of a program that is not finite.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -128,6 +128,17 @@ impl ProgramBuilder {
         });
         let groups = groups.collect();
         self.push_array(Statement::Scaled { base, groups }, n_values)
+    }
+
+    /// Sums side by side, see [`Statement::Lanes`].
+    pub(crate) fn lanes(&mut self, start: Option<Vector>, terms: Vec<(Vector, ValueId)>) -> Vector {
+        match start.filter(|_| terms.is_empty()) {
+            Some(start) => start,
+            None => {
+                let first = self.push(Statement::Lanes { start, terms }, LANES);
+                std::array::from_fn(|lane| ValueId(first.0 + lane as u32))
+            }
+        }
     }
 
     /// Evaluates another program; returns the values of each of its outputs.

@@ -13,8 +13,8 @@
 
 pub use double::{LIMIT, reduced_sin_cos, sin_cos};
 
-use super::operation::{Binary, Real, Unary};
-use super::program::{Program, Slot, Statement, Table, ValueId};
+use super::operation::{Binary, Real, Unary, alternating};
+use super::program::{LANES, Program, Slot, Statement, Table, ValueId, Vector};
 
 /// Runs one program as often as asked; owns the memory of all its values, so that a run allocates nothing. Numbers are
 /// `f64` unless another `Real` is named: `Interpreter::<f32>` is the reference for code in single precision.
@@ -172,6 +172,15 @@ fn array<T: Real>(
                     sum = Some(sum.map_or(term, |sum| sum + term));
                 }
                 values[first + k] = sum.expect("at least one group");
+            }
+        }
+        Statement::Lanes { start, terms } => {
+            for lane in 0..LANES {
+                let number = |vector: &Vector| values[vector[lane].index()];
+                let products = terms.iter();
+                let products = products.map(|(v, weight)| Some(number(v) * values[weight.index()]));
+                let sum = alternating(start.as_ref().map(number), products, |a, b| a + b);
+                values[first + lane] = sum.expect("at least one term");
             }
         }
         Statement::Call { callee, arguments } => {

@@ -24,7 +24,7 @@ mod program;
 
 pub use build::{IrError, ProgramBuilder};
 pub use interpret::Interpreter;
-pub(crate) use operation::FUNCTIONS;
 pub use operation::{Binary, Unary};
-pub(crate) use program::Table;
-pub use program::{Program, Slot, Statement, ValueId};
+pub(crate) use operation::{FUNCTIONS, alternating};
+pub(crate) use program::{LANES, Table};
+pub use program::{Program, Slot, Statement, ValueId, Vector};

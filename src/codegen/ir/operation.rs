@@ -65,6 +65,21 @@ pub enum Binary {
     Pow,
 }
 
+/// Adds the first, third and so on of the terms to `start`, the others to one another, and both sums; what is missing is
+/// left out.
+pub(crate) fn alternating<S>(
+    start: Option<S>,
+    terms: impl Iterator<Item = Option<S>>,
+    add: impl Fn(S, S) -> S,
+) -> Option<S> {
+    let add = |a: Option<S>, b: Option<S>| match (a, b) {
+        (Some(a), Some(b)) => Some(add(a, b)),
+        (a, b) => a.or(b),
+    };
+    let (even, odd) = terms.fold((start, None), |(next, last), term| (last, add(next, term)));
+    add(even, odd)
+}
+
 /// `f64` or `f32`; each operator rounds once, as generated code does with contraction off.
 pub trait Real:
     Copy

@@ -23,6 +23,12 @@ impl ValueId {
     }
 }
 
+/// Sums of one statement side by side.
+pub(crate) const LANES: usize = 2;
+
+/// A number per lane.
+pub type Vector = [ValueId; LANES];
+
 /// A constant matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table<T = f64> {
@@ -98,6 +104,14 @@ pub enum Statement {
         /// Positions of at least one table, all of one shape, each with a weight per column or added as it is.
         groups: Vec<(usize, Option<Vec<ValueId>>)>,
     },
+    /// A sum per lane, `y_l = v_0l + sum_t v_tl w_t`, added [alternately](super::alternating). Terms whose numbers are
+    /// the constant zero may be left out.
+    Lanes {
+        /// What the sums begin with.
+        start: Option<Vector>,
+        /// At least one vector with its weight.
+        terms: Vec<(Vector, ValueId)>,
+    },
     /// Evaluation of another program: arguments fill its input slots, values are those of its output slots, in order.
     Call {
         /// Position in [`Program::callees`].
@@ -116,6 +130,11 @@ impl Statement {
             Self::Select(operands) => operands.to_vec(),
             Self::SinCos { arguments } | Self::Call { arguments, .. } => arguments.clone(),
             Self::Accumulate { weights, .. } => weights.clone(),
+            Self::Lanes { start, terms } => {
+                let weights = terms.iter().map(|(_, weight)| weight);
+                let vectors = terms.iter().map(|(vector, _)| vector).chain(start);
+                vectors.flatten().chain(weights).copied().collect()
+            }
             Self::Scaled { base, groups } => {
                 let weights = groups.iter().filter_map(|(_, weights)| weights.as_ref());
                 base.iter().chain(weights).flatten().copied().collect()

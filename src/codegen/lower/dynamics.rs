@@ -5,6 +5,7 @@ use super::dense::{DenseJacobian, Form, distinct, matrix_vector};
 use super::expression::ExpressionLowering;
 use super::nested::{Demand, Nested};
 use super::number::{Number, Sheet, ids, numbers};
+use super::polynomial::Polynomials;
 use crate::equations::{Equations, PhaseEquations};
 use crate::ir::{IrError, Program, ProgramBuilder, ValueId};
 use crate::model::{LatentVariable, ModelError};
@@ -99,25 +100,32 @@ fn with_derivatives(
             }
         }
     }
-    let (mut builder, ddz, jacobian) = if form.uses_tables(&equations) {
+    let (mut builder, mut ddz) = if form.uses_tables(&equations) {
         let dense = DenseJacobian::new(&mut pool, &equations, columns);
         let mut lowering = start(system, &pool, name);
         let mut roots = distinct(&equations);
         roots.extend(dense.expressions());
         lowering.prepare(&roots);
-        let ddz = matrix_vector(&mut lowering, &equations);
+        let mut values = matrix_vector(&mut lowering, &equations);
         let entries = dense.lower(&mut lowering, &equations);
         let places = pattern.places();
-        let jacobian = places.map(|(row, col)| entries[&(row, columns[col])]);
-        let jacobian = jacobian.collect();
-        (lowering.builder, ddz, jacobian)
+        values.extend(places.map(|(row, col)| entries[&(row, columns[col])]));
+        (lowering.builder, values)
+    } else if let (Form::Automatic, Some(polynomials)) =
+        (form, Polynomials::new(&mut pool, &equations, columns))
+    {
+        let mut lowering = start(system, &pool, name);
+        let rows = polynomials.lower(&mut lowering);
+        let places = pattern.places().map(|(row, col)| rows[row][1 + col]);
+        let values = rows.iter().map(|row| row[0]).take(equations.len());
+        (lowering.builder, values.chain(places).collect())
     } else {
         let sums = nested(&mut pool, &equations, columns, entries, &pattern);
         let mut lowering = start(system, &pool, name);
-        let mut ddz = values(&mut lowering, &sums);
-        let jacobian = ddz.split_off(equations.len());
-        (lowering.builder, ddz, jacobian)
+        let values = values(&mut lowering, &sums);
+        (lowering.builder, values)
     };
+    let jacobian = ddz.split_off(equations.len());
     builder.output("ddz", &ddz);
     if !jacobian.is_empty() {
         builder.output("jacobian", &jacobian);

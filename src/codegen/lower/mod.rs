@@ -12,6 +12,7 @@ mod expression;
 mod maps;
 mod nested;
 mod number;
+mod polynomial;
 mod wrench;
 
 pub use compiled::CompiledModel;

@@ -100,22 +100,10 @@ impl Layout<'_> {
     }
 
     fn monomial(&self, expr: ExprId) -> Option<Vec<LatentVariable>> {
-        let mut variables = Vec::new();
-        for &factor in self.pool.factors_of(expr) {
-            let (base, times) = match self.pool.node(factor) {
-                Node::Number(_) => continue,
-                Node::Power(base, exponent) => {
-                    let power = self.pool.as_integer(*exponent)?;
-                    (
-                        *base,
-                        usize::try_from(power).ok().filter(|power| *power <= 64)?,
-                    )
-                }
-                _other => (factor, 1),
-            };
-            let variable = self.variable(self.pool.as_symbol(base)?)?;
-            variables.extend(std::iter::repeat_n(variable, times));
-        }
+        let bases = self.pool.repeated_factors(expr, 64)?.into_iter();
+        let bases = bases.filter(|&base| self.pool.as_number(base).is_none());
+        let variables = bases.map(|base| self.variable(self.pool.as_symbol(base)?));
+        let mut variables: Vec<LatentVariable> = variables.collect::<Option<_>>()?;
         variables.sort();
         Some(variables)
     }
