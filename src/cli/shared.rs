@@ -19,7 +19,7 @@ use crate::report::{Figure, figure_files};
 use crate::robot::Robot;
 use crate::train::sha256;
 
-pub use crate::files::{
+pub(crate) use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
 

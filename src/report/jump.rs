@@ -87,7 +87,7 @@ impl<'a> Jump<'a> {
     }
 
     /// As a strip and as an animation; none without a robot.
-    pub fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
+    pub(crate) fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
         let robot = self.model.robot().ok()?;
         let segment = self.run.segment;
         let predicted = Motion {

@@ -34,7 +34,7 @@ pub use joints::{
     BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
     JOINT_NAMES, Leg, STATE_DIM,
 };
-pub use leg::{LegShape, SINGULAR_BOUND};
+pub use leg::LegShape;
 pub use wrench::FeetRule;
 
 #[cfg(feature = "serde")]

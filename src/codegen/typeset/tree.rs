@@ -56,13 +56,13 @@ impl Signed {
 /// A variable: a glyph, up to two dots above it for time derivatives, and a subscript, its parts joined by commas.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Symbol {
-    pub glyph: Glyph,
+    pub(crate) glyph: Glyph,
     pub dots: u8,
-    pub subscript: Vec<Glyph>,
+    pub(crate) subscript: Vec<Glyph>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Glyph {
+pub(crate) enum Glyph {
     /// One Latin letter, italic.
     Letter(char),
     /// A Greek letter, by its place in `GREEK`.

@@ -257,7 +257,7 @@ fn delayed(time_s: &[f64], rows: &DMatrix<f64>, delay_s: f64) -> DMatrix<f64> {
 pub(crate) type Directions = [Vector3<f64>; 5];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LegFrame {
+pub(crate) struct LegFrame {
     pub abduction: Vector3<f64>,
     pub flexion: Vector3<f64>,
     pub directions: Directions,
@@ -267,7 +267,7 @@ pub struct LegFrame {
 pub struct Motion {
     pub attitude: Vec<Matrix3<f64>>, // rotation from trunk to world at each sample
     pub trunk_rate: Vec<Vector3<f64>>, // angular velocity of the trunk in the world, rad/s
-    pub legs: Vec<[LegFrame; 4]>,
+    pub(crate) legs: Vec<[LegFrame; 4]>,
     pub coordinates: DMatrix<f64>, // accelerations of the recorded coordinates, 18 x n, per s^2
     directions: DMatrix<f64>, // of trunk axes (9 rows), then of each leg's five directions, 69 x n
 }

@@ -91,7 +91,7 @@ templates! {
 }
 
 /// The crate of a model's controller; `provenance` is the first line of its files, `plan` the jump of its C example.
-pub fn emit(
+pub(crate) fn emit(
     equations: &Equations<'_>,
     form: Form,
     provenance: &str,

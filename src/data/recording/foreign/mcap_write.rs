@@ -42,7 +42,7 @@ const FEET_TOPIC: &str = "/foot_contacts"; // contact, 1 or 0 for each foot
 const INPUT_TOPIC: &str = "/inputs"; // inputs of a model
 
 /// Writes a segment and, if given, its inputs (18 x samples) as messages; chunks are not packed.
-pub fn write_mcap(
+pub(crate) fn write_mcap(
     destination: impl Write + Seek,
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,

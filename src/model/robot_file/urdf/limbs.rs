@@ -27,7 +27,10 @@ type Chain = (Vec<usize>, bool); // moving joints below a body while they are a 
 
 impl Legs {
     /// Finds legs, or takes those that end at these feet.
-    pub fn find(tree: &Tree<'_>, feet: &[(String, Vector3<f64>)]) -> Result<Self, RobotFileError> {
+    pub(crate) fn find(
+        tree: &Tree<'_>,
+        feet: &[(String, Vector3<f64>)],
+    ) -> Result<Self, RobotFileError> {
         let top = top(tree);
         let body = tree.body(top);
         let legs = match feet {
