@@ -85,12 +85,12 @@ pub struct StageRows {
     /// Torque rows of which the rate is limited, and by how much per stage; empty if it is not.
     pub rate: Vec<Row>,
     /// Friction of the body force, if it is constrained.
-    pub friction: Option<BodyFriction>,
+    pub(crate) friction: Option<BodyFriction>,
 }
 
 /// Rows of the body force that a latent input is lifted to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BodyFriction {
+pub(crate) struct BodyFriction {
     /// Friction coefficient.
     pub coefficient: f64,
     /// Force over the robot's weight along x, y and z of the model's frame, `3 × latent_dim` row-major.

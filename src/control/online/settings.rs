@@ -367,7 +367,7 @@ settings! {
 
 impl MpcSettings {
     /// Checks every number.
-    pub fn check(&self) -> Result<(), ControlError> {
+    pub(crate) fn check(&self) -> Result<(), ControlError> {
         self.check_table()?;
         let (qp, fallback) = (&self.qp, &self.fallback);
         for (name, found) in [
