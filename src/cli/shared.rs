@@ -12,7 +12,8 @@ use serde_json::Value;
 
 use super::*;
 use crate::Error;
-use crate::files::{Emitted, Overwrite, is_invisible, read_toml, write_files_since, write_whole};
+use crate::files::size::read_toml;
+use crate::files::{Emitted, Overwrite, is_invisible, write_files_since, write_whole};
 use crate::model::ReducedModel;
 use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
 use crate::report::{Figure, figure_files};

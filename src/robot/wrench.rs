@@ -36,7 +36,7 @@ impl Robot {
         self.require_finite(leg, "joint angle", q)?;
         let geometry = self.geometry(leg);
         let singular = || RobotError::SingularLeg {
-            robot: self.name().to_owned(),
+            robot: self.name.to_owned(),
             leg,
             joints_rad: *q,
             determinant: geometry.manipulability(q),
@@ -128,7 +128,7 @@ impl Robot {
         match values.iter().find(|value| !value.is_finite()) {
             None => Ok(()),
             Some(found) => Err(RobotError::NotFinite {
-                robot: self.name().to_owned(),
+                robot: self.name.to_owned(),
                 leg,
                 quantity,
                 found: *found,

@@ -1,12 +1,12 @@
 //! Lowered programs: steps, activations, nested sums, singular maps.
 
-use nalgebra::{DMatrix, DVector};
-use romc::equations::Equations;
-use romc::ir::{Binary, Interpreter, ProgramBuilder, Statement, Unary};
-use romc::lower::{CompiledModel, Form, Map, dynamics};
-use romc::model::{
+use crate::equations::Equations;
+use crate::ir::{Binary, Interpreter, ProgramBuilder, Statement, Unary};
+use crate::lower::{CompiledModel, Form, Map, dynamics};
+use crate::model::{
     Activation, AffineMap, FeetRule, Layer, Library, Phase, ReducedModel, Scaling, StateMap,
 };
+use nalgebra::{DMatrix, DVector};
 
 fn model(d: usize, terms: &[&str], phases: &[(&str, FeetRule, &[f64])]) -> ReducedModel {
     let texts: Vec<String> = terms.iter().map(|&term| term.to_owned()).collect();

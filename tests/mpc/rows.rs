@@ -1,7 +1,7 @@
 //! Which rows can be active at all.
 
-use romc::mpc::needed_rows;
 use romc::mpc::problem::Row;
+use romc::mpc::problem::needed_rows;
 
 fn row(joint: usize, row: &[f64], bound: f64) -> Row {
     Row {

@@ -51,7 +51,7 @@ impl JacobianPattern {
     }
 
     /// Whether the accelerations are constant.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 }

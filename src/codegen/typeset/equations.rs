@@ -121,7 +121,7 @@ impl Equation {
     }
 
     /// The right side as one piece: a lone zero when there are no terms.
-    pub fn right(&self) -> Math {
+    pub(crate) fn right(&self) -> Math {
         match self.terms.is_empty() {
             true => Math::Number(Decimal::integer(0)),
             false => Math::Sum(self.terms.clone()),

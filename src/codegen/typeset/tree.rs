@@ -44,7 +44,7 @@ impl Signed {
     }
 
     /// The same as one [`Math`]: a negative one becomes a sum of one term.
-    pub fn into_math(self) -> Math {
+    pub(crate) fn into_math(self) -> Math {
         if self.negative {
             Math::Sum(vec![self])
         } else {
@@ -114,7 +114,7 @@ impl Math {
         }
     }
 
-    pub fn starts_with_digit(&self) -> bool {
+    pub(crate) fn starts_with_digit(&self) -> bool {
         match self {
             Math::Number(_) => true,
             Math::Product(factors) => factors.first().is_some_and(Math::starts_with_digit),

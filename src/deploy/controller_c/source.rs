@@ -11,10 +11,11 @@ use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
 use crate::mpc::problem::{Row, StageRows, pairs};
-use crate::mpc::shared::{NO_PHASE, RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE, torque_deviation};
+use crate::mpc::structured::{RATE_SOFTNESS, RATE_TOLERANCE, TOLERANCE};
 use crate::mpc::{
     ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings,
 };
+use crate::mpc::{NO_PHASE, torque_deviation};
 use crate::robot::{DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, WrenchFrame};
 
 #[derive(Template)]

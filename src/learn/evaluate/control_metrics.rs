@@ -4,8 +4,8 @@ use super::along_recording::{control_samples, set_reference};
 use super::prediction::{prediction_error, recorded_stages, uninformed};
 use super::verdict::failure;
 use super::*;
-use crate::mpc::{MAX_STRUCTURED_DIM, MpcSettings, Solver, Status};
-use crate::robot::input_rule::rotation;
+use crate::mpc::{MpcSettings, Solver, Status, structured::MAX_STRUCTURED_DIM};
+use crate::robot::rotation;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct StepTimes {

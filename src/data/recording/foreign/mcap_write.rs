@@ -8,7 +8,7 @@ use mcap::{WriteOptions, Writer};
 use nalgebra::{DMatrix, UnitQuaternion, Vector3};
 
 use crate::recording::segment::Segment;
-use crate::robot::input_rule::rotation;
+use crate::robot::rotation;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, Robot};
 
 const JOINT_STATE: &str = "std_msgs/Header header\n

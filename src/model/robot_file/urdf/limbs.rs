@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::tree::{Body, Tree};
 use crate::files::shell_word;
 use crate::robot::FOOT_DIM;
-use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::LEG_JOINT_DIM;
 use crate::robot_file::RobotFileError;
 
 const SAME_PLACE_M: f64 = 1e-12; // largest distance of two feet that are one
