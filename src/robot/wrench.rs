@@ -19,7 +19,7 @@ impl Robot {
     /// abduction, flexion, knee.
     ///
     /// # Errors
-    /// [`RobotError::SingularLeg`] at full extension (see [`SINGULAR_BOUND`]), [`RobotError::NotFinite`].
+    /// [`RobotError::SingularLeg`] at full extension (see `SINGULAR_BOUND`), [`RobotError::NotFinite`].
     pub fn foot_force(
         &self,
         leg: Leg,

@@ -21,7 +21,7 @@ fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
     let mut forms = CanonicalForms::new(&pool, &[left, right]);
     let difference = forms.of(left).minus(&forms.of(right));
     let cleared = forms.without_fractions(&difference).expect("small enough");
-    (cleared, forms.rounding())
+    (cleared, forms.rounding)
 }
 
 #[test]

@@ -170,7 +170,7 @@ impl PointwiseSums {
         let factors = model.state_factors()?;
         let mut accelerations =
             vec![vec![FitSums::default(); model.latent_dim()]; self.acceleration.len()];
-        for sample in 0..latent.len() {
+        for sample in 0..latent.time_s.len() {
             let column = |matrix: &nalgebra::DMatrix<f64>| matrix.column(sample).into_owned();
             let (x, z) = (column(&segment.x), column(&latent.z));
             let scaled = x.component_mul(&factors);

@@ -247,14 +247,6 @@ impl LatentSegment {
         })
     }
 
-    pub fn len(&self) -> usize {
-        self.time_s.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.time_s.is_empty()
-    }
-
     /// Latent input at a time between samples, interpolated linearly; held outside the record.
     pub(crate) fn input_at(&self, time_s: f64, u_lat: &mut [f64]) {
         let (left, right, share) = between(&self.time_s, time_s);
