@@ -19,7 +19,7 @@ impl Robot {
     /// abduction, flexion, knee.
     ///
     /// # Errors
-    /// [`RobotError::SingularLeg`] at full extension (see [`SINGULAR_BOUND`]), [`RobotError::NotFinite`].
+    /// [`RobotError::SingularLeg`] at full extension (see `SINGULAR_BOUND`), [`RobotError::NotFinite`].
     pub fn foot_force(
         &self,
         leg: Leg,
@@ -36,7 +36,7 @@ impl Robot {
         self.require_finite(leg, "joint angle", q)?;
         let geometry = self.geometry(leg);
         let singular = || RobotError::SingularLeg {
-            robot: self.name().to_owned(),
+            robot: self.name.to_owned(),
             leg,
             joints_rad: *q,
             determinant: geometry.manipulability(q),
@@ -133,7 +133,7 @@ impl Robot {
         match values.iter().find(|value| !value.is_finite()) {
             None => Ok(()),
             Some(found) => Err(RobotError::NotFinite {
-                robot: self.name().to_owned(),
+                robot: self.name.to_owned(),
                 leg,
                 quantity,
                 found: *found,
