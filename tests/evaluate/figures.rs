@@ -15,7 +15,7 @@ use crate::sim::{LatentSegment, Restart};
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 
 fn jump(name: &str) -> Recording {
-    let path = format!("../../examples/recordings/{name}.csv.gz");
+    let path = format!("examples/recordings/{name}.csv.gz");
     recording::read(Path::new(&path)).expect("a shipped recording")
 }
 
@@ -157,7 +157,7 @@ fn combined_loss_follows_equation_29() {
 fn more_latent_coordinates_lose_less_of_the_torques() {
     let jumps = [jump("go1/test_01")];
     let [two, six] = ["go1-d2", "go1-d6"].map(|name| {
-        let path = format!("../../models/{name}.json");
+        let path = format!("models/{name}.json");
         let model = romc_model::artifact::read(Path::new(&path)).expect("a model");
         let assessment = Assessment::over(&model, &jumps, 0.1).expect("of its robot");
         assessment.lift

@@ -89,7 +89,7 @@ fn value_of(math: &Math, values: &Values) -> f64 {
 }
 
 fn models() -> Vec<ReducedModel> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = Vec::new();
     for folder in ["models", "tests/fixtures/models"] {
         for entry in fs::read_dir(root.join(folder)).unwrap() {
