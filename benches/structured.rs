@@ -18,7 +18,7 @@
 
 use std::io::Write as _;
 
-use romc::mpc::problem::{Kind, Row, needed_rows};
+use romc::mpc::problem::{Row, RowKind, needed_rows};
 use romc::mpc::structured::{has_avx2, prepare, solve};
 use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, sparse};
 use romc::solver::{Cost, Links, Outcome, Program, RowMatrices, Settings, Shape, Stage};
@@ -145,7 +145,7 @@ fn read_loop<const NU: usize>(reader: &mut Reader, horizon: usize) -> Loop<NU> {
 /// The rows without those that the others imply; opposite rows come first, in pairs.
 fn needed<const NU: usize>(rows: Vec<([f64; NU], f64)>) -> Vec<([f64; NU], f64)> {
     let numbered = rows.iter().enumerate().map(|(joint, (row, bound))| Row {
-        kind: Kind::JointRange,
+        kind: RowKind::JointLimit,
         joint,
         row: row.to_vec(),
         bound: *bound,

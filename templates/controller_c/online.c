@@ -87,10 +87,6 @@ typedef struct {
     real share;
 } online_instant;
 
-/* A kind of rows. What its rows are, where they stand in a stage and what the settings make of them is stated here alone,
- * for both solvers and for the controller in C. */
-typedef enum { ONLINE_MOTOR_TORQUE, ONLINE_TORQUE_RATE, ONLINE_JOINT_RANGE, ONLINE_BODY_FRICTION } online_kind;
-
 /* A leg in the frame of its plane at the zero posture. */
 typedef struct {
     /* Shares of forward, normal and up, in the body's axes, that stay as the first joint turns. */
@@ -131,6 +127,9 @@ typedef struct {
     /* From the third joint to the foot. */
     real calf[2];
 } online_posture;
+
+/* A kind of rows; rows, place in a stage and size are stated here alone, for both solvers and the controller in C. */
+typedef enum { ONLINE_TORQUE_LIMIT, ONLINE_TORQUE_RATE, ONLINE_JOINT_LIMIT, ONLINE_BODY_FRICTION } online_row_kind;
 
 /* Nodes of the classical Runge-Kutta method: the internal state is x + node . h . previous slope. */
 static const real ONLINE_NODES[4] = {(real)0.0, (real)0.5, (real)0.5, (real)1.0};
@@ -530,30 +529,34 @@ static inline MAYBE_UNUSED real online_planned_loss(const real *of, real before,
     return online_clamped_torque(online_joint_loss(of, dq, ddq), limit);
 }
 
-/* What the settings make of a kind, zero if stages have no such rows: the limit that rows for a limit of one are divided
- * by, the friction coefficient of cones. */
-static inline MAYBE_UNUSED real online_row_size(online_kind kind, const online_settings *settings)
+/* Returns the limit by which unit rows are divided; for cones the friction coefficient; 0 if the settings do not ask for
+ * the kind. */
+static inline MAYBE_UNUSED real online_row_size(online_row_kind kind, const online_settings *settings)
 {
     /* The consistent lift keeps the torque limits by itself. */
-    if (kind == ONLINE_MOTOR_TORQUE && settings->lift == (int)ONLINE_CONSISTENT) {
-        return 0;
+    if (kind == ONLINE_TORQUE_LIMIT && settings->lift != (int)ONLINE_CONSISTENT) {
+        return 1;
     }
     if (kind == ONLINE_TORQUE_RATE) {
         return settings->torque_rate_nm_s * (real)settings->step_s;
     }
+    if (kind == ONLINE_JOINT_LIMIT) {
+        return 1;
+    }
     if (kind == ONLINE_BODY_FRICTION) {
         return settings->body_friction;
     }
-    return 1;
+    return 0;
 }
 
-/* Writes sigma^-1 A sigma and sigma^-1 B C_p of derivatives (A B), 2d x 3d; all row-major but C_p, lower triangular,
- * column by column. */
-static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *root, const real *deviation, int d,
-        real *restrict a, real *restrict b)
+/* Writes sigma^-1 A sigma, sigma^-1 B C_p and sigma^-1 defect of derivatives (A B), 2d x 3d; all row-major but C_p, lower
+ * triangular, column by column. */
+static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *defect, const real *root,
+        const real *deviation, int d, real *restrict a, real *restrict b, real *restrict c)
 {
     for (int i = 0; i < 2 * d; ++i) {
         const real factor = 1 / deviation[i];
+        c[i] = factor * defect[i];
         const real *row = by + 3 * i * d;
         for (int j = 0; j < d; ++j) {
             real sum = 0;

@@ -1,10 +1,13 @@
 //! Which rows can be active at all.
 
-use romc::mpc::problem::{Kind, Row, needed_rows};
+use romc::mpc::problem::{Row, RowKind, has_links_or_cones, needed_rows};
+use romc::mpc::{Lift, MpcSettings, RowSelection};
+
+use crate::synthetic::{Equations, model};
 
 fn row(joint: usize, row: &[f64], bound: f64) -> Row {
     Row {
-        kind: Kind::JointRange,
+        kind: RowKind::JointLimit,
         joint,
         row: row.to_vec(),
         bound,
@@ -66,6 +69,75 @@ fn dropped_rows_stay_within_the_margin_of_those_that_stay() {
         for row in &rows {
             let value = row.row[0] * corner[0] + row.row[1] * corner[1];
             assert!(value <= 1.0 + 0.02 + 1e-5, "{value}");
+        }
+    }
+}
+
+fn rows_of_stage(settings: MpcSettings) -> Vec<Row> {
+    let model = model(Equations::Linear);
+    let controller = romc::mpc::controller(&model, settings).expect("the model is complete");
+    let rows = controller.stage_rows().clone();
+    [rows.input, rows.link, rows.soft, rows.cones].concat()
+}
+
+fn with_all_kinds() -> MpcSettings {
+    MpcSettings {
+        rows: RowSelection::All,
+        torque_rate_nm_s: Some(100.0),
+        body_friction: Some(0.5),
+        ..MpcSettings::default()
+    }
+}
+
+#[test]
+fn every_kind_has_rows_if_the_settings_ask_for_all() {
+    let rows = rows_of_stage(with_all_kinds());
+    for kind in RowKind::ALL {
+        assert!(rows.iter().any(|row| row.kind == kind), "{kind:?}");
+    }
+    assert!(has_links_or_cones(&with_all_kinds()));
+}
+
+#[test]
+fn kinds_that_the_settings_do_not_ask_for_have_no_rows() {
+    let settings = MpcSettings {
+        lift: Lift::Consistent,
+        ..MpcSettings::default()
+    };
+    let rows = rows_of_stage(settings);
+    assert!(rows.iter().all(|row| row.kind == RowKind::JointLimit));
+    assert!(!has_links_or_cones(&settings));
+    for settings in [
+        MpcSettings {
+            torque_rate_nm_s: Some(100.0),
+            ..settings
+        },
+        MpcSettings {
+            body_friction: Some(0.5),
+            ..settings
+        },
+    ] {
+        assert!(has_links_or_cones(&settings), "{settings:?}");
+    }
+}
+
+#[test]
+fn rows_of_a_rate_are_divided_by_it_and_cones_have_their_coefficient_as_bound() {
+    let settings = with_all_kinds();
+    let twice = MpcSettings {
+        torque_rate_nm_s: Some(200.0),
+        body_friction: Some(1.0),
+        ..settings
+    };
+    for (row, other) in rows_of_stage(settings).iter().zip(rows_of_stage(twice)) {
+        let factor = match row.kind {
+            RowKind::TorqueRate => 0.5,
+            RowKind::TorqueLimit | RowKind::JointLimit | RowKind::BodyFriction => 1.0,
+        };
+        let entries: Vec<f64> = row.row.iter().map(|entry| factor * entry).collect();
+        assert_eq!(other.row, entries, "{row:?}");
+        if row.kind == RowKind::BodyFriction {
+            assert_eq!((row.bound, other.bound), (0.5, 1.0));
         }
     }
 }

@@ -95,12 +95,11 @@ impl Layout {
     }
 
     fn slacks(&self) -> usize {
-        usize::from(self.shape.soft_rows > 0)
+        usize::from(self.shape.rows.soft > 0)
     }
 
     fn inequalities(&self) -> usize {
-        let shape = &self.shape;
-        shape.input_rows + shape.link_rows + shape.soft_rows + self.slacks()
+        self.shape.rows.rows()
     }
 
     fn input_row(&self, stage: usize) -> usize {
@@ -126,7 +125,7 @@ impl Layout {
             for i in 0..nx {
                 block(dynamics + i, state + i, 1, -1.0, &[1.0]);
             }
-            let link = self.input_row(k) + self.shape.input_rows;
+            let link = self.input_row(k) + self.shape.rows.input;
             if k > 0 {
                 let before = input - self.width();
                 block(dynamics, before + nu, nx, 1.0, &stage.a);
@@ -134,10 +133,10 @@ impl Layout {
             }
             block(self.input_row(k), input, nu, 1.0, &stage.input.entries);
             block(link, input, nu, 1.0, &stage.link.entries);
-            let soft = link + self.shape.link_rows;
+            let soft = link + self.shape.rows.link;
             block(soft, state, nu, 1.0, &stage.soft.entries);
             if self.slacks() > 0 {
-                for row in soft..=soft + self.shape.soft_rows {
+                for row in soft..=soft + self.shape.rows.soft {
                     block(row, slack, 1, -1.0, &[1.0]);
                 }
             }
@@ -165,7 +164,7 @@ impl Layout {
                 next += 1;
             };
             stage.input.bounds.iter().copied().for_each(&mut push);
-            for row in 0..self.shape.link_rows {
+            for row in 0..self.shape.rows.link {
                 push(stage.link.bounds[row] - stage.link_at_reference[row] + before[row]);
             }
             stage.soft.bounds.iter().copied().for_each(&mut push);

@@ -166,10 +166,9 @@ impl Controller {
             reference.input = Some(found);
         }
         let d = self.plant.latent_dim();
-        let deviation = reference.deviation();
+        let (deviation, weight) = (reference.deviation(), self.settings.velocity_weight);
         let mut state_weights = vec![1.0; 2 * d];
-        let of_velocities = self.settings.velocity_weight;
-        write_weights(deviation, of_velocities, d, &mut state_weights);
+        write_weights(deviation, weight, d, &mut state_weights);
         let rows = match row_selection(&self.plant, &self.settings) {
             RowSelection::All => self.rows.clone(),
             RowSelection::Needed => self.rows.clone().near(&reference),

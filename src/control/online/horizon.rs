@@ -75,7 +75,7 @@ impl Horizon {
             is_new: vec![true; length],
             start: Start {
                 state: vec![0.0; shape.states],
-                link_before: vec![0.0; shape.link_rows],
+                link_before: vec![0.0; shape.rows.link],
             },
             force: vec![0.0; 3 * latent_dim],
             lineariser: Lineariser::new(latent_dim),
@@ -180,22 +180,15 @@ impl Horizon {
         program.write_rows(rows, &losses_nm, &stage.end, &scale);
         let (cones, _) = rows.cones.as_chunks::<CONE_ROWS>();
         for (number, [x, y, z]) in cones.iter().enumerate() {
-            self.force.fill(0.0);
+            let force = &mut self.force;
+            force.fill(0.0);
             if phase.is_grounded {
                 let attitude = inputs.reference.attitude_at(start_s + 0.5 * step_s);
                 let rotation = to_upright(plant.input_rule().wrench_frame(), attitude);
                 let (rotation, d) = (rotation.as_flattened(), stage.input.len());
-                turn_force(
-                    rotation,
-                    &x.row,
-                    &y.row,
-                    &z.row,
-                    x.bound,
-                    d,
-                    &mut self.force,
-                );
+                turn_force(rotation, &x.row, &y.row, &z.row, x.bound, d, force);
             }
-            program.write_cone((number, cones.len()), &self.force, &scale);
+            program.write_cone((number, cones.len()), force, &scale);
         }
     }
 
@@ -216,18 +209,12 @@ impl Horizon {
             Linearisation::Reference => None,
             Linearisation::LastPlan => inputs.plan.at(start_s),
         };
-        let Stage {
-            model,
-            defect,
-            state,
-            end,
-            input,
-            phase,
-            ..
-        } = &mut self.stages[index];
+        let of = &mut self.stages[index];
+        let (model, defect, phase) = (&mut of.model, &mut of.defect, of.phase);
+        let (state, input, end) = (&of.state, &of.input, &of.end);
         let (x, u) = point.unwrap_or((state, input));
         let mut stage = |x: &[f64], u: &[f64], model: &mut StageModel| {
-            (self.lineariser).stage((dynamics, *phase), x, u, step_s, model);
+            (self.lineariser).stage((dynamics, phase), x, u, step_s, model);
         };
         stage(x, u, model);
         let (next, by, d) = (&model.next, &model.by, input.len());

@@ -36,7 +36,7 @@ use super::qp::QpSettings;
 use super::settings::{MpcSettings, Solver};
 use super::stage::{CONE_ROWS, PYRAMID_ROWS, SQRT_HALF, StageCost, StageQp, StageShape};
 use crate::robot::{ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM, WrenchFrame};
-use crate::solver::Outcome;
+use crate::solver::{Outcome, Shape};
 
 const LIFT_ITERATIONS: u32 = 60;
 /// Curvature of the cost as the solvers have it: `CURVATURE / 2 ‖v‖²`. Inputs a few deviations beyond the limits then
@@ -110,7 +110,10 @@ impl ConsistentLift {
         let d = plant.latent_dim();
         let shape = StageShape {
             inputs: JOINT_DIM,
-            input_rows: 2 * JOINT_DIM,
+            rows: Shape {
+                input: 2 * JOINT_DIM,
+                ..Shape::default()
+            },
             ..StageShape::default()
         };
         let shape = shape.with_cones(FOOT_DIM, settings.solver);

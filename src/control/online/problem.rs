@@ -39,7 +39,7 @@
 //! margin matters: left and right legs have nearly equal rows, each of which alone excludes a thin part of the
 //! region that the other allows.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::control_model::ControlModel;
 use super::dense::Real;
@@ -62,60 +62,102 @@ const INPUT_REACH: f64 = 10.0;
 /// plans may be that far off, commands are clamped and are not.
 pub(super) const ROW_MARGIN: Real = 0.02;
 
-/// A kind of rows. What its rows are, where they stand in a stage and what the settings make of them is stated here alone,
-/// for both solvers and for the controller in C.
+/// A kind of rows; rows, place in a stage and size are stated here alone, for both solvers and the controller in C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// `± T_i (u + ℓ) / τ_max,i ≤ 1`.
-    MotorTorque,
-    /// `± T_i (u − u⁻) ≤ 1`.
+pub enum RowKind {
+    /// `|T_i u_k + ℓ_k,i| ≤ τ_max,i`, in N m.
+    TorqueLimit,
+    /// `|T_i (u_k − u_{k-1})| ≤ h r`, in N m.
     TorqueRate,
-    /// `± D_i z / q_half,i ≤ …`.
-    JointRange,
-    /// `F u` over the robot's weight.
+    /// `q_min,i − s_k q_half,i ≤ D_i z_k + d_i ≤ q_max,i + s_k q_half,i`, in rad.
+    JointLimit,
+    /// `‖(R F u_k)_{x,y}‖ ≤ μ (R F u_k)_z` in contact, forces over the robot's weight.
     BodyFriction,
 }
 
-/// What the settings make of a kind, zero if stages have no such rows: the limit that rows for a limit of one are divided
-/// by, the friction coefficient of cones.
-fn row_size(kind: Kind, settings: &Settings) -> Real {
-    // The consistent lift keeps the torque limits by itself.
-    if kind == Kind::MotorTorque && settings.lift == Lift::Consistent as i32 {
-        return 0.0;
-    }
-    if kind == Kind::TorqueRate {
-        return settings.torque_rate_nm_s * settings.step_s as Real;
-    }
-    if kind == Kind::BodyFriction {
-        return settings.body_friction;
-    }
-    1.0
+/// Where rows stand in a stage, see [`StageRows`].
+enum RowPlace {
+    Input,
+    Link,
+    Soft,
+    Cone,
 }
 
-impl Kind {
+/// Returns the limit by which unit rows are divided; for cones the friction coefficient; 0 if the settings do not ask for
+/// the kind.
+fn row_size(kind: RowKind, settings: &Settings) -> Real {
+    // The consistent lift keeps the torque limits by itself.
+    if kind == RowKind::TorqueLimit && settings.lift != Lift::Consistent as i32 {
+        return 1.0;
+    }
+    if kind == RowKind::TorqueRate {
+        return settings.torque_rate_nm_s * settings.step_s as Real;
+    }
+    if kind == RowKind::JointLimit {
+        return 1.0;
+    }
+    if kind == RowKind::BodyFriction {
+        return settings.body_friction;
+    }
+    0.0
+}
+
+impl RowKind {
+    /// All kinds; rows of one place stand in this order.
+    pub const ALL: [Self; 4] = [
+        Self::TorqueLimit,
+        Self::TorqueRate,
+        Self::JointLimit,
+        Self::BodyFriction,
+    ];
+
+    fn place(self) -> RowPlace {
+        match self {
+            Self::TorqueLimit => RowPlace::Input,
+            Self::TorqueRate => RowPlace::Link,
+            Self::JointLimit => RowPlace::Soft,
+            Self::BodyFriction => RowPlace::Cone,
+        }
+    }
+
     fn rows(self, plant: &ControlModel, size: f64, selection: RowSelection) -> Vec<Row> {
-        let (robot, both) = (plant.robot(), [1.0, -1.0]);
-        let mut rows = match self {
-            Self::MotorTorque => self.rows_of(&plant.lift, &both, |joint, sign| {
-                let limit = robot.torque_limit_nm()[joint];
-                (limit, 1.0, sign / limit)
-            }),
-            Self::TorqueRate => self.rows_of(&plant.lift, &both, |_, _| (1.0, 1.0, 0.0)),
-            Self::JointRange => self.rows_of(&plant.decoder, &both, |joint, sign| {
-                let (lower, upper) = robot.joint_limit_rad()[joint];
-                let half = 0.5 * (upper - lower);
-                let limit = if sign > 0.0 { upper } else { lower };
-                (half, sign * (limit - plant.decoder_bias[joint]) / half, 0.0)
-            }),
-            Self::BodyFriction => {
-                let force = plant.lift.rows(JOINT_DIM, 3) / (robot.mass_kg() * GRAVITY_M_S2);
-                return self.rows_of(&force, &[1.0], |_, _| (1.0, size, 0.0));
+        let robot = plant.robot();
+        let row = |(joint, sign): (usize, f64)| {
+            let (entries, limit, bound, per_loss) = match self {
+                Self::TorqueLimit => {
+                    let limit = robot.torque_limit_nm()[joint];
+                    (plant.lift.row(joint), limit, 1.0, sign / limit)
+                }
+                Self::TorqueRate => (plant.lift.row(joint), 1.0, 1.0, 0.0),
+                Self::JointLimit => {
+                    let (lower, upper) = robot.joint_limit_rad()[joint];
+                    let half = 0.5 * (upper - lower);
+                    let limit = if sign > 0.0 { upper } else { lower };
+                    let bound = sign * (limit - plant.decoder_bias[joint]) / half;
+                    (plant.decoder.row(joint), half, bound, 0.0)
+                }
+                Self::BodyFriction => {
+                    let weight_n = robot.mass_kg() * GRAVITY_M_S2;
+                    (plant.lift.row(JOINT_DIM + joint), weight_n, size, 0.0)
+                }
+            };
+            Row {
+                kind: self,
+                joint,
+                row: entries.iter().map(|e| sign * e / limit).collect(),
+                bound,
+                per_loss,
             }
         };
+        if let RowPlace::Cone = self.place() {
+            return (0..3).map(|axis| row((axis, 1.0))).collect();
+        }
+        let sides = (0..JOINT_DIM).flat_map(|joint| [(joint, 1.0), (joint, -1.0)]);
+        let mut rows: Vec<Row> = sides.map(row).collect();
         rows.retain(|row| row.row.iter().any(|entry| *entry != 0.0));
         // Which rows are needed does not depend on the size.
         if selection == RowSelection::Needed {
-            rows.retain(|row| self != Self::MotorTorque || is_reachable(plant, row));
+            rows.retain(|row| self != Self::TorqueLimit || is_reachable(plant, row));
             rows = needed_rows(rows, ROW_MARGIN);
         }
         for entry in rows.iter_mut().flat_map(|row| &mut row.row) {
@@ -123,41 +165,22 @@ impl Kind {
         }
         rows
     }
-
-    /// Each joint's row of a matrix over `of`'s first value, with these signs, bound and loss share.
-    fn rows_of(
-        self,
-        matrix: &DMatrix<f64>,
-        signs: &[f64],
-        of: impl Fn(usize, f64) -> (f64, f64, f64),
-    ) -> Vec<Row> {
-        let joints = 0..matrix.nrows().min(JOINT_DIM);
-        let sides = joints.flat_map(|joint| signs.iter().map(move |&sign| (joint, sign)));
-        let row = |(joint, sign): (usize, f64)| {
-            let (size, bound, per_loss) = of(joint, sign);
-            Row {
-                kind: self,
-                joint,
-                row: matrix.row(joint).iter().map(|e| sign * e / size).collect(),
-                bound,
-                per_loss,
-            }
-        };
-        sides.map(row).collect()
-    }
 }
 
 /// Whether settings ask for rows that link stages, or for cones.
 pub fn has_links_or_cones(settings: &MpcSettings) -> bool {
-    let size = |kind| row_size(kind, &Settings::from(settings));
-    size(Kind::TorqueRate) > 0.0 || size(Kind::BodyFriction) > 0.0
+    let settings = Settings::from(settings);
+    RowKind::ALL.into_iter().any(|kind| match kind.place() {
+        RowPlace::Input | RowPlace::Soft => false,
+        RowPlace::Link | RowPlace::Cone => row_size(kind, &settings) > 0.0,
+    })
 }
 
 /// A row `row · v ≤ bound` on latent inputs or latent positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Its kind.
-    pub kind: Kind,
+    pub kind: RowKind,
     /// The joint or axis it belongs to.
     pub joint: usize,
     /// Coefficients, `latent_dim`.
@@ -214,30 +237,33 @@ impl StageRows {
 
     /// All rows for sizes of one, for settings that are chosen when a controller runs.
     pub fn of_all_kinds(plant: &ControlModel) -> Self {
-        Self::of_sizes(plant, row_selection(plant, &MpcSettings::default()), |_| {
-            1.0
-        })
+        let selection = row_selection(plant, &MpcSettings::default());
+        Self::sized(plant, selection, |_| 1.0)
     }
 
     fn of_settings(plant: &ControlModel, of: &MpcSettings, selection: RowSelection) -> Self {
         let settings = Settings::from(of);
-        Self::of_sizes(plant, selection, |kind| row_size(kind, &settings))
+        Self::sized(plant, selection, |kind| row_size(kind, &settings))
     }
 
-    fn of_sizes(plant: &ControlModel, selection: RowSelection, size: impl Fn(Kind) -> f64) -> Self {
-        let of = |kind: Kind| match size(kind) {
-            size if size > 0.0 => kind.rows(plant, size, selection),
-            _ => Vec::new(),
-        };
-        Self {
-            input: match selection {
-                RowSelection::Needed => pairs_first(of(Kind::MotorTorque)),
-                RowSelection::All => of(Kind::MotorTorque),
-            },
-            link: of(Kind::TorqueRate),
-            soft: of(Kind::JointRange),
-            cones: of(Kind::BodyFriction),
+    fn sized(plant: &ControlModel, selection: RowSelection, size: impl Fn(RowKind) -> f64) -> Self {
+        let mut rows = Self::default();
+        for kind in RowKind::ALL {
+            let of_place = match kind.place() {
+                RowPlace::Input => &mut rows.input,
+                RowPlace::Link => &mut rows.link,
+                RowPlace::Soft => &mut rows.soft,
+                RowPlace::Cone => &mut rows.cones,
+            };
+            let size = size(kind);
+            if size > 0.0 {
+                of_place.extend(kind.rows(plant, size, selection));
+            }
         }
+        // Both sides of a limit first, side by side; else the order stays.
+        let all = rows.input.clone();
+        (rows.input).sort_by_cached_key(|row| !all.iter().any(|other| other.is_opposite(row)));
+        rows
     }
 
     /// The same rows with the maps of `plant`, those at a stage's reference; none if a row vanishes there.
@@ -265,13 +291,6 @@ pub(super) fn stage_cost(state_weights: &[f64], settings: &MpcSettings) -> Stage
         input: scale * settings.input_weight,
         slack: SLACK_PRICE,
     }
-}
-
-/// The rows with both sides of a limit first, side by side; else the order stays.
-fn pairs_first(mut rows: Vec<Row>) -> Vec<Row> {
-    let all = rows.clone();
-    rows.sort_by_key(|row| !all.iter().any(|other| other.is_opposite(row)));
-    rows
 }
 
 /// How many pairs of opposite rows come first.
@@ -358,11 +377,9 @@ fn is_implied(rows: &[Row], is_kept: &[bool], index: usize, margin: f64) -> bool
     let others = (0..rows.len()).filter(|&other| is_kept[other] && other != index);
     let mut others: Vec<&Row> = others.map(|other| &rows[other]).collect();
     others.push(&rows[index]);
-    match maximum(&others, relaxation) {
-        // The solver's own tolerance must not decide.
-        Some(maximum) => maximum <= rows[index].bound + margin.max(1e-6 * relaxation),
-        None => false,
-    }
+    // The solver's own tolerance must not decide.
+    let most = rows[index].bound + margin.max(1e-6 * relaxation);
+    maximum(&others, relaxation).is_some_and(|maximum| maximum <= most)
 }
 
 /// `max row · v` for the last row subject to all rows, that one relaxed.

@@ -114,8 +114,8 @@ pub enum Accepts {
     NotNegative,
     /// A positive number, or none, which is zero in C.
     Optional,
-    /// As [`Self::Optional`]; none where the generated C is compiled without this switch, and what it compiles.
-    Compiled(&'static str, &'static str),
+    /// As [`Self::Optional`], of rows that link stages: the switch that compiles them in the C, and what that compiles.
+    LinkRows(&'static str, &'static str),
     /// Zero or a positive number; not looked at where this setting is zero.
     With(&'static str),
 }
@@ -127,7 +127,7 @@ impl Accepts {
             Self::Whole(least, most, expected) => {
                 ((least as f64..=most as f64).contains(&found), expected)
             }
-            Self::Positive | Self::Optional | Self::Compiled(..) => {
+            Self::Positive | Self::Optional | Self::LinkRows(..) => {
                 (is_positive, "a positive number")
             }
             Self::NotNegative | Self::With(_) => {
@@ -344,7 +344,7 @@ settings! {
             in_c "weight of the training's torques in the consistent lift";
         /// What the consistent lift makes of the same latent input is not limited.
         torque_rate_nm_s: Option<f64> = None => torque_rate_nm_s: Real,
-            Accepts::Compiled("TORQUE_RATES", "limits on torque rates"),
+            Accepts::LinkRows("TORQUE_RATES", "limits on torque rates"),
             "largest change of a torque, N m/s, plain lift; 0 leaves it free",
             in_c "largest change of a torque of LIFT_TRANSPOSE, N m/s; 0 leaves it free, as it must if UPPER_TORQUE_RATES is 0",
             in_ros "largest change of a torque of the plain lift, N m/s, where the controller is compiled with \

@@ -12,6 +12,7 @@ use super::dense::{MOST_LATENT, Real};
 use super::linearise::StageModel;
 use super::problem::{Row, StageRows, pairs};
 use super::settings::Solver;
+use crate::solver::Shape;
 
 pub(super) const PYRAMID_ROWS: usize = 4;
 pub(super) const CONE_ROWS: usize = 3;
@@ -44,12 +45,8 @@ impl Rows {
 pub(super) struct StageShape {
     pub states: usize,
     pub inputs: usize,
-    /// Most rows on the input.
-    pub input_rows: usize,
-    /// How many pairs of opposite rows come first among them.
-    pub pairs: usize,
-    pub soft_rows: usize,
-    pub link_rows: usize,
+    /// Rows but for cones, with the pyramids in their place; of those on the input the most.
+    pub rows: Shape,
     pub cones: usize,
 }
 
@@ -58,10 +55,12 @@ impl StageShape {
         let shape = Self {
             states: 2 * latent_dim,
             inputs: latent_dim,
-            input_rows: rows.input.len(),
-            pairs: pairs(&rows.input),
-            soft_rows: rows.soft.len(),
-            link_rows: rows.link.len(),
+            rows: Shape {
+                input: rows.input.len(),
+                soft: rows.soft.len(),
+                link: rows.link.len(),
+                pairs: pairs(&rows.input),
+            },
             cones: 0,
         };
         shape.with_cones(rows.cones.len() / CONE_ROWS, solver)
@@ -71,7 +70,7 @@ impl StageShape {
     pub(super) fn with_cones(mut self, count: usize, solver: Solver) -> Self {
         match solver {
             Solver::Clarabel => self.cones = count,
-            Solver::Riccati => self.input_rows += PYRAMID_ROWS * count,
+            Solver::Riccati => self.rows.input += PYRAMID_ROWS * count,
         }
         self
     }
@@ -134,10 +133,10 @@ impl StageQp {
             a: vec![0.0; nx * nx],
             b: vec![0.0; nx * nu],
             c: vec![0.0; nx],
-            input: Rows::zeros(shape.input_rows, nu),
-            soft: Rows::zeros(shape.soft_rows, nu),
-            link: Rows::zeros(shape.link_rows, nu),
-            link_at_reference: vec![0.0; shape.link_rows],
+            input: Rows::zeros(shape.rows.input, nu),
+            soft: Rows::zeros(shape.rows.soft, nu),
+            link: Rows::zeros(shape.rows.link, nu),
+            link_at_reference: vec![0.0; shape.rows.link],
             cones: Rows::zeros(CONE_ROWS * shape.cones, nu),
         }
     }
@@ -150,10 +149,8 @@ impl StageQp {
         scale: &StageScale<'_>,
     ) {
         let (root, deviation, d) = (scale.root, scale.deviation, scale.input.len());
-        scale_dynamics(&model.by, root, deviation, d, &mut self.a, &mut self.b);
-        for row in 0..2 * d {
-            self.c[row] = 1.0 / deviation[row] * defect[row];
-        }
+        let (a, b, c) = (&mut self.a, &mut self.b, &mut self.c);
+        scale_dynamics(&model.by, defect, root, deviation, d, a, b, c);
     }
 
     /// Rows but for cones; `end` is the reference state at the stage's end.
@@ -219,18 +216,21 @@ impl StageScale<'_> {
     }
 }
 
-/// Writes `σ⁻¹ A σ` and `σ⁻¹ B C_p` of derivatives `(A B)`, `2d × 3d`; all row-major but `C_p`, lower triangular,
-/// column by column.
+/// Writes `σ⁻¹ A σ`, `σ⁻¹ B C_p` and `σ⁻¹ defect` of derivatives `(A B)`, `2d × 3d`; all row-major but `C_p`, lower
+/// triangular, column by column.
 fn scale_dynamics(
     by: &[Real],
+    defect: &[Real],
     root: &[Real],
     deviation: &[Real],
     d: usize,
     a: &mut [Real],
     b: &mut [Real],
+    c: &mut [Real],
 ) {
     for i in 0..2 * d {
         let factor = 1.0 / deviation[i];
+        c[i] = factor * defect[i];
         let row = &by[3 * i * d..];
         for j in 0..d {
             let mut sum: Real = 0.0;

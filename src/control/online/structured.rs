@@ -26,7 +26,7 @@ pub(super) fn structured(
     cost: &StageCost,
     settings: QpSettings,
 ) -> Result<Box<dyn StageSolver>, ControlError> {
-    let (is_linked, is_lift) = (shape.link_rows > 0, shape.states == 0);
+    let (is_linked, is_lift) = (shape.rows.link > 0, shape.states == 0);
     let settings = Settings {
         max_iterations: settings.max_iterations,
         tolerance: if is_linked { LINK_TOLERANCE } else { TOLERANCE },
@@ -91,12 +91,7 @@ impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
         cost: &StageCost,
         settings: Settings<f64>,
     ) -> Self {
-        let shape = Shape {
-            input: of.input_rows,
-            soft: of.soft_rows,
-            link: of.link_rows,
-            pairs: of.pairs,
-        };
+        let shape = of.rows;
         let mut state = [0.0; NX];
         state[..of.states].copy_from_slice(&cost.state);
         let stage = |index: usize| {

@@ -121,7 +121,7 @@ impl<'a> Facts<'a> {
         };
         let limits = plant.robot().torque_limit_nm();
         let switch = |setting: &Setting| match setting.accepts {
-            Accepts::Compiled(name, what) => Some((name, what)),
+            Accepts::LinkRows(name, what) => Some((name, what)),
             _ => None,
         };
         Self {
