@@ -1,5 +1,5 @@
-/* @generated from src/control by `cargo run -p romc-translate`: the controller's own steps. Names that are defined
- * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
+/* @generated from src/control/online and src/robot by `cargo run -p romc-translate`: the controller's own steps.
+ * Names that are defined elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
 /* Curvature of the cost as the solvers have it: CURVATURE / 2 ‖v‖². Inputs a few deviations beyond the limits then
  * have multipliers near those at which iterations begin. */

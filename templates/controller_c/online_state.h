@@ -1,5 +1,5 @@
-/* @generated from src/control by `cargo run -p romc-translate`: state of the controller's own steps. Names that are defined
- * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
+/* @generated from src/control/online and src/robot by `cargo run -p romc-translate`: types of the controller's own steps.
+ * Names that are defined elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
 typedef struct {
     /* gamma. */
