@@ -18,9 +18,9 @@
 
 use std::io::Write as _;
 
-use romc::mpc::problem::{Kind, Row};
-use romc::mpc::widest::{has_avx2, prepare, solve};
-use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, needed_rows, sparse};
+use romc::mpc::problem::{Kind, Row, needed_rows};
+use romc::mpc::structured::{has_avx2, prepare, solve};
+use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, sparse};
 use romc::solver::{Cost, Links, Outcome, Program, RowMatrices, Settings, Shape, Stage};
 
 #[path = "shared/clock.rs"]

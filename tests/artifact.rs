@@ -443,7 +443,7 @@ fn actuators_and_frame_are_read_and_written_with_the_second_schema() {
     assert_eq!((actuators.viscous[3], actuators.dry[5]), (0.9, 0.3));
     assert_eq!(model.wrench_frame(), WrenchFrame::World);
     let rule = model.input_rule().expect("a robot");
-    assert_eq!(rule.robot().name(), "go2");
+    assert_eq!(rule.robot().name, "go2");
     assert!(artifact::to_text(&model).contains("\"schema\": \"romc-model/2\""));
     // Without them it is a file of the first schema, which keeps old files byte for byte.
     let plain = model.clone().into_builder().actuators(None);

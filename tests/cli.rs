@@ -1167,7 +1167,7 @@ fn bad_recordings_end_with_one_and_name_file_row_and_column() {
     let error = failed(&["simulate", MODEL, &missing]);
     assert!(error.contains("missing.csv"), "{error}");
 
-    let header: Vec<String> = romc::recording::reader::Column::all(true, true)
+    let header: Vec<String> = romc::recording::Column::all(true, true)
         .iter()
         .map(|column| column.name())
         .collect();

@@ -12,12 +12,8 @@ mod drivers;
 mod functions;
 #[path = "differential/kinks.rs"]
 mod kinks;
-#[path = "differential/lowered.rs"]
-mod lowered;
 #[path = "differential/models.rs"]
 mod models;
-#[path = "differential/sines.rs"]
-mod sines;
 #[path = "differential/single.rs"]
 mod single;
 #[path = "differential/slopes.rs"]

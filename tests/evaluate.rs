@@ -1,12 +1,5 @@
 //! Evaluation of the shipped models on our own recordings against figures computed another way.
 
-#[path = "evaluate/figures.rs"]
-mod figures;
-#[path = "evaluate/integrate.rs"]
-mod integrate;
-#[path = "evaluate/rollout.rs"]
-mod rollouts;
-
 use std::path::Path;
 
 use nalgebra::DVector;

@@ -198,8 +198,8 @@ fn a_step_that_no_recording_holds_is_refused() {
     let jump = Path::new(env!("CARGO_MANIFEST_DIR")).join(JUMP);
     let recording = romc::recording::read(&jump).expect("a sound recording");
     let mut text = Vec::new();
-    let options = romc::recording::write::WriteOptions::default();
-    romc::recording::write::write_to(&mut text, &recording, None, &options).expect("memory");
+    let options = romc::recording::WriteOptions::default();
+    romc::recording::write_to(&mut text, &recording, None, &options).expect("memory");
     let text = String::from_utf8(text).expect("UTF-8");
     for (rows, step) in [(101, "0.5"), (3, "0.01")] {
         let short: Vec<&str> = text.lines().take(rows).collect();
@@ -381,9 +381,9 @@ fn a_bomb_of_blank_lines_is_refused_early() {
     let path = folder.path().join("bomb.csv.gz");
     let jump = Path::new(env!("CARGO_MANIFEST_DIR")).join(JUMP);
     let recording = romc::recording::read(&jump).expect("a sound recording");
-    let options = romc::recording::write::WriteOptions::default();
+    let options = romc::recording::WriteOptions::default();
     let mut text = Vec::new();
-    romc::recording::write::write_to(&mut text, &recording, None, &options).expect("memory");
+    romc::recording::write_to(&mut text, &recording, None, &options).expect("memory");
     let rows = text.iter().filter(|byte| **byte == b'\n').count();
     for (start, place) in [(&text[..], rows + 10_001), (&b"\n"[..], 10_001)] {
         let file = fs::File::create(&path).expect("a file");

@@ -1,7 +1,5 @@
 //! `romc identify` on the shipped recordings: the simulated robots are known.
 
-#[path = "identify/made.rs"]
-mod made;
 #[allow(dead_code, reason = "folders alone")]
 mod outside;
 mod tools;

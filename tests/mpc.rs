@@ -12,8 +12,6 @@ mod interface;
 mod lift_pyramids;
 #[path = "mpc/lifts.rs"]
 mod lifts;
-#[path = "mpc/linearise.rs"]
-mod linearise;
 #[path = "mpc/nonlinear.rs"]
 mod nonlinear;
 mod outside;

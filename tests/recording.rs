@@ -7,8 +7,6 @@
 mod bad_files;
 #[path = "recording/checks.rs"]
 mod checks;
-#[path = "recording/clock.rs"]
-mod clock;
 #[path = "recording/foreign.rs"]
 mod foreign;
 #[path = "recording/formats.rs"]

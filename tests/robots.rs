@@ -72,13 +72,13 @@ fn feet_and_jacobians_are_those_of_pinocchio() {
         for posture in reference[name].as_array().expect("postures") {
             for entry in posture.as_array().expect("legs") {
                 let first = entry["joints"][0].as_str().expect("a name");
-                let place = robot.joint_names().iter().position(|joint| *joint == first);
+                let place = robot.joint_names.iter().position(|joint| *joint == first);
                 let leg = Leg::ALL[place.expect("a first joint") / 3];
                 let names: Vec<&str> = (0..3)
                     .map(|k| entry["joints"][k].as_str().expect("a name"))
                     .collect();
                 assert_eq!(
-                    robot.joint_names()[3 * leg.index()..3 * leg.index() + 3],
+                    robot.joint_names[3 * leg.index()..3 * leg.index() + 3],
                     names[..]
                 );
                 let q: [f64; 3] = numbers(&entry["angles"]).try_into().expect("three angles");
@@ -113,7 +113,7 @@ fn legs_are_matched_by_where_they_stand() {
         ("anymal_c.toml", "RF_HAA"),
         ("hare.urdf", "ne_swing"),
     ] {
-        assert_eq!(robot(name).joint_names()[0], front_right);
+        assert_eq!(robot(name).joint_names[0], front_right);
     }
     // Thighs of the hare turn about y on the left and about -y on the right: mirrored motions of
     // them read with opposite signs.
@@ -604,10 +604,7 @@ fn another_robot_of_a_known_name_is_one_of_its_own_and_says_what_differs() {
     fs::write(&path, &a1).expect("written");
     let open = |name: Option<&str>| robot_file::open(&path, &RobotOptions { feet: &[], name });
     let read = open(None).expect("read");
-    assert_eq!(
-        (read.robot.name(), read.robot.mass_kg()),
-        ("a1-toml", 12.79)
-    );
+    assert_eq!((read.robot.name, read.robot.mass_kg()), ("a1-toml", 12.79));
     assert_eq!(
         read.notes,
         [
@@ -615,7 +612,7 @@ fn another_robot_of_a_known_name_is_one_of_its_own_and_says_what_differs() {
              \"a1-toml\"; --name (romc robot) gives it another name"
         ]
     );
-    assert_eq!(open(Some("mine")).expect("read").robot.name(), "mine");
+    assert_eq!(open(Some("mine")).expect("read").robot.name, "mine");
     let error = open(Some("a1")).unwrap_err().to_string();
     let found = "--name: found \"a1\", romc's own robot with other";
     assert!(error.contains(found), "{error}");

@@ -93,13 +93,15 @@ fn closed_form_d4_meets_its_lines_on_jumps_it_never_saw() {
 #[test]
 fn refinement_predicts_whole_jumps_better_and_terms_are_dropped_within_the_slack() {
     let (training, validation) = (jumps("train", 6), jumps("validation", 2));
-    let told = RefCell::new(Vec::new());
-    let trained = |refinements, slack| {
+    let messages = RefCell::new(Vec::new());
+    let train_d4 = |refinements, slack| {
         let mut options = TrainOptions::new("d4", 4);
         options.regression.refinements = refinements;
         options.regression.slack = slack;
-        told.borrow_mut().clear();
-        let (cancel, mut listener) = (AtomicBool::new(false), |news| told.borrow_mut().push(news));
+        messages.borrow_mut().clear();
+        let (cancel, mut listener) = (AtomicBool::new(false), |message| {
+            messages.borrow_mut().push(message)
+        });
         let recordings = Recordings::new(&training, &validation);
         let origin = Origin::new("romc train", paths(&training));
         let monitor = &mut Monitor::new(&mut listener, &cancel);
@@ -112,17 +114,17 @@ fn refinement_predicts_whole_jumps_better_and_terms_are_dropped_within_the_slack
         both[0].hypot(both[1])
     };
     let usual = TrainOptions::new("d4", 4).regression;
-    let plain = trained(0, usual.slack);
-    let refined = trained(usual.refinements, 0.0);
+    let plain = train_d4(0, usual.slack);
+    let refined = train_d4(usual.refinements, 0.0);
     assert!(score(&refined) < 0.95 * score(&plain));
     assert!(whole_m(&refined) < 0.9 * whole_m(&plain));
     for slack in [0.1, 0.5] {
-        trained(usual.refinements, slack);
+        train_d4(usual.refinements, slack);
         // Scores of a stage's steps, relative to the first candidate's errors.
         let scores_of = |name: &str| -> Vec<f64> {
-            let told = told.borrow();
+            let messages = messages.borrow();
             let mut is_in = false;
-            let each = told.iter().filter_map(|news| match news {
+            let each = messages.iter().filter_map(|message| match message {
                 Progress::Stage { name: own } => {
                     is_in = own.ends_with(name);
                     None

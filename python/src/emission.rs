@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use romc::Error;
 use romc::artifact;
-use romc::cli::args::UnitsChoice;
+use romc::cli::UnitsChoice;
 use romc::deploy::{self, EmitOptions, Target};
 use romc::equations::Equations;
 use romc::files::{EmittedFile, Overwrite};

@@ -259,7 +259,7 @@ impl Model {
         let mut summary = BTreeMap::new();
         summary.insert("description", self.data.description().to_owned());
         if let Ok(robot) = self.data.robot() {
-            summary.insert("robot", robot.name().to_owned());
+            summary.insert("robot", robot.name.to_owned());
         }
         if let Ok(encoder) = self.data.encoder_map() {
             summary.insert("encoder", encoder.summary());

@@ -9,11 +9,11 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArr
 use pyo3::prelude::*;
 use romc::Error;
 use romc::files::{Overwrite, Place};
-use romc::recording::write::{Notation, write_to};
 use romc::recording::{
     Clocks, ColumnMap, Reader, ReadingNotes, RecordingError, RecordingFault, WriteOptions,
     read_from_bytes, write_as,
 };
+use romc::recording::{Notation, write_to};
 use romc::robot::{ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, STATE_DIM};
 use romc::robot_file::find;
 
@@ -215,9 +215,8 @@ pub fn read(
 /// A first map of an unknown log; returns its text, and why a log cannot be read by it, if so.
 #[pyfunction]
 pub fn guess(py: Python<'_>, path: PathBuf, robot: &str) -> PyResult<(String, Option<String>)> {
-    let guessed = py.detach(|| -> Result<_, Error> {
-        Ok(romc::recording::foreign::guess::guess(&path, find(robot)?)?)
-    });
+    let guessed =
+        py.detach(|| -> Result<_, Error> { Ok(romc::recording::guess(&path, find(robot)?)?) });
     let guessed = guessed.map_err(|error| python_error(py, error))?;
     Ok((guessed.text, guessed.outcome.err()))
 }

@@ -30,7 +30,7 @@ impl Run {
         let latent = run.latent;
         let mut arrays = Vec::new();
         for (name, rollout) in [("full", &run.full), ("restarted", &run.restarted)] {
-            let [z, dz, x] = predictions(model, rollout, latent.len())?;
+            let [z, dz, x] = predictions(model, rollout, latent.time_s.len())?;
             arrays.push((format!("z_{name}"), z));
             arrays.push((format!("dz_{name}"), dz));
             arrays.push((format!("x_{name}"), x));

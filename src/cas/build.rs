@@ -37,7 +37,7 @@ impl ExprPool {
     }
 
     /// `a - b`.
-    pub fn sub(&mut self, a: ExprId, b: ExprId) -> ExprId {
+    pub(crate) fn sub(&mut self, a: ExprId, b: ExprId) -> ExprId {
         let minus_b = self.neg(b);
         self.sum(&[a, minus_b])
     }
@@ -57,7 +57,7 @@ impl ExprPool {
     }
 
     /// `a / b`; the quotient of two numbers is rounded once. Division by zero stays symbolic.
-    pub fn div(&mut self, a: ExprId, b: ExprId) -> ExprId {
+    pub(crate) fn div(&mut self, a: ExprId, b: ExprId) -> ExprId {
         if let Some(divisor) = self.as_number(b) {
             let (coefficient, rest) = self.split(a);
             if let Some(quotient) = self.folded(coefficient.checked_div(divisor)) {

@@ -60,11 +60,6 @@ impl Costs {
 }
 
 impl ExprPool {
-    /// The length of `expr` in weighted characters, by the module's table; saturates.
-    pub fn cost(&self, expr: ExprId) -> u64 {
-        Costs::default().of(self, expr)
-    }
-
     /// The length of a node without what its surroundings add to a sum.
     fn length_of_node(&self, expr: ExprId, length_of: impl Fn(ExprId) -> u64) -> u64 {
         let factor = |operand: ExprId| self.as_factor(operand, length_of(operand));

@@ -171,7 +171,7 @@ impl Function {
     }
 
     /// Whether the argument is an angle.
-    pub fn is_circular(self) -> bool {
+    pub(crate) fn is_circular(self) -> bool {
         self.row().is_circular
     }
 

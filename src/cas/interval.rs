@@ -19,7 +19,7 @@ pub struct Interval {
 
 impl Interval {
     /// All reals.
-    pub const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
+    pub(crate) const ENTIRE: Interval = Interval::between(f64::NEG_INFINITY, f64::INFINITY);
     /// No points: the value of an expression that is defined nowhere in its domain.
     pub const EMPTY: Interval = Interval::between(f64::INFINITY, f64::NEG_INFINITY);
     const NON_NEGATIVE: Interval = Interval::between(0.0, f64::INFINITY);

@@ -41,6 +41,9 @@ mod display;
 mod factors;
 mod function;
 mod germ;
+#[cfg(test)]
+#[path = "../../tests/symbolic_identities/mod.rs"]
+mod identities;
 mod interval;
 mod node;
 mod number;
@@ -58,7 +61,10 @@ mod slope;
 mod trig;
 mod values;
 
-pub use canonical::{CanonicalForm, CanonicalForms, Coefficient};
+pub use canonical::{
+    forms::CanonicalForms,
+    polynomial::{CanonicalForm, Coefficient},
+};
 pub use defined::Reading;
 pub use display::Display;
 
@@ -68,7 +74,7 @@ pub use node::{ExprId, Node, SymbolId};
 pub use number::{Number, sum_of_floats};
 pub use parse::{ParseError, ParseErrorKind};
 pub use pool::ExprPool;
-pub use shorten::{Shortened, Shortener};
+pub use shorten::search::{Shortened, Shortener};
 pub use values::integer_power;
 
 // Names that most files use.

@@ -43,7 +43,7 @@ impl Number {
     }
 
     /// `numerator / denominator` in lowest terms; `None` for a zero denominator.
-    pub fn rational(numerator: i64, denominator: i64) -> Option<Number> {
+    pub(crate) fn rational(numerator: i64, denominator: i64) -> Option<Number> {
         Number::from_ratio(i128::from(numerator), i128::from(denominator))
     }
 

@@ -17,7 +17,7 @@ type Units = BTreeMap<ExprId, Number>;
 
 impl ExprPool {
     /// `expr` with sines, cosines, tangents of sums and exact multiples by those of single angles, not multiplied out.
-    pub fn expand_angles(&mut self, expr: ExprId) -> ExprId {
+    pub(crate) fn expand_angles(&mut self, expr: ExprId) -> ExprId {
         self.expand_angles_like(expr, ExprId::ZERO)
     }
 
@@ -100,12 +100,12 @@ impl ExprPool {
     }
 
     /// `expr` with powers of sines reduced to the first by `sin(x)^2 = 1 - cos(x)^2`, also below; not multiplied out.
-    pub fn sines_to_cosines(&mut self, expr: ExprId) -> ExprId {
+    pub(crate) fn sines_to_cosines(&mut self, expr: ExprId) -> ExprId {
         self.reduce_powers(expr, Function::Sin, Function::Cos, |_| true)
     }
 
     /// As [`sines_to_cosines`](ExprPool::sines_to_cosines) with the functions exchanged.
-    pub fn cosines_to_sines(&mut self, expr: ExprId) -> ExprId {
+    pub(crate) fn cosines_to_sines(&mut self, expr: ExprId) -> ExprId {
         self.reduce_powers(expr, Function::Cos, Function::Sin, |_| true)
     }
 
@@ -153,7 +153,7 @@ impl ExprPool {
     }
 
     /// `expr` with products of sines and cosines in outermost terms as sums: `sin(x)^2` is `1/2 - 1/2*cos(2*x)`.
-    pub fn combine_angles(&mut self, expr: ExprId) -> ExprId {
+    pub(crate) fn combine_angles(&mut self, expr: ExprId) -> ExprId {
         let terms = self.terms_of(expr);
         let mut combined = Vec::with_capacity(terms.len());
         for (coefficient, rest) in terms {

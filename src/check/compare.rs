@@ -229,12 +229,12 @@ fn proof(
             _ => None,
         }
     };
-    let mut found = verdict(&difference, forms.rounding());
+    let mut found = verdict(&difference, forms.rounding);
     if found.is_none() {
         let cleared = forms.without_fractions(&difference)?;
-        found = verdict(&cleared, forms.rounding());
+        found = verdict(&cleared, forms.rounding);
     }
-    found.filter(|_| !forms.is_contradictory())
+    found.filter(|_| !forms.is_contradictory)
 }
 
 fn sum(pool: &mut ExprPool, side: usize, rows: &[&Row]) -> ExprId {

@@ -217,7 +217,7 @@ impl CheckDomain {
     }
 
     /// The first phase or variable that is none of these: its ranges would be without effect.
-    pub fn foreign(&self, phases: &[&str], latent_dim: usize) -> Option<String> {
+    pub(crate) fn foreign(&self, phases: &[&str], latent_dim: usize) -> Option<String> {
         let foreign = self.phases.iter().find_map(|(phase, ranges)| {
             if !phases.contains(&phase.as_str()) {
                 return Some(format!("[{phase}]"));

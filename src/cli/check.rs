@@ -5,7 +5,7 @@ use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, Gap, Side, TermDifference, Verdict, compare,
     read_sides,
 };
-use crate::files::{Place, read_toml};
+use crate::files::{Place, size::read_toml};
 use crate::import::{ImportError, SymbolNames};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {

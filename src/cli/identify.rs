@@ -77,9 +77,7 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     format!(
         "{} from {recordings} recordings: {} samples with feet on the ground, {} in flight\n\n\
          {body}\n{joints}\n{links}\n{fits}{notes}",
-        robot.name(),
-        found.samples.contact,
-        found.samples.flight
+        robot.name, found.samples.contact, found.samples.flight
     )
 }
 

@@ -9,7 +9,7 @@ use crate::equations::Equations;
 use crate::evaluate::Invariance;
 use crate::model::StateMap;
 use crate::recording::check::{Finding, check};
-use crate::recording::foreign::guess::guess;
+use crate::recording::guess;
 use crate::recording::mismatch::{Figures, notes as mismatches};
 use crate::recording::{PhaseRule, Reading, ReadingNotes};
 use crate::report::{invariance_table, range};
@@ -167,7 +167,7 @@ fn input_rule(model: &ReducedModel) -> String {
         WrenchFrame::Body => "the body's axes, as published",
         WrenchFrame::World => "the world's axes, moments of roll, pitch and yaw",
     };
-    let rule = format!("  inputs of robot {}: forces in {axes};", robot.name());
+    let rule = format!("  inputs of robot {}: forces in {axes};", robot.name);
     let Some(actuators) = model.actuators() else {
         return rule + " torques of the motors\n";
     };

@@ -1,9 +1,9 @@
 //! The command line. Each command is a file with one function from its arguments to an `Answer`, text or one JSON
 //! object; [`run`] prints it and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
-//! to stdout; progress, warnings, errors to stderr. Start with [`args`]. All commands import what this file imports
+//! to stdout; progress, warnings, errors to stderr. Start with `args`. All commands import what this file imports
 //! (`use super::*`).
 
-pub mod args;
+mod args;
 mod check;
 mod compile;
 mod convert;
@@ -24,6 +24,7 @@ mod study;
 mod train;
 mod train_settings;
 
+pub use args::{command::Arguments, compile::UnitsChoice};
 pub use import::{Compared, import_compared};
 
 use std::borrow::Cow;

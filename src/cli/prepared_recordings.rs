@@ -3,8 +3,8 @@
 use super::args::{ReadingArguments, TrainArguments, TrainSettings};
 use super::inspect::finding_json;
 use super::*;
+use crate::recording::as_recorded;
 use crate::recording::check::Finding;
-use crate::recording::files::as_recorded;
 use crate::recording::{
     ConditionOptions, ImplausibleSamples, Reader, RecordingError, RecordingFile, RecordingSet,
 };

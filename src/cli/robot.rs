@@ -9,9 +9,9 @@ pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
     let read = robot_file::open(name_or_file, &RobotOptions::default())?;
     let robot = read.robot;
     if robot_file::by_name(name_or_file).is_err() {
-        let joints = Leg::ALL.into_iter().zip(robot.joint_names().chunks(3));
+        let joints = Leg::ALL.into_iter().zip(robot.joint_names.chunks(3));
         let matched = joints.map(|(leg, joints)| format!("{leg} = {}", joints.join(" ")));
-        let (name, matched) = (robot.name(), matched.collect::<Vec<_>>().join(", "));
+        let (name, matched) = (robot.name, matched.collect::<Vec<_>>().join(", "));
         note(&format!("{name_or_file}: robot {name}, {matched}"));
     }
     note_all(name_or_file, &read.notes);
@@ -36,10 +36,10 @@ pub(super) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
     note_all(&arguments.robot, &read.notes);
     let geometry = |joint: usize| robot.geometry(Leg::ALL[joint / 3]);
     let limits = robot.joint_limit_rad();
-    let (torques, speeds) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
+    let (torques, speeds) = (robot.torque_limit_nm(), &robot.joint_speed_limit_rad_s);
     let table = Table::of(0..JOINT_NAMES.len())
         .column("romc", "", |&i| JOINT_NAMES[i])
-        .column("joint", "", |&i| robot.joint_names()[i])
+        .column("joint", "", |&i| robot.joint_names[i])
         .column("at", "m", |&i| match i % 3 {
             0 => vector(robot.hip_position(Leg::ALL[i / 3]).into()),
             _ => vector(geometry(i).links[i % 3 - 1]),
@@ -50,7 +50,7 @@ pub(super) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
         .column("torque", "N m", |&i| number(torques[i]))
         .column("speed", "rad/s", |&i| number(speeds[i]))
         .table();
-    let (name, mass) = (robot.name(), number(robot.mass_kg()));
+    let (name, mass) = (robot.name, number(robot.mass_kg()));
     let mut text = format!("{name}: {mass} kg\n\n{table}\n");
     for leg in Leg::ALL {
         let foot = vector(robot.geometry(leg).links[2]);

@@ -12,14 +12,15 @@ use serde_json::Value;
 
 use super::*;
 use crate::Error;
-use crate::files::{Emitted, Overwrite, is_invisible, read_toml, write_files_since, write_whole};
+use crate::files::size::read_toml;
+use crate::files::{Emitted, Overwrite, is_invisible, write_files_since, write_whole};
 use crate::model::ReducedModel;
 use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
 use crate::report::{Figure, figure_files};
 use crate::robot::Robot;
 use crate::train::sha256;
 
-pub use crate::files::{
+pub(crate) use crate::files::{
     shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
 };
 

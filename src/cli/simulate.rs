@@ -99,7 +99,7 @@ fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result
     for (index, run) in assessment.runs.iter().enumerate() {
         let (segment, latent) = (run.segment, &run.latent);
         let [full, restarted] =
-            [&run.full, &run.restarted].map(|rollout| rollout.states(latent.len()));
+            [&run.full, &run.restarted].map(|rollout| rollout.states(latent.time_s.len()));
         for (sample, states) in full.iter().zip(&restarted).enumerate() {
             let states = [states.0.as_ref(), states.1.as_ref()];
             let z = states.map(|state| state.map(|(z, _)| z));

@@ -12,3 +12,6 @@ pub mod equations;
 pub mod ir;
 pub mod lower;
 pub mod typeset;
+#[cfg(test)]
+#[path = "../../tests/typeset_values/mod.rs"]
+mod typeset_values;

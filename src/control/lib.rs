@@ -6,6 +6,9 @@
 
 use romc_robot as robot;
 
+#[cfg(test)]
+#[path = "../../tests/mpc/linearise.rs"]
+mod linearise;
 pub mod online;
 pub mod solver;
 pub mod sources;

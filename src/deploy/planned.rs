@@ -118,7 +118,7 @@ impl PlannedJump {
     }
 
     /// `NAME_plan.h` and `NAME_plan.c` below `folder`, C99; `provenance` is their first line.
-    pub fn files(&self, folder: &str, name: &str, provenance: &str) -> [EmittedFile; 2] {
+    pub(crate) fn files(&self, folder: &str, name: &str, provenance: &str) -> [EmittedFile; 2] {
         let upper = name.to_ascii_uppercase();
         let one = |value: &f64| format!("{value:.*e}", DIGITS - 1);
         let columns = |rows: &DMatrix<f64>| {

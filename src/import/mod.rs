@@ -28,7 +28,7 @@ mod run;
 mod tensors;
 
 pub use equations::{Equation, Section, Sections};
-pub use latex::{NameError, SymbolNames};
+pub use latex::variables::{NameError, SymbolNames};
 pub use library::read_terms;
 pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
 pub use role::{Mapping, Part, Role};

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use clap::ValueEnum;
 use nalgebra::DVector;
 
-use super::latex::SymbolNames;
+use super::latex::variables::SymbolNames;
 use super::role::{Mapping, ONLY_PHASE};
 use super::{ImportError, Read};
 use crate::files::Place;

@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::assemble::{self, Parts};
 use super::equations::{self, Sections};
-use super::latex::{self, SymbolNames};
+use super::latex::{self, variables::SymbolNames};
 use super::options::{Format, ImportOptions, refusal};
 use super::tensors::{self, Tensor};
 use super::{ImportError, Read, latent};

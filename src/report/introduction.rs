@@ -62,7 +62,7 @@ fn cause(content: &Content<'_>) -> Option<String> {
 
 fn subject(content: &Content<'_>) -> Result<String> {
     let (model, assessment) = (content.model, content.assessment);
-    let robot = model.robot().map_or("a robot", |robot| robot.name());
+    let robot = model.robot().map_or("a robot", |robot| robot.name);
     let phases: Vec<&str> = model.phases().iter().map(|p| p.name.as_str()).collect();
     let first = assessment.runs.first();
     let modelled = first.map(|run| modelled(model, run)).transpose()?;

@@ -44,7 +44,7 @@ fn predicted(
     rollout: &Rollout,
     value: impl Fn(usize, &DVector<f64>, &DVector<f64>) -> Result<DVector<f64>>,
 ) -> Result<Samples> {
-    let states = rollout.states(run.latent.len()).into_iter();
+    let states = rollout.states(run.latent.time_s.len()).into_iter();
     let value = |(sample, state): (usize, Option<(DVector<f64>, DVector<f64>)>)| {
         state.map(|(z, dz)| value(sample, &z, &dz)).transpose()
     };
@@ -87,7 +87,7 @@ impl<'a> Jump<'a> {
     }
 
     /// As a strip and as an animation; none without a robot.
-    pub fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
+    pub(crate) fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
         let robot = self.model.robot().ok()?;
         let segment = self.run.segment;
         let predicted = Motion {

@@ -180,16 +180,11 @@ pub struct Robot {
     pub torque_limit_nm: [f64; JOINT_DIM],
     /// Lowest and highest angles.
     pub joint_limit_rad: [(f64, f64); JOINT_DIM],
-    /// Largest speeds.
+    /// Largest speeds, in rad/s.
     pub joint_speed_limit_rad_s: [f64; JOINT_DIM],
 }
 
 impl Robot {
-    /// Its name, in model files and on the command line.
-    pub fn name(&self) -> &str {
-        self.name
-    }
-
     /// Mass of body and legs, in kg.
     pub fn mass_kg(&self) -> f64 {
         self.mass_kg
@@ -198,11 +193,6 @@ impl Robot {
     /// Shape of a leg.
     pub fn geometry(&self, leg: Leg) -> &LegGeometry {
         &self.legs[leg.index()]
-    }
-
-    /// The maker's names of the joints.
-    pub fn joint_names(&self) -> &[&'static str; JOINT_DIM] {
-        &self.joint_names
     }
 
     /// How a joint's angle on the left, mirrored, reads on the right: 1 where both turn alike in a mirrored motion (the
@@ -232,11 +222,6 @@ impl Robot {
     /// Lowest and highest angle of each joint, in rad.
     pub fn joint_limit_rad(&self) -> &[(f64, f64); JOINT_DIM] {
         &self.joint_limit_rad
-    }
-
-    /// Largest speed of each joint, in rad/s.
-    pub fn joint_speed_limit_rad_s(&self) -> &[f64; JOINT_DIM] {
-        &self.joint_speed_limit_rad_s
     }
 
     /// Foot position of a leg from its first joint, along the body's axes, in m.

@@ -21,7 +21,7 @@ pub(crate) type Real = f64;
 
 /// Smallest `|det J|`, divided by [`LegShape::volume`], at which torques still give a foot force: a knee about 1e-3 rad
 /// from full extension.
-pub const SINGULAR_BOUND: Real = 1e-3;
+pub(crate) const SINGULAR_BOUND: Real = 1e-3;
 
 /// Smallest area that thigh and calf span, over the product of their lengths (about the sine of the knee), at which
 /// torques are turned into forces without damping.

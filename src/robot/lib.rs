@@ -1,8 +1,8 @@
 //! Joints, legs, geometry and limits of quadrupeds.
 //!
 //! Joint angles, torques and contact flags enter; foot positions, leg Jacobians, the force and moment of the legs on
-//! the body (equations 4 to 8, 22 and 23) and limits of commands leave. Read [`joints`] for names and order first, then
-//! [`leg`] for one leg, `wrench` for all four and [`input_rule`] for the inputs of a model; `romc_model::robot_file`
+//! the body (equations 4 to 8, 22 and 23) and limits of commands leave. Read `joints` for names and order first, then
+//! `leg` for one leg, `wrench` for all four and [`InputRule`] for the inputs of a model; `romc_model::robot_file`
 //! reads robots from files; generated controllers hold these sources.
 //!
 //! ```
@@ -20,21 +20,21 @@
 //! ```
 
 pub(crate) mod geometry;
-pub mod input_rule;
-pub mod joints;
-pub mod leg;
+pub(crate) mod input_rule;
+pub(crate) mod joints;
+pub(crate) mod leg;
 pub(crate) mod wrench;
 
 mod error;
 
 pub use error::RobotError;
 pub use geometry::{LegGeometry, LegLinks, Robot};
-pub use input_rule::{Actuators, DRY_SPEED_RAD_S, InputRule, WrenchFrame, joint_loss};
+pub use input_rule::{Actuators, DRY_SPEED_RAD_S, InputRule, WrenchFrame, joint_loss, rotation};
 pub use joints::{
     BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
-    JOINT_NAMES, Leg, STATE_DIM,
+    JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM,
 };
-pub use leg::{LegShape, SINGULAR_BOUND};
+pub use leg::{LEAST_HEIGHT, LEAST_SPAN, LegShape, Posture};
 pub use wrench::FeetRule;
 
 #[cfg(feature = "serde")]

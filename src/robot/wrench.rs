@@ -19,7 +19,7 @@ impl Robot {
     /// abduction, flexion, knee.
     ///
     /// # Errors
-    /// [`RobotError::SingularLeg`] at full extension (see [`SINGULAR_BOUND`]), [`RobotError::NotFinite`].
+    /// [`RobotError::SingularLeg`] at full extension (see `SINGULAR_BOUND`), [`RobotError::NotFinite`].
     pub fn foot_force(
         &self,
         leg: Leg,
@@ -119,7 +119,7 @@ impl Robot {
 
     fn singular(&self, leg: Leg, q: &[f64; 3]) -> RobotError {
         RobotError::SingularLeg {
-            robot: self.name().to_owned(),
+            robot: self.name.to_owned(),
             leg,
             joints_rad: *q,
             determinant: self.geometry(leg).manipulability(q),
@@ -136,7 +136,7 @@ impl Robot {
         match values.iter().find(|value| !value.is_finite()) {
             None => Ok(()),
             Some(found) => Err(RobotError::NotFinite {
-                robot: self.name().to_owned(),
+                robot: self.name.to_owned(),
                 leg,
                 quantity,
                 found: *found,

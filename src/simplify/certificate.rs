@@ -37,7 +37,7 @@ impl std::iter::Sum for BeforeAfter {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum ChangeKind {
+pub(crate) enum ChangeKind {
     Dropped,
     Constant,
     /// A straight line took its place: multiples of variables, perhaps with a constant.
@@ -57,7 +57,7 @@ pub struct Effect {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change {
-    pub kind: ChangeKind,
+    pub(crate) kind: ChangeKind,
     /// Significant digits of a rounding.
     pub digits: Option<usize>,
     #[serde(flatten)]
@@ -69,7 +69,7 @@ pub struct Change {
     #[serde(serialize_with = "ends")]
     pub bound: Interval,
     /// The same at the recorded samples.
-    pub measured: Option<Measured>,
+    pub(crate) measured: Option<Measured>,
 }
 
 impl Change {
@@ -94,7 +94,7 @@ pub struct EquationCertificate {
     #[serde(serialize_with = "ends")]
     pub sum_of_bounds: Interval,
     /// The difference at the recorded samples.
-    pub measured: Option<Measured>,
+    pub(crate) measured: Option<Measured>,
     pub terms: BeforeAfter,
     /// Significant decimal digits that the coefficients need, added up.
     pub digits: BeforeAfter,
@@ -135,7 +135,7 @@ pub struct Certificate {
 
 impl Certificate {
     /// All equations with the names of their phases.
-    pub fn equations(&self) -> impl Iterator<Item = (&str, &EquationCertificate)> {
+    pub(crate) fn equations(&self) -> impl Iterator<Item = (&str, &EquationCertificate)> {
         let phases = self.phases.iter();
         phases.flat_map(|phase| phase.equations.iter().map(|e| (phase.name.as_str(), e)))
     }
@@ -241,7 +241,7 @@ pub struct ToleranceError {
 
 impl Tolerance {
     /// The tolerance with its unit, in words.
-    pub fn words(self) -> String {
+    pub(crate) fn words(self) -> String {
         let unit = match self {
             Self::ShareOfRms(_) => "of the root mean square of each ddz over the recordings",
             Self::Absolute(_) => "scaled units per s^2",

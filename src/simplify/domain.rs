@@ -63,7 +63,7 @@ impl Samples {
         let of_phase = |phase: usize| {
             let mut values: Vec<f64> = Vec::new();
             for segment in segments {
-                for k in (0..segment.len()).filter(|&k| segment.phase[k] == phase) {
+                for k in (0..segment.time_s.len()).filter(|&k| segment.phase[k] == phase) {
                     for block in [&segment.z, &segment.dz, &segment.u_lat] {
                         values.extend(block.column(k).iter());
                     }

@@ -18,7 +18,7 @@ use crate::typeset::{Decimal, Rounding};
 
 /// How large an error is at recorded samples (scaled units per second squared).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Measured {
+pub(crate) struct Measured {
     pub max: f64,
     pub rms: f64,
 }
@@ -76,7 +76,7 @@ pub struct PrintedEquation {
     /// Contains the model's `ddz` minus `ddz` as printed over the domain; `None` where the phase has none.
     pub bound: Option<Interval>,
     /// The same at the recorded samples in the domain.
-    pub measured: Option<Measured>,
+    pub(crate) measured: Option<Measured>,
 }
 
 /// The errors of all equations when their coefficients are printed with `rounding`.
@@ -115,7 +115,7 @@ const BODY: &str = "body.";
 
 /// Errors of a model's rollouts in the robot's body coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RolloutErrors {
+pub(crate) struct RolloutErrors {
     /// Root mean squares of each coordinate: whole jumps, restarted.
     pub rms: Vec<[Option<f64>; 2]>,
     /// Windows that diverged: whole jumps, restarted.
@@ -134,9 +134,9 @@ pub struct RolloutEffect {
     /// Time between restarts, s.
     pub restart_every_s: f64,
     /// Of the model.
-    pub before: RolloutErrors,
+    pub(crate) before: RolloutErrors,
     /// Of the simplified model.
-    pub after: RolloutErrors,
+    pub(crate) after: RolloutErrors,
 }
 
 #[derive(Clone, Debug)]

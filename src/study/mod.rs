@@ -2,15 +2,15 @@
 //! `Plan` and recordings enter; a folder with one file per training leaves, so that a stopped study goes on and parts
 //! can be joined, and their `Summary`. Read `run` first.
 
-pub mod run;
+pub(crate) mod run;
 mod store;
 mod summary;
 
-pub use run::Plan;
+pub(crate) use run::Plan;
 pub(crate) use run::{CellId, FOLDS, Shard, StudyError, run};
 pub(crate) use store::Store;
 pub(crate) use summary::{Cell, DimensionSummary, Spread, cell_table};
-pub use summary::{Outcome, Summary};
+pub(crate) use summary::{Outcome, Summary};
 
 use std::path::PathBuf;
 

@@ -99,7 +99,7 @@ pub(crate) const FOLDS: usize = 5;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
+pub(crate) struct Plan {
     pub latent_dims: Vec<usize>,
     pub seeds: usize,
     pub method: Method,
@@ -118,7 +118,7 @@ pub(crate) struct CellId {
 }
 
 impl Plan {
-    pub fn check(&self) -> Result<(), StudyError> {
+    pub(crate) fn check(&self) -> Result<(), StudyError> {
         let refuse =
             |found: String, expected: &'static str| Err(StudyError::Range { found, expected });
         if self.latent_dims.is_empty() || self.seeds == 0 {

@@ -42,7 +42,7 @@ impl Store {
         Ok(Self { folder, plan })
     }
 
-    pub fn plan(&self) -> &Plan {
+    pub(crate) fn plan(&self) -> &Plan {
         &self.plan
     }
 

@@ -14,7 +14,7 @@ pub(crate) struct Cell {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub(crate) enum Outcome {
     Trained(Metrics),
     Refused(String),
 }
@@ -45,7 +45,7 @@ impl Metrics {
         }
     }
 
-    pub fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         let [x, z] = [self.prediction_x_m, self.prediction_z_m];
         let values = [x, z, self.decoder_mse, self.torque_r2];
         values.into_iter().all(f64::is_finite)
@@ -91,7 +91,7 @@ pub(crate) struct DimensionSummary {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Summary {
+pub(crate) struct Summary {
     pub lambda: f64,
     /// Ascending; dimensions without any model are left out.
     pub dimensions: Vec<DimensionSummary>,
@@ -116,7 +116,7 @@ impl Summary {
         best.map(|row| row.latent_dim)
     }
 
-    pub fn table(&self) -> Table {
+    pub(crate) fn table(&self) -> Table {
         let mut table = Table::of(&self.dimensions)
             .column("latent_dim", "", |row| row.latent_dim)
             .column("trained", "", |row| row.trained)

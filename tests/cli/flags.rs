@@ -6,7 +6,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser as _};
 
 use romc::Error;
-use romc::cli::args::Arguments;
+use romc::cli::Arguments;
 use romc::limits::{Range, table};
 
 /// Command lines with a flag that does nothing there, and that flag.

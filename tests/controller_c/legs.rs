@@ -21,7 +21,7 @@ fn on_robot(name: &str, frame: WrenchFrame) -> ReducedModel {
 }
 
 fn robot_name(model: &ReducedModel) -> &str {
-    model.robot().expect("a robot").name()
+    model.robot().expect("a robot").name
 }
 
 #[test]

@@ -1,12 +1,15 @@
 //! Lowered programs: steps, activations, nested sums, singular maps.
 
-use nalgebra::{DMatrix, DVector};
-use romc::equations::Equations;
-use romc::ir::{Binary, Interpreter, ProgramBuilder, Statement, Unary};
-use romc::lower::{CompiledModel, Form, Map, dynamics, dynamics_jacobian};
-use romc::model::{
+#[path = "cubic.rs"]
+mod cubic;
+
+use crate::equations::Equations;
+use crate::ir::{Binary, Interpreter, ProgramBuilder, Statement, Unary};
+use crate::lower::{CompiledModel, Form, Map, dynamics, dynamics_jacobian};
+use crate::model::{
     Activation, AffineMap, FeetRule, Layer, Library, Phase, ReducedModel, Scaling, StateMap,
 };
+use nalgebra::{DMatrix, DVector};
 
 fn model(d: usize, terms: &[&str], phases: &[(&str, FeetRule, &[f64])]) -> ReducedModel {
     let texts: Vec<String> = terms.iter().map(|&term| term.to_owned()).collect();
@@ -78,7 +81,7 @@ fn polynomials_take_fewer_products_than_their_terms_one_by_one() {
 
 #[test]
 fn sums_of_vectors_equal_one_operation_after_the_other() {
-    let model = super::models::cubic();
+    let model = cubic::cubic();
     let inputs = [0.9, 1.3, -0.2].map(|x: f64| (0..5).map(|k| x - 0.4 * f64::from(k)).collect());
     let [found, expected] = [Form::Automatic, Form::StraightLine].map(|form| {
         let (program, _) = dynamics_jacobian(&Equations::of(&model), 0, form).expect("lowers");

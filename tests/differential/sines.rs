@@ -1,7 +1,6 @@
 //! The kernel of sines and cosines against the standard library.
 
-use romc::ir::interpret::{LIMIT, sin_cos};
-use romc::ir::{Interpreter, ProgramBuilder};
+use crate::ir::{Interpreter, LIMIT, ProgramBuilder, sin_cos};
 
 /// Largest magnitude that the single-precision kernel reduces itself, in rad.
 const LIMIT_F32: f32 = 128.0;

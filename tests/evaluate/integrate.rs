@@ -1,7 +1,7 @@
 //! The adaptive integrator against closed forms and a published reference.
 
+use crate::sim::integrate::{IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
 use nalgebra::DMatrix;
-use romc::sim::{IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
 
 /// One equation in one unknown, or more, as two functions.
 struct Case<F, J>(F, J);

@@ -1,9 +1,9 @@
 //! Rollouts of a small hybrid model against closed forms and fine steps.
 
+use crate::lower::CompiledModel;
+use crate::model::{FeetRule, Library, Phase, ReducedModel};
+use crate::sim::{LatentSegment, Restart, rollout};
 use nalgebra::DMatrix;
-use romc::lower::CompiledModel;
-use romc::model::{FeetRule, Library, Phase, ReducedModel};
-use romc::sim::{LatentSegment, Restart, rollout};
 
 /// A damped, driven oscillator in contact; constant acceleration in flight.
 fn compiled() -> CompiledModel {

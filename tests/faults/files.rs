@@ -5,10 +5,10 @@ use std::io::{self, Read as _};
 use std::path::Path;
 
 use romc::files::magic::recognised;
-use romc::files::size::{Capped, Format, read_capped};
+use romc::files::size::{Capped, Format, read_capped, read_toml};
 use romc::files::{
     Emitted, EmittedFile, FolderError, Overwrite, Place, check_folder, earlier_files, is_invisible,
-    read_toml, shell_path, write_files, write_files_since, write_whole,
+    shell_path, write_files, write_files_since, write_whole,
 };
 
 const LIST: &str = ".romc-emitted";

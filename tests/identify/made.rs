@@ -4,24 +4,24 @@ use std::path::PathBuf;
 
 use nalgebra::{DMatrix, DVector, SVector};
 
-use romc::files::Place;
-use romc::identify::equations::Motion;
-use romc::identify::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
-use romc::identify::parameters::{
+use crate::files::Place;
+use crate::identify::equations::Motion;
+use crate::identify::equations::{BODY_ROWS, JOINT_ROWS, SampleEquations, joint_unknowns};
+use crate::identify::parameters::{
     ARMATURE, CALF, CALF_SECOND, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
     THIGH_SECOND, TRUNK_FORWARD, VISCOUS,
 };
-use romc::identify::{Identification, IdentifyError, identify};
-use romc::recording::clock::timed;
-use romc::recording::{Recording, Segment};
-use romc::robot::{BODY_Z, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
+use crate::identify::{Identification, IdentifyError, identify};
+use crate::recording::clock::timed;
+use crate::recording::{Recording, Segment};
+use crate::robot::{BODY_Z, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 const STEP_S: f64 = 0.002;
 const MASS_KG: f64 = 11.0;
 const GRAVITY_M_S2: f64 = 9.7;
 
 fn go1() -> &'static Robot {
-    romc::robot_file::by_name("go1").unwrap()
+    crate::robot_file::by_name("go1").unwrap()
 }
 
 /// The unknowns of the made robot, per mass except gravity.
@@ -372,7 +372,6 @@ fn timed_lost_samples_are_found_and_a_true_clock_stays() {
     let made = hop(0.0);
     let same = timed(&made).unwrap();
     assert!(same.mended.elapsed_ratio.is_none() && same.segment == made);
-    assert!((same.elapsed_ratio - 1.0).abs() < 0.01);
     // Every eighth sample is lost, and the logger counts on.
     let kept: Vec<usize> = (0..made.len()).filter(|sample| sample % 8 != 3).collect();
     let lost = Segment {
@@ -385,8 +384,8 @@ fn timed_lost_samples_are_found_and_a_true_clock_stays() {
         ..made.clone()
     };
     let mended = timed(&lost).unwrap();
-    assert!(mended.mended.elapsed_ratio.is_some());
-    close(mended.elapsed_ratio, 8.0 / 7.0, 0.01, "ratio");
+    let ratio = mended.mended.elapsed_ratio.expect("rebuilt");
+    close(ratio, 8.0 / 7.0, 0.01, "ratio");
     close(
         mended.segment.duration_s(),
         made.duration_s(),

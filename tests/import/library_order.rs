@@ -156,7 +156,7 @@ fn fitted() -> (ReducedModel, Vec<DMatrix<f64>>) {
     let latent = LatentSegment::encode(&original, &jump.segments[0]).expect("a jump");
     let library = Library::standard(4, StandardLibrary::default()).expect("small");
     let xi = (0..original.phases().len()).map(|phase| {
-        let samples: Vec<usize> = (0..latent.len())
+        let samples: Vec<usize> = (0..latent.time_s.len())
             .filter(|&k| latent.phase[k] == phase)
             .collect();
         let column = |k: usize| {

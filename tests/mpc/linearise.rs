@@ -1,8 +1,8 @@
 //! The step of a stage and its derivatives.
 
+use crate::online::LatentDynamics;
+use crate::online::linearise::{Lineariser, StageModel};
 use nalgebra::DVector;
-use romc::mpc::LatentDynamics;
-use romc::mpc::linearise::{Lineariser, StageModel};
 
 /// Accelerations with all entries of their Jacobian, row by row.
 #[derive(Debug)]

@@ -1,7 +1,6 @@
 //! Which rows can be active at all.
 
-use romc::mpc::needed_rows;
-use romc::mpc::problem::{Kind, Row};
+use romc::mpc::problem::{Kind, Row, needed_rows};
 
 fn row(joint: usize, row: &[f64], bound: f64) -> Row {
     Row {

@@ -94,7 +94,7 @@ fn plan_read_as_a_recording_has_the_planned_torques_inside_their_limits() {
     let recording = Recording::from(plan.motion.clone());
     let mut bytes = Vec::new();
     let options = recording::WriteOptions::default();
-    recording::write::write_to(&mut bytes, &recording, None, &options).unwrap();
+    recording::write_to(&mut bytes, &recording, None, &options).unwrap();
     let read = recording::read_from_bytes("plan.csv", &bytes).unwrap();
     assert_eq!(read.segments[0].torque_nm, plan.motion.torque_nm);
     let limits = romc::robot_file::by_name("go1").unwrap().torque_limit_nm();

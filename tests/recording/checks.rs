@@ -206,8 +206,8 @@ mod implausible {
 }
 
 mod conditioning {
-    use romc::recording::files::{Accelerations, SmoothedRows, condition};
     use romc::recording::preprocess::SavitzkyGolay;
+    use romc::recording::{Accelerations, SmoothedRows, condition};
 
     use super::*;
 
@@ -306,7 +306,7 @@ mod conditioning {
 }
 
 mod phases {
-    use romc::recording::phases::{PhasePattern, PhaseSpan};
+    use romc::recording::{PhasePattern, PhaseSpan};
     use romc::robot::{ContactFlags, FeetRule};
 
     use super::*;

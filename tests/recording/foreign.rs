@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, Vector3};
 use romc::files::Overwrite;
-use romc::recording::foreign::guess::guess;
+use romc::recording::guess;
 use romc::recording::{self, Clocks, ColumnMap, Reader, Recording, RecordingError, Segment};
 use romc::robot::JOINT_NAMES;
-use romc::robot::input_rule::rotation;
+use romc::robot::rotation;
 
 /// Columns of numbers with names.
 #[derive(Default)]

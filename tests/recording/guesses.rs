@@ -6,8 +6,8 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 use romc::files::Overwrite;
-use romc::recording::foreign::guess::{Guess, guess};
 use romc::recording::{self, Clocks, ColumnMap, Reader, Recording, Segment};
+use romc::recording::{Guess, guess};
 
 use super::foreign::{Log, difference, gyro, jump, quaternion};
 use super::mcap::Dice;

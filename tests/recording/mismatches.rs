@@ -164,7 +164,7 @@ fn wrong_readings_of_every_jump_are_noticed() {
             for (name, spoil) in SPOILED {
                 require(name, notes(&spoiled(&right, spoil), robot));
             }
-            let other = if robot.name() == "go1" { "go2" } else { "go1" };
+            let other = if robot.name == "go1" { "go2" } else { "go1" };
             require(
                 other,
                 notes(&right, romc::robot_file::by_name(other).unwrap()),

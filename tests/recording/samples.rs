@@ -125,7 +125,7 @@ mod inputs {
 mod writing {
     use std::fs;
 
-    use romc::recording::write::{Notation, WriteOptions, write_to};
+    use romc::recording::{Notation, WriteOptions, write_to};
     use romc::recording::{read_from_bytes, write};
 
     use super::*;

@@ -1,8 +1,8 @@
 //! Joints, legs, forces and inputs of robots: formulas against differences, virtual work and a physics engine.
 
 use nalgebra::{Matrix3, Rotation3, SVector, Unit, Vector3, Vector6};
-use romc::robot::input_rule::rotation;
-use romc::robot::joints::LEG_JOINT_DIM;
+use romc::robot::LEG_JOINT_DIM;
+use romc::robot::rotation;
 use romc::robot::{
     Actuators, ContactFlags, InputRule, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, Robot,
     RobotError, STATE_DIM, WrenchFrame,

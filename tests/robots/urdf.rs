@@ -49,7 +49,7 @@ impl Random {
 /// Feet of the robot at random angles are those of the numbers that the file was made of, from `trunk`.
 fn assert_feet(made: &Made, robot: &Robot, trunk: &str, random: &mut Random) {
     for leg in Leg::ALL {
-        let names = &robot.joint_names()[3 * leg.index()..3 * leg.index() + 3];
+        let names = &robot.joint_names[3 * leg.index()..3 * leg.index() + 3];
         let q = [(); 3].map(|()| random.between(-2.0, 2.0));
         let angles: BTreeMap<&str, f64> = names.iter().copied().zip(q).collect();
         let last = made
@@ -433,7 +433,7 @@ fn robots_of_other_joints_and_feet_get_their_own_hints() {
 fn robot_with_the_name_of_romcs_own_is_another_and_says_what_differs() {
     let go1 = Made::quadruped().urdf().replace("\"made\"", "\"go1\"");
     let read = read(&go1);
-    assert_eq!(read.robot.name(), "go1-urdf");
+    assert_eq!(read.robot.name, "go1-urdf");
     let note = read.notes.join("\n");
     assert!(note.starts_with("its numbers are not those of romc's own \"go1\" (mass_kg 11.24 instead of 12.01, FR_hip_joint at [0.2, -0.05, 0.0] instead of [0.1881, -0.04675, 0.0], "), "{note}");
     assert!(
@@ -570,7 +570,7 @@ fn changed_robots_are_read_as_they_are_or_refused() {
         let hips: Vec<&Joint> = (made.joints.iter())
             .filter(|joint| {
                 robot
-                    .joint_names()
+                    .joint_names
                     .iter()
                     .step_by(3)
                     .any(|name| *name == joint.name)
@@ -597,7 +597,7 @@ fn changed_robots_are_read_as_they_are_or_refused() {
         let trunk = shared.max_by(|a, b| mass(a).unwrap_or(0.0).total_cmp(&mass(b).unwrap_or(0.0)));
         let trunk = trunk.expect("the root");
         assert_feet(&made, robot, trunk, &mut random);
-        for (name, limit) in robot.joint_names().iter().zip(robot.torque_limit_nm()) {
+        for (name, limit) in robot.joint_names.iter().zip(robot.torque_limit_nm()) {
             let joint = made
                 .joints
                 .iter()

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use romc::symbolic::{ExprId, ExprPool, Function, Interval, SymbolId};
+use crate::{ExprId, ExprPool, Function, Interval, SymbolId};
 
 use super::parse;
 

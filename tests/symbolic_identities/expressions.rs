@@ -2,7 +2,8 @@
 
 use std::cmp::Ordering;
 
-use romc::symbolic::{ExprId, ExprPool, Function, Number, SymbolId};
+use crate::cost::Costs;
+use crate::{ExprId, ExprPool, Function, Number, SymbolId};
 
 use super::{assert_rewritten, nested, parse, rewritten};
 
@@ -535,7 +536,7 @@ fn combine_angles_turns_products_into_sums() {
 fn cost(text: &str) -> u64 {
     let mut pool = ExprPool::new();
     let expr = parse(&mut pool, text);
-    pool.cost(expr)
+    Costs::default().of(&pool, expr)
 }
 
 #[test]
@@ -563,7 +564,7 @@ fn cost_of_exponentially_large_tree_saturates() {
         let cosine = pool.apply(Function::Cos, expr);
         expr = pool.add(sine, cosine);
     }
-    assert_eq!(pool.cost(expr), u64::MAX);
+    assert_eq!(Costs::default().of(&pool, expr), u64::MAX);
 }
 
 #[test]

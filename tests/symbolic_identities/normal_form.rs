@@ -1,6 +1,6 @@
 //! Equal expressions get equal normal forms, different ones do not.
 
-use romc::symbolic::{CanonicalForm, CanonicalForms, ExprPool};
+use crate::{CanonicalForm, CanonicalForms, ExprPool};
 
 /// The form of `a - b` without fractions; decimals are rounded where their text starts with `~`.
 fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
@@ -21,7 +21,7 @@ fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
     let mut forms = CanonicalForms::new(&pool, &[left, right]);
     let difference = forms.of(left).minus(&forms.of(right));
     let cleared = forms.without_fractions(&difference).expect("small enough");
-    (cleared, forms.rounding())
+    (cleared, forms.rounding)
 }
 
 #[test]

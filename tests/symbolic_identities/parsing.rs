@@ -1,6 +1,6 @@
 //! Texts of candidate terms: what is read, and how faults are reported.
 
-use romc::symbolic::{ExprPool, ParseError, ParseErrorKind};
+use crate::{ExprPool, ParseError, ParseErrorKind};
 
 fn is_latent(name: &str) -> bool {
     matches!(name, "z1" | "z2" | "dz1" | "dz2" | "u1")

@@ -1,10 +1,11 @@
 //! Names of variables, coordinates and patterns of feet in print.
 
-use romc::artifact;
-use romc::equations::Equations;
-use romc::model::{FeetRule, LatentVariable};
-use romc::typeset::words::feet;
-use romc::typeset::{RobotTypeset, Rounding, SymbolTable, TypesetError};
+use romc_model::artifact;
+
+use crate::equations::Equations;
+use crate::model::{FeetRule, LatentVariable};
+use crate::typeset::words::feet;
+use crate::typeset::{RobotTypeset, Rounding, SymbolTable, TypesetError};
 
 /// A model of one latent coordinate over two robot coordinates.
 const TWO: &str = r#"{ "schema": "romc-model/1", "name": "two", "latent_dim": 1,

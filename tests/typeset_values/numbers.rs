@@ -1,6 +1,6 @@
 //! Numbers as they are printed, and tables of them.
 
-use romc::typeset::{Decimal, Rounding, Table, rounded, rounded_up, significant};
+use crate::typeset::{Decimal, Rounding, Table, rounded, rounded_up, significant};
 
 #[test]
 fn numbers_are_rounded_by_decimals_by_significant_digits_or_as_each_needs() {

@@ -1,8 +1,8 @@
 //! Text of a model file in TeX, HTML and Markdown.
 
-use romc::typeset::latex::tex_text;
-use romc::typeset::markdown::markdown_text;
-use romc::typeset::mathml::{HtmlProse, HtmlText};
+use crate::typeset::latex::math::tex_text;
+use crate::typeset::markdown::markdown_text;
+use crate::typeset::mathml::{HtmlProse, HtmlText};
 
 /// Characters that change how TeX reads what follows.
 const ACTIVE: &str = "$&#%_^~";

@@ -27,9 +27,11 @@ pub struct CanonicalForms<'p> {
     pub(super) positive: HashSet<u32>,
     pub(super) positive_sums: Vec<CanonicalForm>,
     pub(super) negative: HashSet<u32>,
-    rounding: f64,
+    /// Largest difference between arguments of functions that only rounding of decimals explains.
+    pub rounding: f64,
     is_rounded: bool,
-    is_contradictory: bool,
+    /// Whether no numbers round to all decimals whose arguments were taken as equal: then equal forms prove nothing.
+    pub is_contradictory: bool,
     n_fraction_tries: usize,
 }
 
@@ -84,16 +86,6 @@ impl<'p> CanonicalForms<'p> {
         forms.positive_sums = sums;
         forms.rounding = 0.0;
         forms
-    }
-
-    /// Whether no numbers round to all decimals whose arguments were taken as equal: then equal forms prove nothing.
-    pub fn is_contradictory(&self) -> bool {
-        self.is_contradictory
-    }
-
-    /// Largest difference between arguments of functions that only rounding of decimals explains.
-    pub fn rounding(&self) -> f64 {
-        self.rounding
     }
 
     /// The normal form. Parts that grow too large while they are multiplied out stay as they are.

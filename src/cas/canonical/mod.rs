@@ -10,10 +10,7 @@
 //! Equal forms prove equal values wherever both are defined. Different forms prove a difference only where no atoms
 //! depend on each other (`sqrt(1 + x)`, `sqrt(2 + x)` and `sqrt(2 + 3*x + x^2)` do): confirm it at a point.
 
-mod forms;
-mod polynomial;
+pub(crate) mod forms;
+pub(crate) mod polynomial;
 mod products;
 mod roots;
-
-pub use forms::CanonicalForms;
-pub use polynomial::{CanonicalForm, Coefficient};

@@ -80,7 +80,7 @@ impl Monomial {
     }
 }
 
-/// A sum in normal form, made by [`CanonicalForms`](super::CanonicalForms).
+/// A sum in normal form, made by [`CanonicalForms`](super::forms::CanonicalForms).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CanonicalForm {
     pub(super) terms: BTreeMap<Monomial, Coefficient>,

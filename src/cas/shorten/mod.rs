@@ -12,9 +12,7 @@
 mod agreement;
 mod forms;
 mod groups;
-mod search;
-
-pub use search::{Shortened, Shortener};
+pub(crate) mod search;
 
 use crate::{ExprId, Number};
 

@@ -5,12 +5,12 @@ use crate::equations::{Equations, LatentUnits, Unit, summand_words};
 use crate::lower::LowerError;
 use crate::model::{CoordinateNames, ReducedModel};
 use crate::robot::WrenchFrame;
-use crate::robot::leg::{LEAST_HEIGHT, LEAST_SPAN};
+use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
 
 const MOST_TERMS: usize = 40;
 
 pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerError> {
-    let robot = model.robot()?.name();
+    let robot = model.robot()?.name;
     let axes = match model.wrench_frame() {
         WrenchFrame::Body => {
             "Axes are parallel to the body's: x forward, y left, z up. The arm p_k of a moment is the foot in \

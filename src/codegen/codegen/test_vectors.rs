@@ -5,7 +5,7 @@ use super::interface::{FunctionSpec, ModelInterface};
 use super::options::Precision;
 use crate::ir::{Binary, Interpreter, Slot, Statement, Unary};
 use crate::robot::JOINT_DIM;
-use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::LEG_JOINT_DIM;
 use crate::typeset::rounded_up;
 
 pub(crate) const N_POINTS: usize = 6;

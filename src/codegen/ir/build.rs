@@ -25,14 +25,14 @@ enum Key {
 
 /// Appends statements in order of evaluation and numbers values; equal scalar computations are made once.
 #[derive(Debug)]
-pub struct ProgramBuilder {
+pub(crate) struct ProgramBuilder {
     program: Program,
     known: HashMap<Key, ValueId>,
 }
 
 impl ProgramBuilder {
     /// An empty program.
-    pub fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         Self {
             program: Program {
                 name: name.to_owned(),
@@ -49,7 +49,7 @@ impl ProgramBuilder {
     }
 
     /// Declares an input array and returns its elements.
-    pub fn input(&mut self, name: &str, len: usize) -> Vec<ValueId> {
+    pub(crate) fn input(&mut self, name: &str, len: usize) -> Vec<ValueId> {
         let slot = self.program.inputs.len();
         self.program.inputs.push(Slot {
             name: name.to_owned(),
@@ -61,17 +61,17 @@ impl ProgramBuilder {
     }
 
     /// A constant.
-    pub fn constant(&mut self, value: f64) -> ValueId {
+    pub(crate) fn constant(&mut self, value: f64) -> ValueId {
         self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
     }
 
     /// A scalar operation on one value.
-    pub fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
+    pub(crate) fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
         self.numbered(Key::Unary(op, a), Statement::Unary(op, a))
     }
 
     /// A scalar operation on two values.
-    pub fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
+    pub(crate) fn binary(&mut self, op: Binary, a: ValueId, b: ValueId) -> ValueId {
         let (low, high) = match op {
             Binary::Add | Binary::Mul => (a.min(b), a.max(b)),
             Binary::Sub | Binary::Div | Binary::Pow => (a, b),
@@ -97,7 +97,7 @@ impl ProgramBuilder {
     }
 
     /// Sines and cosines of all arguments.
-    pub fn sin_cos(&mut self, arguments: &[ValueId]) -> (Vec<ValueId>, Vec<ValueId>) {
+    pub(crate) fn sin_cos(&mut self, arguments: &[ValueId]) -> (Vec<ValueId>, Vec<ValueId>) {
         let n = arguments.len();
         let statement = Statement::SinCos {
             arguments: arguments.to_vec(),
@@ -160,7 +160,7 @@ impl ProgramBuilder {
     }
 
     /// Declares an output array that takes the given values.
-    pub fn output(&mut self, name: &str, values: &[ValueId]) {
+    pub(crate) fn output(&mut self, name: &str, values: &[ValueId]) {
         let slot = self.program.outputs.len();
         let is_other = |known: &Slot| known.name != name;
         assert!(
@@ -178,7 +178,7 @@ impl ProgramBuilder {
     }
 
     /// The finished program.
-    pub fn finish(self) -> Result<Program, IrError> {
+    pub(crate) fn finish(self) -> Result<Program, IrError> {
         let of_table = |table: &usize| {
             let mut entries = self.program.tables[*table].entries.iter().copied();
             entries.find(|entry| !entry.is_finite())

@@ -11,8 +11,6 @@
 //! exact, and a positive tail keeps the sign of zero. Adding `ROUND`, 1.5 times 2^52 or 2^23, rounds to an integer,
 //! which the low bits then hold. `SIN` is (r - sin r) / r^3 in powers of r^2, `COS` is (cos r - 1 + r^2/2) / r^4.
 
-pub use double::{LIMIT, reduced_sin_cos, sin_cos};
-
 use super::operation::{Binary, Real, Unary, alternating};
 use super::program::{LANES, Program, Slot, Statement, Table, ValueId, Vector};
 

@@ -1,29 +1,40 @@
 //! Programs: what is computed, in which order.
 //!
-//! A [`Program`] enters from `lower` (through [`ProgramBuilder`]); C, Rust and the interpreter run its statements in
+//! A [`Program`] enters from `lower` (through `ProgramBuilder`); C, Rust and the interpreter run its statements in
 //! the same order with the same association, so that results agree bit for bit. Read `program` first, then `interpret`.
 //!
 //! ```
-//! use romc::ir::{Binary, Interpreter, ProgramBuilder};
+//! use romc::equations::Equations;
+//! use romc::ir::Interpreter;
+//! use romc::lower::{Form, dynamics};
+//! use romc::model::{FeetRule, Library, Phase, ReducedModel};
 //!
-//! let mut builder = ProgramBuilder::new("area");
-//! let sides = builder.input("sides", 2);
-//! let area = builder.binary(Binary::Mul, sides[0], sides[1]);
-//! builder.output("area", &[area]);
-//! let program = builder.finish().expect("finite");
+//! let library = Library::from_terms(1, &["z1".to_owned()])?;
+//! let (name, xi) = ("contact".to_owned(), nalgebra::DMatrix::from_element(1, 1, -40.0));
+//! let contact = Phase { name, feet: FeetRule::Any, xi };
+//! let spring = ReducedModel::builder("spring", library).phase(contact).build()?;
+//! let program = dynamics(&Equations::of(&spring), 0, Form::StraightLine)?;
 //!
-//! let mut area = [0.0];
-//! Interpreter::new(&program).run(&[&[3.0, 4.0]], &mut [&mut area]);
-//! assert_eq!(area, [12.0]);
+//! let mut ddz = [0.0];
+//! Interpreter::new(&program).run(&[&[0.5], &[0.0], &[0.0]], &mut [&mut ddz]);
+//! assert_eq!(ddz, [-20.0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod build;
-pub mod interpret;
+pub(crate) mod interpret;
 mod operation;
 mod program;
+#[cfg(test)]
+#[path = "../../../tests/differential/sines.rs"]
+mod sines;
 
-pub use build::{IrError, ProgramBuilder};
-pub use interpret::Interpreter;
+pub use build::IrError;
+pub(crate) use build::ProgramBuilder;
+pub use interpret::{
+    Interpreter,
+    double::{LIMIT, reduced_sin_cos, sin_cos},
+};
 pub use operation::{Binary, Unary};
 pub(crate) use operation::{FUNCTIONS, alternating};
 pub(crate) use program::{LANES, Table};

@@ -82,7 +82,7 @@ pub enum Statement {
     Binary(Binary, ValueId, ValueId),
     /// The second value where the first is zero of either sign, else the third, also for NaN; both are computed.
     Select([ValueId; 3]),
-    /// Sine and cosine of all arguments by [`super::interpret::sin_cos`]: defines the n sines, then the n cosines.
+    /// Sine and cosine of all arguments by [`super::sin_cos`]: defines the n sines, then the n cosines.
     SinCos {
         /// The n arguments, in rad.
         arguments: Vec<ValueId>,
@@ -150,7 +150,7 @@ pub(crate) struct ResultEntry {
     pub value: ValueId,
 }
 
-/// A validated, scheduled computation of named output arrays from named input arrays; see [`super::ProgramBuilder`].
+/// A validated, scheduled computation of named output arrays from named input arrays; see `ProgramBuilder`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
     pub(super) name: String,

@@ -104,7 +104,7 @@ impl DenseJacobian {
     }
 
     /// The value of each entry that may be nonzero, by (row, variable).
-    pub fn lower(
+    pub(crate) fn lower(
         &self,
         lowering: &mut ExpressionLowering,
         equations: &[Combination],

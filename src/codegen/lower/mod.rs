@@ -9,6 +9,9 @@ mod compiled;
 mod dense;
 mod dynamics;
 mod expression;
+#[cfg(test)]
+#[path = "../../../tests/differential/lowered.rs"]
+mod lowered;
 mod maps;
 mod nested;
 mod number;

@@ -5,9 +5,9 @@ use super::dynamics::LowerError;
 use super::number::{Number, Sheet};
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
-use crate::robot::input_rule::DRY_SPEED_RAD_S;
-use crate::robot::joints::LEG_JOINT_DIM;
-use crate::robot::leg::Posture;
+use crate::robot::DRY_SPEED_RAD_S;
+use crate::robot::LEG_JOINT_DIM;
+use crate::robot::Posture;
 use crate::robot::{
     BODY_DIM, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegShape, STATE_DIM, WrenchFrame,
 };

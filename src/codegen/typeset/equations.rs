@@ -27,14 +27,14 @@ pub struct Equation {
 
 /// Every candidate term that is printed somewhere, with its coefficients; in library order.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CoefficientTable {
+pub(crate) struct CoefficientTable {
     /// Column heads: the acceleration, with the phase it belongs to, and its unit where that is physical.
     pub columns: Vec<(String, Symbol, Option<Unit>)>,
     pub rows: Vec<CoefficientRow>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct CoefficientRow {
+pub(crate) struct CoefficientRow {
     pub term: Math,
     /// Unit of the term, for equations in physical units; that of a coefficient is the column's over this.
     pub unit: Option<Unit>,
@@ -45,7 +45,7 @@ pub struct CoefficientRow {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Typeset {
     pub systems: Vec<EquationSystem>, // one per phase, in the model's order
-    pub table: CoefficientTable,
+    pub(crate) table: CoefficientTable,
     pub rounding: RoundingReport,
 }
 
@@ -121,7 +121,7 @@ impl Equation {
     }
 
     /// The right side as one piece: a lone zero when there are no terms.
-    pub fn right(&self) -> Math {
+    pub(crate) fn right(&self) -> Math {
         match self.terms.is_empty() {
             true => Math::Number(Decimal::integer(0)),
             false => Math::Sum(self.terms.clone()),

@@ -34,7 +34,7 @@ fn after_comma(unit: &Option<Unit>) -> String {
 }
 
 /// Text from outside that Markdown shows as it is, in one line.
-pub fn markdown_text(text: &str) -> String {
+pub(crate) fn markdown_text(text: &str) -> String {
     let mut markdown = String::new();
     for (place, character) in text.replace(ends_line, " ").chars().enumerate() {
         // A hyphen makes a list only at the start.

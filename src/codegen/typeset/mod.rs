@@ -20,11 +20,10 @@ pub use decimal::{Decimal, Rounding};
 pub(crate) use equations::{CoefficientRow, CoefficientTable};
 pub use equations::{Equation, EquationSystem, Typeset};
 pub use expression::expression;
-pub use robot::RobotTypeset;
+pub(crate) use robot::RobotTypeset;
 pub use symbols::{
     Emitted, Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError,
 };
 pub use table::{Cell, Table, rounded, rounded_up, significant};
 pub(crate) use tree::{EQUALS, Glyph, break_lines, symbol_width, width};
 pub use tree::{Math, Signed, Symbol};
-pub use words::rendered;

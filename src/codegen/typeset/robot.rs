@@ -18,7 +18,7 @@ const NEGLIGIBLE: f64 = 0.02;
 
 /// A model in robot coordinates `q`, in SI units.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RobotTypeset {
+pub(crate) struct RobotTypeset {
     /// `z = W_e (s_x q) + b_e`, one equation a latent coordinate.
     pub encoder: EquationSystem,
     /// How many weights of the encoder are too small to be printed: each below 2 % of the largest of its row.
@@ -34,7 +34,7 @@ impl RobotTypeset {
     ///
     /// # Errors
     /// [`TypesetError::NotFinite`] if a coefficient is too large for a float in SI units.
-    pub fn new(
+    pub(crate) fn new(
         system: &Equations<'_>,
         symbols: &SymbolTable,
         rounding: Rounding,

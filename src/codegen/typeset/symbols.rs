@@ -50,7 +50,7 @@ impl SymbolTable {
         }
     }
 
-    pub fn symbol(&self, variable: LatentVariable) -> Symbol {
+    pub(crate) fn symbol(&self, variable: LatentVariable) -> Symbol {
         let (letter, index) = match variable {
             LatentVariable::Z(index) => ('z', index),
             LatentVariable::U(index) => ('u', index),

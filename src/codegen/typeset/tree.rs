@@ -44,7 +44,7 @@ impl Signed {
     }
 
     /// The same as one [`Math`]: a negative one becomes a sum of one term.
-    pub fn into_math(self) -> Math {
+    pub(crate) fn into_math(self) -> Math {
         if self.negative {
             Math::Sum(vec![self])
         } else {
@@ -56,13 +56,13 @@ impl Signed {
 /// A variable: a glyph, up to two dots above it for time derivatives, and a subscript, its parts joined by commas.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Symbol {
-    pub glyph: Glyph,
+    pub(crate) glyph: Glyph,
     pub dots: u8,
-    pub subscript: Vec<Glyph>,
+    pub(crate) subscript: Vec<Glyph>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Glyph {
+pub(crate) enum Glyph {
     /// One Latin letter, italic.
     Letter(char),
     /// A Greek letter, by its place in `GREEK`.
@@ -114,7 +114,7 @@ impl Math {
         }
     }
 
-    pub fn starts_with_digit(&self) -> bool {
+    pub(crate) fn starts_with_digit(&self) -> bool {
         match self {
             Math::Number(_) => true,
             Math::Product(factors) => factors.first().is_some_and(Math::starts_with_digit),

@@ -146,7 +146,7 @@ pub trait LatentDynamics: Debug + Send {
 
 /// Runge-Kutta step of one stage and its derivatives.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StageModel {
+pub(crate) struct StageModel {
     /// `F(x̄, ū)`, `2 latent_dim`: positions first.
     pub next: Vec<f64>,
     /// `(∂F/∂x ∂F/∂u)`, `2 latent_dim × 3 latent_dim`, row-major.
@@ -155,7 +155,7 @@ pub struct StageModel {
 
 impl StageModel {
     /// A stage of zeros.
-    pub fn zeros(latent_dim: usize) -> Self {
+    pub(crate) fn zeros(latent_dim: usize) -> Self {
         Self {
             next: vec![0.0; 2 * latent_dim],
             by: vec![0.0; 6 * latent_dim * latent_dim],
@@ -163,28 +163,30 @@ impl StageModel {
     }
 
     /// Entry of `∂F/∂x`.
-    pub fn a(&self, row: usize, col: usize) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn a(&self, row: usize, col: usize) -> f64 {
         self.by[row * 3 * (self.next.len() / 2) + col]
     }
 
     /// Entry of `∂F/∂u`.
-    pub fn b(&self, row: usize, col: usize) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn b(&self, row: usize, col: usize) -> f64 {
         self.a(row, self.next.len() + col)
     }
 }
 
 /// Working memory of [`Lineariser::stage`].
 #[derive(Debug, Clone)]
-pub struct Lineariser(Vec<f64>);
+pub(crate) struct Lineariser(Vec<f64>);
 
 impl Lineariser {
     /// Memory for a latent dimension.
-    pub fn new(latent_dim: usize) -> Self {
+    pub(crate) fn new(latent_dim: usize) -> Self {
         Self(vec![0.0; (4 + 15 * latent_dim) * latent_dim])
     }
 
     /// Writes `F(x, u)`, `A` and `B` at `x = (z, dz)` and `u` for a stage of `step_s` in a phase into `stage`.
-    pub fn stage(
+    pub(crate) fn stage(
         &mut self,
         (dynamics, phase): (&mut dyn LatentDynamics, usize),
         x: &[f64],

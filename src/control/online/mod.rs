@@ -26,7 +26,7 @@ pub(crate) mod estimate;
 mod horizon;
 pub mod interface;
 mod lift;
-pub mod linearise;
+pub(crate) mod linearise;
 mod plan;
 pub mod problem;
 mod qp;
@@ -34,20 +34,8 @@ mod reference;
 mod settings;
 mod stage;
 mod step;
-mod structured;
+pub mod structured;
 mod trajectory;
-
-/// Numbers that the controller in C shares, which are no settings.
-pub mod shared {
-    pub use crate::online::lift::torque_deviation;
-    pub use crate::online::structured::{LINK_SOFTNESS, LINK_TOLERANCE, TOLERANCE};
-    pub use crate::online::trajectory::NO_PHASE;
-}
-
-/// The structured solver, with wide vectors where the processor has them.
-pub mod widest {
-    pub use crate::online::structured::{has_avx2, prepare, solve};
-}
 
 pub use crate::solver::{Outcome, Residuals};
 pub use command::{Command, Source, Status};
@@ -55,14 +43,13 @@ pub use control_model::{ControlModel, ControlPhase, NonlinearMaps};
 pub use controller::{Controller, Measurement};
 pub use error::ControlError;
 pub use estimate::InputGivenState;
-pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces};
+pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces, torque_deviation};
 pub use linearise::LatentDynamics;
 pub use plan::Plan;
-pub use problem::{needed_rows, to_upright};
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, SparseColumns, sparse};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
     Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput,
     MpcSettings, RowSelection, Solver,
 };
-pub use structured::MAX_STRUCTURED_DIM;
+pub use trajectory::NO_PHASE;

@@ -18,7 +18,7 @@
 //!   `w_N` the terminal weight.
 //! - `S_p` is the covariance of the training inputs in the stage's phase, projected into latent coordinates. Where the
 //!   training inputs hardly moved, the model knows least about an input's effect; a scalar weight would ignore that.
-//! - `F̄, A, B` are the Runge-Kutta step of the stage's phase and its derivatives ([`linearise`](super::linearise)) at
+//! - `F̄, A, B` are the Runge-Kutta step of the stage's phase and its derivatives (`linearise.rs`) at
 //!   `(x̄, ū)`: the reference or the last plan. `e_k` is zero if the model is the drift; otherwise `e_k = x_r,k+1 −
 //!   F(x_r,k, u_r,k)`, so that the reference is itself a trajectory and the model answers for deviations only.
 //! - Without a recorded input `u_r` is estimated from the reference's accelerations (`estimate`) or, if asked for, the

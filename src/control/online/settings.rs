@@ -57,7 +57,7 @@ pub enum RowSelection {
 pub enum Solver {
     /// clarabel, for all rows and cones.
     Clarabel = 0,
-    /// The structured [`solver`](crate::solver), for at most [`MAX_STRUCTURED_DIM`](super::MAX_STRUCTURED_DIM) latent
+    /// The structured [`solver`](crate::solver), for at most [`MAX_STRUCTURED_DIM`](super::structured::MAX_STRUCTURED_DIM) latent
     /// coordinates and with friction pyramids inside the cones.
     Riccati = 1,
 }
@@ -373,7 +373,7 @@ settings! {
 
 impl MpcSettings {
     /// Checks every number.
-    pub fn check(&self) -> Result<(), ControlError> {
+    pub(crate) fn check(&self) -> Result<(), ControlError> {
         self.check_table()?;
         let (qp, fallback) = (&self.qp, &self.fallback);
         for (name, found) in [

@@ -14,18 +14,18 @@ use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 use super::parameters::{CALF_FRONT, FOOT_RADIUS, ROLLING, THIGH_FRONT, TRUNK_FORWARD, TRUNK_UP};
 use super::*;
+use crate::recording::between;
 use crate::recording::preprocess::differences;
-use crate::recording::segment::between;
+use crate::robot::DRY_SPEED_RAD_S;
 use crate::robot::LegLinks;
-use crate::robot::input_rule::DRY_SPEED_RAD_S;
 
 pub(crate) const LEAST_MANIPULABILITY: f64 = 0.04;
 const ROLLING_SPEED_RAD_S: f64 = 0.05;
-pub const BODY_ROWS: usize = PARAMETER_DIM + 1;
-pub const JOINT_ROWS: usize = 12;
+pub(crate) const BODY_ROWS: usize = PARAMETER_DIM + 1;
+pub(crate) const JOINT_ROWS: usize = 12;
 
 /// The unknowns of a joint's equation, in the order of its rows; the left side follows.
-pub fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
+pub(crate) fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
     let mut unknowns = [DELAY; JOINT_ROWS - 1];
     let losses = [VISCOUS + kind, DRY + kind, ARMATURE + kind];
     unknowns[..losses.len()].copy_from_slice(&losses);
@@ -35,7 +35,7 @@ pub fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
 
 /// The equations of a segment; one column a sample.
 #[derive(Debug, Clone)]
-pub struct SampleEquations {
+pub(crate) struct SampleEquations {
     pub body: DMatrix<f64>, // axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2
     pub joints: DMatrix<f64>, // twelve joints one below the other, [`JOINT_ROWS`] each: torque, N m; hold in the air
     pub singular: Vec<bool>,
@@ -44,7 +44,7 @@ pub struct SampleEquations {
 
 impl SampleEquations {
     /// Torques run `delay_s` ahead of the motion; `gravity_m_s2` is used only for the weight of the links of a leg.
-    pub fn of(
+    pub(crate) fn of(
         segment: &Segment,
         motion: &Motion,
         robot: &Robot,
@@ -257,17 +257,17 @@ fn delayed(time_s: &[f64], rows: &DMatrix<f64>, delay_s: f64) -> DMatrix<f64> {
 pub(crate) type Directions = [Vector3<f64>; 5];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LegFrame {
+pub(crate) struct LegFrame {
     pub abduction: Vector3<f64>,
     pub flexion: Vector3<f64>,
     pub directions: Directions,
 }
 
 #[derive(Debug, Clone)]
-pub struct Motion {
+pub(crate) struct Motion {
     pub attitude: Vec<Matrix3<f64>>, // rotation from trunk to world at each sample
     pub trunk_rate: Vec<Vector3<f64>>, // angular velocity of the trunk in the world, rad/s
-    pub legs: Vec<[LegFrame; 4]>,
+    pub(crate) legs: Vec<[LegFrame; 4]>,
     pub coordinates: DMatrix<f64>, // accelerations of the recorded coordinates, 18 x n, per s^2
     directions: DMatrix<f64>, // of trunk axes (9 rows), then of each leg's five directions, 69 x n
 }
@@ -276,7 +276,7 @@ const TRUNK_ROWS: usize = 9;
 const LEG_ROWS: usize = 15; // rows of a leg there
 
 impl Motion {
-    pub fn of(segment: &Segment, robot: &Robot) -> Self {
+    pub(crate) fn of(segment: &Segment, robot: &Robot) -> Self {
         let links = Leg::ALL.map(|leg| robot.geometry(leg).links());
         let n = segment.len();
         let mut motion = Self {

@@ -152,7 +152,7 @@ impl State {
             return Err(IdentifyError::Mass {
                 inverse,
                 expected,
-                robot: robot.name().to_owned(),
+                robot: robot.name.to_owned(),
             });
         }
         let mass_kg = 1.0 / inverse;
@@ -200,7 +200,7 @@ impl State {
             std::array::from_fn(|joint| value(first + joint % 3))
         };
         Identification {
-            robot: robot.name().to_owned(),
+            robot: robot.name.to_owned(),
             gravity_m_s2: self.gravity_m_s2,
             mass_kg: self.mass_kg,
             delay_s: self.delay_s,

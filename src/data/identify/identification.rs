@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::*;
-use crate::files::{Place, read_toml};
+use crate::files::{Place, size::read_toml};
 use crate::robot::JOINT_NAMES;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -210,7 +210,7 @@ impl Identification {
     }
 
     /// The same of a text; `file` stands for it in messages.
-    pub fn from_toml(file: &str, text: &str) -> Result<Self, IdentifyError> {
+    pub(crate) fn from_toml(file: &str, text: &str) -> Result<Self, IdentifyError> {
         let found: Self = toml::from_str(text).map_err(|error| {
             let of_byte = |span: std::ops::Range<usize>| Place::of_byte(text, span.start);
             let place = error.span().map_or(Place::Whole, of_byte);

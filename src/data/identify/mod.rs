@@ -1,7 +1,7 @@
 //! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia. Enters: recordings and
 //! the robot's geometry. Leaves: an [`Identification`], each value with its standard error, and the file that keeps it.
 //! Read `estimate` first, the loop around the fit and the refusal of recordings that contradict each other;
-//! [`equations`] has the linear equations of every sample, `windows` their averages, `fit` the weighted least squares.
+//! `equations` has the linear equations of every sample, `windows` their averages, `fit` the weighted least squares.
 //! `docs/identify.md` has the method and measured figures.
 //!
 //! ```
@@ -18,12 +18,14 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
-pub mod equations;
-pub mod parameters;
-
+mod equations;
 mod estimate;
 mod fit;
 mod identification;
+#[cfg(test)]
+#[path = "../../../tests/identify/made.rs"]
+mod made;
+mod parameters;
 mod windows;
 
 pub use estimate::{IdentifyError, identify};
@@ -36,7 +38,7 @@ use nalgebra::DMatrix;
 
 use crate::files::{Fault, Located};
 use crate::recording::Segment;
-use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::LEG_JOINT_DIM;
 use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
 use equations::SampleEquations;
 use parameters::{

@@ -2,20 +2,20 @@
 
 use crate::robot::LegGeometry;
 
-pub const PARAMETER_DIM: usize = 23;
+pub(crate) const PARAMETER_DIM: usize = 23;
 
-pub const GRAVITY: usize = 0; // m/s^2
-pub const INVERSE_MASS: usize = 1; // 1/kg
-pub const VISCOUS: usize = 2; // first of three viscous frictions (hx, hy, kn), N m s/rad
-pub const DRY: usize = 5; // first of three dry frictions, N m
-pub const ARMATURE: usize = 8; // first of three, kg m^2
-pub const TRUNK_FORWARD: usize = 11; // first moment of the trunk along its x axis, kg m
+pub(crate) const GRAVITY: usize = 0; // m/s^2
+pub(crate) const INVERSE_MASS: usize = 1; // 1/kg
+pub(crate) const VISCOUS: usize = 2; // first of three viscous frictions (hx, hy, kn), N m s/rad
+pub(crate) const DRY: usize = 5; // first of three dry frictions, N m
+pub(crate) const ARMATURE: usize = 8; // first of three, kg m^2
+pub(crate) const TRUNK_FORWARD: usize = 11; // first moment of the trunk along its x axis, kg m
 pub(crate) const TRUNK_UP: usize = 12; // along its z axis
-pub const LEG_SIDE: usize = 13; // first moment of a leg beside its axis of abduction, kg m
-pub const THIGH: usize = 14; // first moment along its length, with the calf's mass at the knee, kg m
-pub const THIGH_SECOND: usize = 15; // second moment of the same, kg m^2
-pub const CALF: usize = 16; // first moment along its length, kg m
-pub const CALF_SECOND: usize = 17; // second moment of the same, kg m^2
+pub(crate) const LEG_SIDE: usize = 13; // first moment of a leg beside its axis of abduction, kg m
+pub(crate) const THIGH: usize = 14; // first moment along its length, with the calf's mass at the knee, kg m
+pub(crate) const THIGH_SECOND: usize = 15; // second moment of the same, kg m^2
+pub(crate) const CALF: usize = 16; // first moment along its length, kg m
+pub(crate) const CALF_SECOND: usize = 17; // second moment of the same, kg m^2
 pub(crate) const THIGH_FRONT: usize = 18; // first moment in front of its length, kg m
 pub(crate) const CALF_FRONT: usize = 19;
 pub(crate) const FOOT_RADIUS: usize = 20; // height of the foot's centre above its point of contact, m

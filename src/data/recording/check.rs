@@ -8,9 +8,9 @@ use super::error::{Outcome, RecordingFault};
 use super::preprocess::median;
 use super::reader::Column;
 use super::segment::{Recording, Segment, stretches};
-use crate::robot::joints::LEG_JOINT_DIM;
-use crate::robot::leg::{LEAST_HEIGHT, LEAST_SPAN};
+use crate::robot::LEG_JOINT_DIM;
 use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
+use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
 
 const TORQUE_FACTOR: f64 = 1.1; // torque and speed over a joint's limit that are still accepted
 const SPEED_FACTOR: f64 = 1.1;
@@ -199,7 +199,7 @@ impl Scan<'_> {
         }
         for i in 0..STATE_DIM {
             let bound = match group(i) {
-                0 => robot.joint_speed_limit_rad_s()[i] * SPEED_FACTOR,
+                0 => robot.joint_speed_limit_rad_s[i] * SPEED_FACTOR,
                 1 => BODY_SPEED_M_S,
                 _ => BODY_RATE_RAD_S,
             };

@@ -19,11 +19,9 @@ const EVEN: f64 = 0.01; // unevenness of time steps, relative, from which a segm
 
 /// A segment at even time steps, and what its own clock said.
 #[derive(Debug, Clone)]
-pub struct Timed {
+pub(crate) struct Timed {
     /// At even steps.
     pub segment: Segment,
-    /// Time that passed by the motion, over time that passed by the stamps.
-    pub elapsed_ratio: f64,
     /// What was mended.
     pub mended: Mended,
     /// Samples that stand in for lost ones: straight lines across more than five steps.
@@ -45,7 +43,7 @@ pub struct Mended {
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
-pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
+pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     let elapsed = Interval::all(segment, &agreeing_coordinates(segment));
     let elapsed_ratio = ratio(&elapsed, 0.0).unwrap_or(1.0);
     let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT && elapsed_ratio > 0.0;
@@ -67,7 +65,6 @@ pub fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     }
     Ok(Timed {
         segment,
-        elapsed_ratio,
         mended: Mended {
             elapsed_ratio: rebuilt.then_some(elapsed_ratio),
             resampled: is_uneven,

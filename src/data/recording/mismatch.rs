@@ -322,11 +322,11 @@ fn other_robot(recording: &Recording, robot: &Robot, slip: &Slip, balance: &Bala
         let share = Balance::of(recording, other).weight_share?;
         let fits = share > 0.0 && share.ln().abs() < OTHER_WEIGHT.1;
         let as_well = Slip::of(recording, other).rms_m()? < OTHER_SLIP * own_slip;
-        (fits && as_well && other.name() != robot.name()).then_some((share, other))
+        (fits && as_well && other.name != robot.name).then_some((share, other))
     });
     let off = |(share, _): &(f64, &Robot)| share.ln().abs();
     let (other_share, other) = explains.min_by(|one, two| off(one).total_cmp(&off(two)))?;
-    let (name, other) = (robot.name(), other.name());
+    let (name, other) = (robot.name, other.name);
     let words = format!(
         "the torques carry {share:.2} of the weight of a {name} and {other_share:.2} of that of a {other}, and feet on \
          the ground stay in place as well: is it a recording of a {other}?"

@@ -1,11 +1,11 @@
 //! Recorded jumps: reading, checking, phases, preprocessing, writing. Enters: CSV files of one or several jumps, plain
 //! or gzip, or logs of other programs. Leaves: segments of consecutive samples in SI units, samples as columns; spans
-//! of contact phases; reports of what is implausible, or not this robot. Read [`segment`] for the data first, then
-//! [`reader`] for the format, [`check`], [`mismatch`], [`condition()`], [`phases`] and [`preprocess`] for what is done
-//! with it, and [`mod@write`].
+//! of contact phases; reports of what is implausible, or not this robot. Read [`Segment`] for the data first, then
+//! [`Reader`] for the format, [`check`], [`mismatch`], [`condition()`], [`PhaseRule`] and [`preprocess`] for what is
+//! done with it, and [`write()`].
 //!
 //! ```
-//! use romc::recording::{self, phases::PhaseRule};
+//! use romc::recording::{self, PhaseRule};
 //! use romc::robot::{InputRule, Robot};
 //!
 //! # let folder = std::env::temp_dir().join(format!("romc-doc-{}", std::process::id()));
@@ -28,27 +28,34 @@
 //! ```
 
 pub mod check;
-pub mod clock;
-pub mod files;
-pub mod foreign;
 pub mod mismatch;
-pub mod phases;
 pub mod preprocess;
-pub mod reader;
-pub mod segment;
-pub mod write;
 
+pub(crate) mod clock;
+#[cfg(test)]
+#[path = "../../../tests/recording/clock.rs"]
+mod clock_tests;
 mod error;
+mod files;
+mod foreign;
 mod lines;
+mod phases;
+mod reader;
+mod segment;
+mod write;
 
-pub use self::write::{WriteOptions, write, write_as, write_mcap};
+pub use self::write::{Notation, WriteOptions, write, write_as, write_mcap, write_to};
 pub use clock::Mended;
 pub use error::{RecordingError, RecordingFault};
 pub use files::{
     Accelerations, ConditionOptions, ImplausibleSamples, RecordingFile, RecordingSet, SmoothedRows,
-    condition,
+    as_recorded, condition,
 };
-pub use foreign::ColumnMap;
-pub use phases::{PhaseRule, PhaseSpan, Stance};
-pub use reader::{Clocks, Reader, Reading, ReadingNotes, read, read_from_bytes};
-pub use segment::{Recording, Segment, stretches};
+pub use foreign::{
+    guess::{Guess, guess},
+    map::ColumnMap,
+    mcap_write::JOINT_TOPIC,
+};
+pub use phases::{CHATTER_SAMPLES, PhasePattern, PhaseRule, PhaseSpan, Stance};
+pub use reader::{Clocks, Column, Reader, Reading, ReadingNotes, read, read_from_bytes};
+pub use segment::{Recording, Segment, between, stretches};

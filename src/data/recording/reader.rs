@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use super::clock::{Mended, timed};
 use super::error::{Outcome, RecordingError, listed, text, unexpected};
 use super::foreign::guess::guess_of;
-use super::foreign::{ColumnMap, TextFormat, assemble, is_mcap, read_lines, read_mcap, read_texts};
+use super::foreign::map::ColumnMap;
+use super::foreign::{TextFormat, assemble, is_mcap, read_lines, read_mcap, read_texts};
 use super::lines::Lines;
 use super::segment::{DERIVED_DDX, Recording, Segment, divided};
 use crate::robot::{BODY_DIM, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, Robot, STATE_DIM};
@@ -144,7 +145,7 @@ fn by_guess(path: &Path, robot: &Robot) -> Outcome<Reading> {
         });
         let topics = topics.collect::<Vec<_>>().join("; ");
         let found = format!("no {} among {topics}", guess.missing.join(", "));
-        let own = &robot.joint_names()[0];
+        let own = &robot.joint_names[0];
         let names = format!("joints named as fr.hx, FR_hip_joint, LF_HAA or {own}");
         let expected = format!("topics of the robot: {names}{TO_COMPLETE}");
         return Err(unexpected(found, expected).of(path));

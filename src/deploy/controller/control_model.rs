@@ -86,16 +86,16 @@ fn robot_text(robot: &Robot) -> String {
         .into();
     let hips = Leg::ALL.map(|leg| <[f64; 3]>::from(robot.hip_position(leg)));
     let fields = [
-        ("name", format!("{:?}", robot.name())),
+        ("name", format!("{:?}", robot.name)),
         ("mass_kg", format!("{:?}", robot.mass_kg())),
         ("legs", format!("[\n{}    ]", legs.concat())),
         ("hip_position_m", format!("{hips:?}")),
-        ("joint_names", format!("{:?}", robot.joint_names())),
+        ("joint_names", format!("{:?}", robot.joint_names)),
         ("torque_limit_nm", format!("{:?}", robot.torque_limit_nm())),
         ("joint_limit_rad", format!("{:?}", robot.joint_limit_rad())),
         (
             "joint_speed_limit_rad_s",
-            format!("{:?}", robot.joint_speed_limit_rad_s()),
+            format!("{:?}", &robot.joint_speed_limit_rad_s),
         ),
     ];
     let fields = fields.map(|(name, value)| format!("    {name}: {value},\n"));

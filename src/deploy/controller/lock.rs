@@ -81,7 +81,7 @@ pub(crate) const LICENCES: [(&str, &str); 2] = [
 ];
 
 /// The sources below the generated crate, each with a first line that says what it is.
-pub fn files(provenance: &str) -> impl Iterator<Item = (String, String)> {
+pub(crate) fn files(provenance: &str) -> impl Iterator<Item = (String, String)> {
     let below = |folder: &str, path: &str| format!("{folder}{}", path.replace("lib.rs", "mod.rs"));
     let control = romc_control::sources::SOURCES
         .iter()

@@ -54,12 +54,12 @@ impl<'a> Facts<'a> {
             model: &entries.name,
             name,
             upper: name.to_ascii_uppercase(),
-            robot: robot.name(),
+            robot: robot.name,
             latent_dim: entries.latent_dim,
             state_dim: STATE_DIM,
             state_names: Robot::state_names().join(" "),
             input_names: Robot::input_names().join(" "),
-            joint_names: robot.joint_names().join(" "),
+            joint_names: robot.joint_names.join(" "),
             input_is: input_in_words(plant.input_rule(), name),
             codes: (texts.iter())
                 .map(|(code, text)| (constant(text), *code))
@@ -91,7 +91,7 @@ templates! {
 }
 
 /// The crate of a model's controller; `provenance` is the first line of its files, `plan` the jump of its C example.
-pub fn emit(
+pub(crate) fn emit(
     equations: &Equations<'_>,
     form: Form,
     provenance: &str,

@@ -61,7 +61,7 @@ templates! {
 }
 
 /// The files of a model's controller in C; `provenance` is the text of each file's first line.
-pub fn emit(
+pub(crate) fn emit(
     equations: &Equations<'_>,
     options: &EmitOptions,
     provenance: &str,

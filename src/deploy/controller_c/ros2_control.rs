@@ -5,8 +5,8 @@ use std::ops::Deref;
 
 use super::source::nested;
 use crate::mpc::STEP_SLACK;
+use crate::recording::Column;
 use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
-use crate::recording::reader::Column;
 use crate::robot::{FOOT_DIM, JOINT_DIM, STATE_DIM};
 
 struct Facts<'a> {

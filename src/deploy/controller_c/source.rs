@@ -11,9 +11,10 @@ use crate::codegen::Precision;
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
 use crate::mpc::interface::Accepts;
 use crate::mpc::problem::{Row, pairs};
-use crate::mpc::shared::{LINK_SOFTNESS, LINK_TOLERANCE, NO_PHASE, TOLERANCE, torque_deviation};
+use crate::mpc::structured::{LINK_SOFTNESS, LINK_TOLERANCE, TOLERANCE};
 use crate::mpc::{
-    ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings,
+    ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings, NO_PHASE,
+    torque_deviation,
 };
 use crate::robot::{GRAVITY_M_S2, Leg, LegShape, WrenchFrame};
 

@@ -16,7 +16,6 @@ mod numbers;
 mod reader;
 mod sections;
 mod token;
-mod variables;
+pub(super) mod variables;
 
 pub(super) use sections::read;
-pub use variables::{NameError, SymbolNames};

@@ -4,9 +4,10 @@
 use nalgebra::{Rotation3, Vector2};
 
 use super::*;
-use crate::recording::segment::between;
+use crate::recording::between;
 use crate::robot::{InputRule, WrenchFrame};
-use crate::sim::{IntegrationOptions, OdeSystem, integrate, integrate_stretches, restart_windows};
+use crate::sim::integrate::{IntegrationOptions, OdeSystem, integrate};
+use crate::sim::{integrate_stretches, restart_windows};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aslip {
@@ -18,7 +19,7 @@ pub struct Aslip {
 }
 
 impl Aslip {
-    pub const PUBLISHED: Self = Self {
+    pub(crate) const PUBLISHED: Self = Self {
         mass_kg: 12.01,
         stiffness_n_m: 250.0,
         rest_length_m: 0.32,
@@ -46,7 +47,7 @@ impl Aslip {
     }
 
     /// Rolls the pendulum out, driven by the same forces as a learned model of this rule, in the world's axes.
-    pub fn rollout(
+    pub(crate) fn rollout(
         &self,
         rule: &InputRule,
         segment: &Segment,
@@ -129,7 +130,7 @@ pub struct AslipSums {
 }
 
 impl AslipSums {
-    pub fn add(&mut self, segment: &Segment, rollout: &[Option<Vector2<f64>>]) {
+    pub(crate) fn add(&mut self, segment: &Segment, rollout: &[Option<Vector2<f64>>]) {
         for (sample, position) in rollout.iter().enumerate() {
             if let Some(position) = position {
                 self.x.add(segment.x[(BODY_X, sample)], position.x);
@@ -201,7 +202,10 @@ pub struct Baseline {
 }
 
 impl Baseline {
-    pub fn all(rule: &InputRule, segments: &[&Segment]) -> Result<Vec<Self>, RecordingError> {
+    pub(crate) fn all(
+        rule: &InputRule,
+        segments: &[&Segment],
+    ) -> Result<Vec<Self>, RecordingError> {
         let published = ("ASLIP, published constants", Aslip::PUBLISHED);
         let fitted = fit_aslip(rule, segments)?.map(|fitted| ("ASLIP, fitted constants", fitted));
         let templates = [published].into_iter().chain(fitted);
@@ -215,7 +219,7 @@ impl Baseline {
     }
 
     /// Adds the residuals over one segment; the rollout over the whole of it is returned.
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         rule: &InputRule,
         segment: &Segment,

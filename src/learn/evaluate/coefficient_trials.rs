@@ -175,7 +175,7 @@ fn samples(model: &ReducedModel, segments: &[&Segment]) -> Result<Vec<PhaseSampl
     let mut place = 0;
     for segment in segments {
         let latent = LatentSegment::encode(model, segment)?;
-        for sample in 0..latent.len() {
+        for sample in 0..latent.time_s.len() {
             place += 1;
             if place % every == 0 {
                 let (variables, ddz) = &mut columns[latent.phase[sample]];

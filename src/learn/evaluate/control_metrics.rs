@@ -5,8 +5,8 @@ use super::prediction::{prediction_error, recorded_stages, uninformed};
 use super::verdict::failure;
 use super::*;
 use crate::mpc::problem::has_links_or_cones;
-use crate::mpc::{MAX_STRUCTURED_DIM, MpcSettings, Solver, Status};
-use crate::robot::input_rule::rotation;
+use crate::mpc::{MpcSettings, Solver, Status, structured::MAX_STRUCTURED_DIM};
+use crate::robot::rotation;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct StepTimes {

@@ -11,7 +11,7 @@ pub struct Fit {
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FitSums {
-    count: usize,
+    pub(super) count: usize,
     residual_square: f64,
     mean: f64,
     deviation_square: f64,
@@ -28,7 +28,7 @@ impl FitSums {
     }
 
     /// Adds the pairs of `other`; differences between the means of the two do not count as explained.
-    pub fn merge_keeping_means(&mut self, other: &Self) {
+    pub(crate) fn merge_keeping_means(&mut self, other: &Self) {
         self.count += other.count;
         self.residual_square += other.residual_square;
         self.deviation_square += other.deviation_square;
@@ -38,10 +38,6 @@ impl FitSums {
         let mut total = Self::default();
         (parts.iter()).for_each(|part| total.merge_keeping_means(part));
         total
-    }
-
-    pub fn count(&self) -> usize {
-        self.count
     }
 
     pub fn fit(&self) -> Option<Fit> {
@@ -174,7 +170,7 @@ impl PointwiseSums {
         let factors = model.state_factors()?;
         let mut accelerations =
             vec![vec![FitSums::default(); model.latent_dim()]; self.acceleration.len()];
-        for sample in 0..latent.len() {
+        for sample in 0..latent.time_s.len() {
             let column = |matrix: &nalgebra::DMatrix<f64>| matrix.column(sample).into_owned();
             let (x, z) = (column(&segment.x), column(&latent.z));
             let scaled = x.component_mul(&factors);
@@ -224,7 +220,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    pub fn add(
+    pub(crate) fn add(
         &mut self,
         feet: ContactFlags,
         predicted: &[f64; JOINT_DIM],
@@ -253,7 +249,7 @@ impl Comparison {
         FitSums::jointly(&self.all).r2()
     }
 
-    pub fn rms(&self) -> Option<f64> {
+    pub(crate) fn rms(&self) -> Option<f64> {
         FitSums::jointly(&self.all).fit().map(|fit| fit.rms)
     }
 }

@@ -12,6 +12,9 @@ mod assessment;
 mod coefficient_trials;
 mod control_metrics;
 mod coordinates;
+#[cfg(test)]
+#[path = "../../../tests/evaluate/figures.rs"]
+mod figures;
 mod invariance;
 mod prediction;
 mod round_trip;

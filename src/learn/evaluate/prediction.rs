@@ -188,7 +188,7 @@ fn linearise_phase(
     let d = model.latent_dim();
     let (mut mean, mut samples) = (vec![0.0; 3 * d], 0);
     for segment in segments {
-        for sample in (0..segment.len()).filter(|&k| segment.phase[k] == phase) {
+        for sample in (0..segment.time_s.len()).filter(|&k| segment.phase[k] == phase) {
             let values = [&segment.z, &segment.dz, &segment.u_lat];
             for (index, total) in mean.iter_mut().enumerate() {
                 *total += values[index / d][(index % d, sample)];

@@ -20,7 +20,7 @@ pub struct Margins {
 }
 
 /// Samples at equal distances, as close to `sample_time_s` apart as a whole number of steps allows.
-pub fn motion(task: &Task<'_>, y: &[f64], sample_time_s: f64) -> Result<(Segment, Margins)> {
+pub(crate) fn motion(task: &Task<'_>, y: &[f64], sample_time_s: f64) -> Result<(Segment, Margins)> {
     let durations = (0..task.seed.parts.len()).map(|part| task.duration_s(part, y));
     let ends = durations.scan(0.0, |end, duration| {
         *end += duration;

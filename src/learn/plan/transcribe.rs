@@ -32,7 +32,7 @@ const FAR_JOINT_RAD: f64 = 0.3;
 
 /// Bounds whose violation is a variable of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Bound {
+pub(crate) enum Bound {
     Torque,
     Joint,
     Friction, // violation in 100 N

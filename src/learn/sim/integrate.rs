@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// A system of ordinary differential equations `dy/dt = f(t, y)`; only asked at finite states.
-pub trait OdeSystem {
+pub(crate) trait OdeSystem {
     fn rate(&mut self, time_s: f64, y: &[f64], dy: &mut [f64]);
 
     /// Writes `df/dy`, `state_dim x state_dim`.
@@ -16,7 +16,7 @@ pub trait OdeSystem {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct IntegrationOptions {
+pub(crate) struct IntegrationOptions {
     pub relative_tolerance: f64,
     pub absolute_tolerance: f64,
     /// A state component beyond this magnitude counts as divergence.
@@ -37,7 +37,7 @@ impl Default for IntegrationOptions {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Integration {
+pub(crate) struct Integration {
     /// `state_dim x reached`: a column for each requested time that was reached.
     pub states: DMatrix<f64>,
     pub diverged_at_s: Option<f64>,
@@ -45,13 +45,13 @@ pub struct Integration {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum IntegrationMethod {
+pub(crate) enum IntegrationMethod {
     Explicit,
     Implicit,
 }
 
 /// States at `times` from `initial` at `times[0]`; a step below 1e-13 of the whole time is a blow-up: divergence.
-pub fn integrate(
+pub(crate) fn integrate(
     system: &mut impl OdeSystem,
     initial: &[f64],
     times: &[f64],

@@ -3,10 +3,15 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
-mod integrate;
+pub(crate) mod integrate;
+#[cfg(test)]
+#[path = "../../../tests/evaluate/integrate.rs"]
+mod integrate_tests;
 mod rollout;
+#[cfg(test)]
+#[path = "../../../tests/evaluate/rollout.rs"]
+mod rollout_tests;
 
-pub use integrate::{Integration, IntegrationMethod, IntegrationOptions, OdeSystem, integrate};
 pub use rollout::{
     LatentSegment, Restart, Rollout, SimError, Window, rollout, with_input_statistics,
 };

@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use super::integrate::{Integration, IntegrationOptions, OdeSystem, integrate};
 use crate::lower::CompiledModel;
 use crate::model::{InputStatistics, ModelError, ReducedModel};
-use crate::recording::phases::{CHATTER_SAMPLES, PhasePattern};
-use crate::recording::segment::{between, stretches};
+use crate::recording::{CHATTER_SAMPLES, PhasePattern};
 use crate::recording::{PhaseRule, RecordingError, Segment};
+use crate::recording::{between, stretches};
 
 /// When a rollout starts again from the recorded latent state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -247,16 +247,8 @@ impl LatentSegment {
         })
     }
 
-    pub fn len(&self) -> usize {
-        self.time_s.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.time_s.is_empty()
-    }
-
     /// Latent input at a time between samples, interpolated linearly; held outside the record.
-    pub fn input_at(&self, time_s: f64, u_lat: &mut [f64]) {
+    pub(crate) fn input_at(&self, time_s: f64, u_lat: &mut [f64]) {
         let (left, right, share) = between(&self.time_s, time_s);
         for (row, value) in u_lat.iter_mut().enumerate() {
             let (from, to) = (self.u_lat[(row, left)], self.u_lat[(row, right)]);

@@ -4,7 +4,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::ir::interpret::{LIMIT, reduced_sin_cos, sin_cos};
+use crate::ir::{LIMIT, reduced_sin_cos, sin_cos};
 use crate::model::{LatentVariable, Library, Step, Tape};
 use crate::symbolic::SymbolId;
 

@@ -202,7 +202,7 @@ pub struct SeedReport {
     pub score: f64,
     /// Losses of the last epoch of the first step of a joint training.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub losses: Option<Losses>,
+    pub(crate) losses: Option<Losses>,
     pub active: usize,
     /// For every latent coordinate the robot coordinate that moves it most on the training jumps.
     pub dominant: Vec<String>,

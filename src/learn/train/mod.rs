@@ -32,7 +32,10 @@ mod weak_form;
 pub use closed_form::closed_form;
 pub use dataset::{MIN_SAMPLES, ScaleOptions, Split};
 pub use error::TrainError;
-pub use joint::{Integrator, Unroll, joint};
+pub use joint::{
+    run::joint,
+    unroll::{Integrator, Unroll},
+};
 pub use metrics::{PartScore, PhaseTerms, SeedReport, SetMetrics, TrainReport, Trained, assess};
 pub use options::{
     Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions,

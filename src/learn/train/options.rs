@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::closed_form::closed_form;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
-use super::joint::{Integrator, LossWeights, Schedule, Unroll, joint};
+use super::joint::{LossWeights, Schedule, run::joint, unroll::Integrator, unroll::Unroll};
 use super::metrics::Trained;
 use super::progress::Monitor;
 use super::task::{Origin, Recordings};
@@ -15,8 +15,8 @@ use crate::limits::table;
 use crate::model::{
     Activation, Library, LibraryChoice, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary, check_name,
 };
+use crate::recording::CHATTER_SAMPLES;
 use crate::recording::PhaseRule;
-use crate::recording::phases::CHATTER_SAMPLES;
 use crate::recording::preprocess::BATCH_ROWS;
 use crate::robot::{
     Actuators, BODY_X, BODY_Z, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame,

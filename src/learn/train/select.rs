@@ -45,7 +45,7 @@ type RankedTerm = (f64, usize, usize, usize); // share of the energy; phase, row
 pub struct Choice {
     pub window: usize,
     pub ridge: f64,
-    pub pruning: Pruning,
+    pub(crate) pruning: Pruning,
     /// Root mean square error, in standard deviations, of predictions over 0.1 s plus 0.2 times that of whole jumps.
     pub score: f64,
     pub active: usize,

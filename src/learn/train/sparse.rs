@@ -27,7 +27,7 @@ pub(super) struct Regression {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Pruning {
+pub(crate) enum Pruning {
     /// Drop every term whose contribution `|xi| rms(term) / rms(ddz)` is below this, solve again, until none is.
     Threshold(f64),
     /// Drop the term that explains least, one at a time, while the share of the energy left unexplained stays within

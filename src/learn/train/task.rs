@@ -151,7 +151,7 @@ impl Task<'_> {
         provenance: Map<String, Value>,
     ) -> Result<ReducedModel, TrainError> {
         let (options, robot, training) = (self.options, self.robot, &self.training);
-        let (d, name) = (options.latent_dim, robot.name());
+        let (d, name) = (options.latent_dim, robot.name);
         let given_state = self.inputs_given_states(&fitted);
         let [state, input] = CoordinateNames::of_robot();
         let mut builder = ReducedModel::builder(options.name.clone(), self.library.clone())

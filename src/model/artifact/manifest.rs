@@ -168,8 +168,8 @@ impl<'de> Deserialize<'de> for RobotValue {
 
 impl RobotValue {
     fn of(robot: &Robot) -> Self {
-        match robot_file::by_name(robot.name()) {
-            Ok(_) => Self::Name(robot.name().to_owned()),
+        match robot_file::by_name(robot.name) {
+            Ok(_) => Self::Name(robot.name.to_owned()),
             Err(_) => Self::Entry(RobotEntry::of(robot)),
         }
     }

@@ -7,8 +7,6 @@ pub mod table;
 use std::fmt;
 use std::str::FromStr;
 
-pub use table::of_training;
-
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Name of the setting: that of its flag without dashes.

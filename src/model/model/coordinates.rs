@@ -51,7 +51,7 @@ impl CoordinateNames {
             }
             if let Some((expected, robot)) = robot {
                 let expected = &expected[index];
-                let of_robot = format!("{expected:?} as on robot {}", robot.name());
+                let of_robot = format!("{expected:?} as on robot {}", robot.name);
                 check(name == expected, &place, || format!("{name:?}"), of_robot)?;
             }
         }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::legs::{Part, Places, build};
 use super::read::{RobotFileError, keep};
 use crate::files::{Located, Place};
-use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::LEG_JOINT_DIM;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, LegGeometry, Robot};
 
 pub(super) const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI; // of a joint or frame: two turns either way
@@ -26,7 +26,7 @@ pub struct RobotReading {
 
 /// How a robot that has the name of one of romc's own differs from it; nothing, if it does not.
 pub(super) fn namesake(robot: &Robot) -> Option<String> {
-    let known = super::by_name(robot.name()).ok()?;
+    let known = super::by_name(robot.name).ok()?;
     (known != robot).then(|| differences(robot, known))
 }
 
@@ -96,7 +96,7 @@ fn differences(robot: &Robot, other: &Robot) -> String {
 }
 
 fn doubts(robot: &Robot) -> Vec<String> {
-    let (torque_nm, speed_rad_s) = (robot.torque_limit_nm(), robot.joint_speed_limit_rad_s());
+    let (torque_nm, speed_rad_s) = (robot.torque_limit_nm(), &robot.joint_speed_limit_rad_s);
     let (limits, mass_kg) = (robot.joint_limit_rad(), robot.mass_kg());
     let share = |joint: usize| {
         let [thigh, calf] = robot.geometry(Leg::ALL[joint / LEG_JOINT_DIM]).lengths_m;
@@ -113,7 +113,7 @@ fn doubts(robot: &Robot) -> Vec<String> {
         };
         Some(format!(
             "joint `{}`{more}: {}",
-            robot.joint_names()[first],
+            robot.joint_names[first],
             what(first)
         ))
     };
@@ -264,7 +264,7 @@ impl RobotEntry {
                 let joint = axes.len() * leg.index() + index;
                 let (low, high) = robot.joint_limit_rad()[joint];
                 JointEntry {
-                    name: robot.joint_names()[joint].to_owned(),
+                    name: robot.joint_names[joint].to_owned(),
                     at: match index {
                         0 => robot.hip_position(leg).into(),
                         _ => links[index - 1],
@@ -275,7 +275,7 @@ impl RobotEntry {
                     limits_rad: Some([low, high]),
                     limits_deg: None,
                     torque_nm: robot.torque_limit_nm()[joint],
-                    speed_rad_s: robot.joint_speed_limit_rad_s()[joint],
+                    speed_rad_s: robot.joint_speed_limit_rad_s[joint],
                 }
             });
             LegEntry {
@@ -284,7 +284,7 @@ impl RobotEntry {
             }
         });
         Self {
-            name: robot.name().to_owned(),
+            name: robot.name.to_owned(),
             mass_kg: robot.mass_kg(),
             leg: leg.to_vec(),
         }

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::identity::{JointEntry, LARGEST_ANGLE_RAD, LegEntry, RobotEntry, namesake};
 use super::read::{RobotFileError, from_toml_text, keep, text_of, word};
 use crate::files::is_invisible;
-use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::LEG_JOINT_DIM;
 use crate::robot::{
     Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, Robot,
 };
@@ -377,7 +377,7 @@ pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, R
             expected,
         ));
     }
-    match (of, robot.map(Robot::name)) {
+    match (of, robot.map(|robot| robot.name)) {
         (Some(found), Some(expected)) if found != expected => {
             let expected = format!("{expected}, whose recordings these are, or no such line");
             Err(RobotFileError::at(&file, "robot", found, expected))

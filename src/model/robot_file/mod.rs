@@ -12,7 +12,7 @@
 //! let own = robot_file::find("go1")?;
 //! let text = robot_file::to_toml(own).replace("\"go1\"", "\"lighter\"").replace("12.01", "9.5");
 //! let lighter = robot_file::from_text("lighter.toml", &text, &Default::default())?.robot;
-//! assert_eq!((lighter.name(), lighter.mass_kg()), ("lighter", 9.5));
+//! assert_eq!((lighter.name, lighter.mass_kg()), ("lighter", 9.5));
 //! let q = [0.1, 0.7, -1.4];
 //! assert_eq!(lighter.foot_position(Leg::RearLeft, &q), own.foot_position(Leg::RearLeft, &q));
 //! # Ok::<(), romc::robot_file::RobotFileError>(())

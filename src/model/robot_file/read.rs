@@ -9,8 +9,8 @@ use serde::de::DeserializeOwned;
 use super::identity::{RobotEntry, RobotReading, identified};
 use super::legs::{self, Places};
 use super::urdf;
-use crate::files::size::{Format, read_text_capped};
-use crate::files::{Fault, Located, Place, read_toml};
+use crate::files::size::{Format, read_text_capped, read_toml};
+use crate::files::{Fault, Located, Place};
 use crate::robot::{Robot, RobotError};
 
 /// A fault of a robot's file and its place; without a file, of a name or an option.

@@ -4,7 +4,7 @@ use super::Sticks;
 
 /// The meaning of a line, which selects its colour and dashes in every figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
+pub(crate) enum Role {
     Recorded,
     Full,
     Restarted,

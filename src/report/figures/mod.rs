@@ -9,7 +9,7 @@ mod spelling;
 mod sticks;
 
 pub(crate) use draw::{range, subscript};
-pub use figure::Role;
+pub(crate) use figure::Role;
 pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Series};
 pub(crate) use spelling::panel_svg;
 pub(crate) use sticks::{Film, Motion, film, film_strip, floor_m};

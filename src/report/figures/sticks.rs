@@ -6,7 +6,7 @@ use nalgebra::{DVector, Vector3};
 
 use super::*;
 use crate::recording::Segment;
-use crate::robot::input_rule::rotation;
+use crate::robot::rotation;
 use crate::robot::{FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 const TRUNK_HALF_HEIGHT_M: f64 = 0.05;

@@ -15,7 +15,7 @@ use crate::typeset::decimal::RoundingReport;
 use crate::typeset::words::{self, Spelling};
 use crate::typeset::{
     Decimal, Emitted, EquationSystem, Form, NumberStyle, PrintOptions, RobotTypeset, Rounding,
-    Typeset, TypesetError, rendered,
+    Typeset, TypesetError, words::rendered,
 };
 
 /// The LaTeX files of a model; NAME is its identifier:

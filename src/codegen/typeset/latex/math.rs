@@ -248,7 +248,7 @@ fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions
 
 /// Text from outside, printed so that TeX shows its characters and runs none of them: in one line, with commands for
 /// special characters and code points for those that pdfTeX does not know.
-pub fn tex_text(text: &str) -> String {
+pub(crate) fn tex_text(text: &str) -> String {
     let mut tex = String::new();
     let mut previous = ' ';
     for character in text.chars() {

@@ -1,6 +1,6 @@
 //! Equations for papers: [`Equations`](crate::equations::Equations) enter, LaTeX files leave.
 //!
-//! Read [`emit`] first: it names the files. Names from a model file pass through [`tex_text`] and nothing else.
+//! Read [`emit`] first: it names the files. Names from a model file pass through `tex_text` and nothing else.
 //!
 //! ```
 //! use nalgebra::DMatrix;
@@ -21,9 +21,9 @@
 //! `\input{flight_only_flight}` for one, and `\eqref{eq:flight-only:flight}` to refer to it.
 
 mod document;
-mod math;
+pub(crate) mod math;
 mod table;
 
 pub use document::emit;
+pub use math::tex_cases;
 pub(crate) use math::{tex, tex_symbol, tex_unit};
-pub use math::{tex_cases, tex_text};

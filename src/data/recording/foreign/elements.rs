@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Matrix3};
 use super::map::Frame;
 use crate::recording::reader::Column;
 use crate::recording::segment::Rows;
-use crate::robot::input_rule::rotation;
+use crate::robot::rotation;
 use crate::robot::{JOINT_DIM as BODY, JOINT_NAMES};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -8,7 +8,7 @@ use mcap::{WriteOptions, Writer};
 use nalgebra::{DMatrix, UnitQuaternion, Vector3};
 
 use crate::recording::segment::Segment;
-use crate::robot::input_rule::rotation;
+use crate::robot::rotation;
 use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, Robot};
 
 const JOINT_STATE: &str = "std_msgs/Header header\n
@@ -42,7 +42,7 @@ const FEET_TOPIC: &str = "/foot_contacts"; // contact, 1 or 0 for each foot
 const INPUT_TOPIC: &str = "/inputs"; // inputs of a model
 
 /// Writes a segment and, if given, its inputs (18 x samples) as messages; chunks are not packed.
-pub fn write_mcap(
+pub(crate) fn write_mcap(
     destination: impl Write + Seek,
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,

@@ -5,10 +5,10 @@
 
 mod assemble;
 mod elements;
-pub mod guess;
-mod map;
+pub(super) mod guess;
+pub(super) mod map;
 mod mcap;
-mod mcap_write;
+pub(super) mod mcap_write;
 mod message;
 mod signal;
 mod text;
@@ -16,9 +16,7 @@ mod topics;
 
 pub(super) use assemble::assemble;
 pub(super) use elements::angles_of_quaternions;
-pub use map::ColumnMap;
 pub(super) use map::TextFormat;
 pub(super) use mcap::{is_mcap, read_mcap};
-pub use mcap_write::JOINT_TOPIC;
 pub(super) use mcap_write::write_mcap;
 pub(super) use text::{read_lines, read_texts};

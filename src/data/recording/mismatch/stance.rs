@@ -11,7 +11,7 @@ use crate::recording::foreign::angles_of_quaternions;
 use crate::recording::preprocess::{differences, median};
 use crate::recording::segment::stretches;
 use crate::recording::{Recording, Segment};
-use crate::robot::input_rule::rotation;
+use crate::robot::rotation;
 use crate::robot::{BODY_NAMES, BODY_Z, FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 type State = [f64; STATE_DIM];

@@ -25,7 +25,7 @@ pub struct LossWeights {
 
 /// Values of the terms, unweighted; errors are mean squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Losses {
+pub(crate) struct Losses {
     pub decoder: f64, // x - x_dec (16), with coordinate weights if there are any
     pub ddz: f64,     // ddz - ddz_pred (17)
     pub ddx: f64,     // ddx - ddx_pred (18)

@@ -8,10 +8,8 @@ mod descent;
 mod loss;
 mod network;
 mod parameters;
-mod run;
-mod unroll;
+pub(super) mod run;
+pub(super) mod unroll;
 
 pub(super) use descent::Schedule;
 pub(super) use loss::{LossWeights, Losses};
-pub use run::joint;
-pub use unroll::{Integrator, Unroll};

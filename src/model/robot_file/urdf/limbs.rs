@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::tree::{Body, Tree};
 use crate::files::shell_word;
 use crate::robot::FOOT_DIM;
-use crate::robot::joints::LEG_JOINT_DIM;
+use crate::robot::LEG_JOINT_DIM;
 use crate::robot_file::RobotFileError;
 
 const SAME_PLACE_M: f64 = 1e-12; // largest distance of two feet that are one
@@ -27,7 +27,10 @@ type Chain = (Vec<usize>, bool); // moving joints below a body while they are a 
 
 impl Legs {
     /// Finds legs, or takes those that end at these feet.
-    pub fn find(tree: &Tree<'_>, feet: &[(String, Vector3<f64>)]) -> Result<Self, RobotFileError> {
+    pub(crate) fn find(
+        tree: &Tree<'_>,
+        feet: &[(String, Vector3<f64>)],
+    ) -> Result<Self, RobotFileError> {
         let top = top(tree);
         let body = tree.body(top);
         let legs = match feet {

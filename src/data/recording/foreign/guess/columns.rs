@@ -189,7 +189,7 @@ fn complete(logs: &[Log], robot: &Robot) -> Vec<Group> {
 
 fn of_robot(name: &str, robot: &Robot) -> Option<Reading> {
     let low = name.to_lowercase();
-    let names = robot.joint_names().iter().map(|joint| joint.to_lowercase());
+    let names = robot.joint_names.iter().map(|joint| joint.to_lowercase());
     let found = (names.enumerate()).filter(|(_, joint)| !joint.is_empty() && low.contains(joint));
     let (element, joint) = found.max_by_key(|(_, joint)| joint.len())?; // `joint_11` contains `joint_1`
     let (before, after) = low.split_once(&joint)?;

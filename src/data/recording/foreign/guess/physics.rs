@@ -10,7 +10,7 @@ use crate::recording::mismatch::{foot_place, hip_torque, median_place, stances};
 use crate::recording::preprocess::differences_within;
 use crate::recording::segment::{Rows, stretches};
 use crate::recording::{Recording, Segment};
-use crate::robot::input_rule::rotation;
+use crate::robot::rotation;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 const MOST: (usize, usize) = (40, 24); // most stances of a leg, and most samples of a stance, that are looked at

@@ -139,7 +139,7 @@ impl Source<'_> {
         Some(times.map(|time| factor * time).collect())
     }
 
-    pub fn columns(&self, group: &Group) -> Vec<String> {
+    pub(crate) fn columns(&self, group: &Group) -> Vec<String> {
         let log = &self.logs[group.log];
         let mut lines = Vec::new();
         if self.logs.len() > 1 {

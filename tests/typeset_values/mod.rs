@@ -1,11 +1,8 @@
 //! Printed equations mean what the model computes: the typeset tree is evaluated as a reader
 //! would and compared with the model.
 
-#[path = "typeset_values/names.rs"]
 mod names;
-#[path = "typeset_values/numbers.rs"]
 mod numbers;
-#[path = "typeset_values/texts.rs"]
 mod texts;
 
 use std::collections::BTreeMap;
@@ -15,11 +12,12 @@ use std::path::Path;
 use nalgebra::DVector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use romc::artifact;
-use romc::equations::Equations;
-use romc::model::{LatentVariable, Library, ReducedModel};
-use romc::symbolic::Function;
-use romc::typeset::{
+use romc_model::artifact;
+
+use crate::equations::Equations;
+use crate::model::{LatentVariable, Library, ReducedModel};
+use crate::symbolic::Function;
+use crate::typeset::{
     Equation, Math, RobotTypeset, Rounding, Signed, Symbol, SymbolTable, Typeset, expression,
 };
 

@@ -1,19 +1,15 @@
 //! The algebra by its public functions, and the table of identities `tests/fixtures/identities.txt`.
 
-#[path = "symbolic_identities/bounds.rs"]
 mod bounds;
-#[path = "symbolic_identities/expressions.rs"]
 mod expressions;
-#[path = "symbolic_identities/normal_form.rs"]
 mod normal_form;
-#[path = "symbolic_identities/parsing.rs"]
 mod parsing;
-#[path = "symbolic_identities/simplify.rs"]
+mod properties;
 mod simplify;
 
-use romc::symbolic::{CanonicalForms, ExprId, ExprPool, Function};
+use crate::{CanonicalForms, ExprId, ExprPool, Function};
 
-const TABLE: &str = include_str!("fixtures/identities.txt");
+const TABLE: &str = include_str!("../fixtures/identities.txt");
 
 fn parse(pool: &mut ExprPool, text: &str) -> ExprId {
     pool.parse(text, &|_| true)
