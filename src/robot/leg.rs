@@ -31,8 +31,8 @@ pub const LEAST_SPAN: f64 = 0.3;
 /// which torques are turned into forces without damping.
 pub const LEAST_HEIGHT: f64 = 0.12;
 
-/// Most that legs are turned, rad.
-const MOST_RAD: Real = 0.3;
+/// Error of pitch beyond which legs turn no further, rad.
+const MOST_TURN_RAD: Real = 0.3;
 
 /// A leg in the frame of its plane at the zero posture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -282,16 +282,18 @@ pub(crate) fn write_wrench_map(leg: &LegShape, hip: &[Real], q: &[Real], out: &m
     true
 }
 
-/// Turns the foot of a leg about the body's origin by the opposite of an error `e` of pitch (rad), to first order in the
-/// joints, `q + J^-1 (R_y(-e) - 1) (h + p(q))` with the hip `h`; a foot that cannot be moved stays.
+/// Turns the foot of a leg about the body's origin by the opposite of an error `e` of pitch (rad), because nothing holds
+/// the pitch of a body in the air and its feet would land elsewhere than planned. To first order in the joints, `q + J^-1
+/// (R_y(-e) - 1) (h + p(q))` with the hip `h`; a foot that cannot be moved stays.
 pub(crate) fn turn_leg(leg: &LegShape, hip: &[Real], error: Real, q: &mut [Real]) {
     let mut map: [[Real; 3]; 3] = [[0.0; 3]; 3];
     let mut foot: [Real; 3] = [0.0; 3];
     if !write_force_map(leg, q, false, &mut map, &mut foot) {
         return;
     }
-    let most = if error < 0.0 { -MOST_RAD } else { MOST_RAD };
-    let turn = if error.abs() > MOST_RAD { most } else { error };
+    let most = MOST_TURN_RAD;
+    let limit = if error < 0.0 { -most } else { most };
+    let turn = if error.abs() > most { limit } else { error };
     let sine = turn.sin();
     let shrunk = turn.cos() - 1.0;
     let x = hip[0] + foot[0];

@@ -34,15 +34,8 @@ impl Robot {
     /// The matrix `-J^-T` that takes a leg's torques (N m) to its force on the body (N).
     pub fn foot_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
-        let geometry = self.geometry(leg);
-        let singular = || RobotError::SingularLeg {
-            robot: self.name.to_owned(),
-            leg,
-            joints_rad: *q,
-            determinant: geometry.manipulability(q),
-            bound: SINGULAR_BOUND,
-        };
-        geometry.force_map(q, true).ok_or_else(singular)
+        let map = self.geometry(leg).force_map(q, true);
+        map.ok_or_else(|| self.singular(leg, q))
     }
 
     /// As [`Robot::foot_force_map`], for any posture. Near a singularity (a stretched knee, or a foot at the height of
@@ -51,8 +44,8 @@ impl Robot {
     /// [`LEAST_HEIGHT`](super::leg::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm. Elsewhere it is exact.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
-        let damped = self.geometry(leg).force_map(q, false);
-        damped.map_or_else(|| self.foot_force_map(leg, q), Ok)
+        let map = self.geometry(leg).force_map(q, false);
+        map.ok_or_else(|| self.singular(leg, q))
     }
 
     /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5 to 7, 22): sums of `F_k` and of `x_k x
@@ -82,7 +75,7 @@ impl Robot {
             self.require_finite(leg, "torque", &tau)?;
             let shape = &self.geometry(leg).shape;
             if !add_wrench(shape, &self.arm_from(frame, leg), &q, &tau, &mut wrench) {
-                self.foot_force_map(leg, &q)?; // says why the leg has none
+                return Err(self.singular(leg, &q));
             }
         }
         Ok(wrench)
@@ -101,7 +94,7 @@ impl Robot {
             self.require_finite(leg, "joint angle", &q)?;
             let (shape, columns) = (&self.geometry(leg).shape, &mut map[3 * leg.index()..]);
             if !write_wrench_map(shape, &self.arm_from(frame, leg), &q, columns) {
-                self.foot_force_map(leg, &q)?;
+                return Err(self.singular(leg, &q));
             }
         }
         Ok(map)
@@ -121,6 +114,16 @@ impl Robot {
         for leg in Leg::ALL {
             let (shape, hip) = (&self.geometry(leg).shape, &self.hip_position_m[leg.index()]);
             turn_leg(shape, hip, turn_rad, &mut joints_rad[3 * leg.index()..]);
+        }
+    }
+
+    fn singular(&self, leg: Leg, q: &[f64; 3]) -> RobotError {
+        RobotError::SingularLeg {
+            robot: self.name.to_owned(),
+            leg,
+            joints_rad: *q,
+            determinant: self.geometry(leg).manipulability(q),
+            bound: SINGULAR_BOUND,
         }
     }
 

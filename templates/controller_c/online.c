@@ -1,5 +1,5 @@
-/* @generated from src/control by `cargo run -p romc-translate`: the controller's own steps. Names that are defined
- * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
+/* @generated from src/control/online and src/robot by `cargo run -p romc-translate`: the controller's own steps.
+ * Names that are defined elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
 /* Curvature of the cost as the solvers have it: CURVATURE / 2 ‖v‖². Inputs a few deviations beyond the limits then
  * have multipliers near those at which iterations begin. */
@@ -27,8 +27,8 @@
 
 #define ONLINE_LIFT_ITERATIONS 60
 
-/* Most that legs are turned, rad. */
-#define ONLINE_MOST_RAD (real)0.3
+/* Error of pitch beyond which legs turn no further, rad. */
+#define ONLINE_MOST_TURN_RAD (real)0.3
 
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
@@ -623,8 +623,9 @@ static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const re
     }
 }
 
-/* Turns the foot of a leg about the body's origin by the opposite of an error e of pitch (rad), to first order in the
- * joints, q + J^-1 (R_y(-e) - 1) (h + p(q)) with the hip h; a foot that cannot be moved stays. */
+/* Turns the foot of a leg about the body's origin by the opposite of an error e of pitch (rad), because nothing holds
+ * the pitch of a body in the air and its feet would land elsewhere than planned. To first order in the joints, q + J^-1
+ * (R_y(-e) - 1) (h + p(q)) with the hip h; a foot that cannot be moved stays. */
 static inline MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, const real *hip, real error,
         real *restrict q)
 {
@@ -633,8 +634,9 @@ static inline MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, con
     if (!online_write_force_map(leg, q, false, map, foot)) {
         return;
     }
-    const real most = error < 0 ? -ONLINE_MOST_RAD : ONLINE_MOST_RAD;
-    const real turn = solver_magnitude(error) > ONLINE_MOST_RAD ? most : error;
+    const real most = ONLINE_MOST_TURN_RAD;
+    const real limit = error < 0 ? -most : most;
+    const real turn = solver_magnitude(error) > most ? limit : error;
     const real sine = SIN(turn);
     const real shrunk = COS(turn) - 1;
     const real x = hip[0] + foot[0];
@@ -1112,19 +1114,21 @@ static inline MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *s
     return self->start_s + ((double)stage + ONLINE_POSTURE_SHARE) * self->step_s;
 }
 
-/* Whether a time belongs to a stage or is beyond the last. */
+/* Whether a time is in a stage or beyond the last. Up to half a stage before the first, as where a clock jitters, it
+ * belongs to the first. */
 static inline MAYBE_UNUSED bool online_plan_time_reaches(online_plan_time *self, double time_s)
 {
     return online_plan_time_passed(self, time_s) > -0.5;
 }
 
-/* The stage that a time belongs to, at most most; that as well for a time before the plan. */
-static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self, double time_s, int most)
+/* The stage that a time belongs to, or otherwise for a time that is not in the stages before that one or has no plan:
+ * the last stage stands for all that is later, the number of stages means none. */
+static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self, double time_s, int otherwise)
 {
     /* A time that is a stage's beginning but for rounding belongs to that stage. */
     const double passed = online_plan_time_passed(self, time_s) + 1e-6;
-    const bool is_within = online_plan_time_reaches(self, time_s) && passed < (double)most;
-    return is_within ? (int)passed : most;
+    const bool is_within = online_plan_time_reaches(self, time_s) && passed < (double)otherwise;
+    return is_within ? (int)passed : otherwise;
 }
 
 static inline MAYBE_UNUSED online_share online_share_unknown(void)
@@ -1163,16 +1167,19 @@ static inline MAYBE_UNUSED void online_share_update(online_share *restrict self,
     if (!(size > 0 && solver_is_finite_number(size) && solver_is_finite_number(agreement))) {
         return;
     }
-    if (self->unit == 0) {
-        self->unit = size;
-    }
-    const real ratio = size / self->unit;
-    const real weight = online_smaller(ratio, ONLINE_LARGEST_WEIGHT);
+    const real unit = self->unit == 0 ? size : self->unit;
+    const real own = online_smaller(size / unit, ONLINE_LARGEST_WEIGHT);
     const real kept = EXP(-part * step_s / time_constant_s);
-    self->weight = kept * self->weight + weight;
-    self->weighted = kept * self->weighted + weight * self->estimate * (1 + agreement / size);
-    const real mean = (ONLINE_PRIOR_WEIGHT + self->weighted) / (ONLINE_PRIOR_WEIGHT + self->weight);
-    self->estimate = online_greater(ONLINE_LEAST, online_smaller(mean, ONLINE_LARGEST));
+    const real weight = kept * self->weight + own;
+    const real weighted = kept * self->weighted + own * self->estimate * (1 + agreement / size);
+    const real mean = (ONLINE_PRIOR_WEIGHT + weighted) / (ONLINE_PRIOR_WEIGHT + weight);
+    /* The quotient of a large and a tiny number may be infinite: such a step says nothing. */
+    if (solver_is_finite_number(mean)) {
+        self->unit = unit;
+        self->weight = weight;
+        self->weighted = weighted;
+        self->estimate = online_greater(ONLINE_LEAST, online_smaller(mean, ONLINE_LARGEST));
+    }
 }
 
 /* Whether a state within STATE_REACH standard deviations of some state of the trajectory reaches row . z =

@@ -1,5 +1,5 @@
-/* @generated from src/control by `cargo run -p romc-translate`: the structured solver. Names that are defined
- * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
+/* @generated from src/control/solver by `cargo run -p romc-translate`: the structured solver.
+ * Names that are defined elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
 /* A guess is of quite another program if the optimum without rows moved further than this, in units of the input's
  * rows. */

@@ -1,5 +1,5 @@
-/* @generated from src/control by `cargo run -p romc-translate`: a stage of the structured solver. Names that are defined
- * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
+/* @generated from src/control/solver by `cargo run -p romc-translate`: types of the structured solver.
+ * Names that are defined elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
 /* One stage: its dynamics, where its rows stand, and the memory of the solver.
  *

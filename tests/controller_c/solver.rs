@@ -7,11 +7,12 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use romc::solver::{Cost, Links, Outcome, Program, Real, RowMatrices, Settings, Shape, Stage};
-use romc_translate::{Source, Unit, controller, solver_of, translate};
+use romc_translate::{Fault, Source, Unit, controller, translate};
 
 use crate::emitted::STRICT;
 use crate::programs::{root, succeed};
 use crate::random::Random;
+use crate::steps::made_of_changed;
 
 const HORIZON: usize = 10;
 
@@ -267,22 +268,6 @@ fn solver_in_c_has_the_bits_of_its_rust_on_random_programs_of_two_sizes_in_both_
     assert!(iterated.iter().all(|count| *count > 20), "{iterated:?}");
 }
 
-/// The sources of the solver with one piece of text changed.
-fn changed(from: &str, to: &str) -> Vec<Source> {
-    let folder = root().join("src/control/solver");
-    let mut sources = Vec::new();
-    for entry in fs::read_dir(folder).expect("sources") {
-        let path = entry.expect("a file").path();
-        let text = fs::read_to_string(&path).expect("a source");
-        sources.push(Source {
-            path: path.display().to_string(),
-            text: text.replace(from, to),
-        });
-    }
-    sources.sort_by(|a, b| a.path.cmp(&b.path));
-    sources
-}
-
 #[test]
 fn constant_of_the_rust_changes_the_c() {
     let mut random = Random::new(1);
@@ -292,11 +277,9 @@ fn constant_of_the_rust_changes_the_c() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut results = Vec::new();
     for margin in ["1e-3", "4e-3"] {
-        let sources = changed(
-            "LEAST_MARGIN: f64 = 1e-3",
-            &format!("LEAST_MARGIN: f64 = {margin}"),
-        );
-        let files = solver_of(&sources).expect("the solver is in the subset");
+        let to = format!("LEAST_MARGIN: f64 = {margin}");
+        let file = "src/control/solver/point.rs";
+        let files = made_of_changed(file, "LEAST_MARGIN: f64 = 1e-3", &to);
         let sizes = (8, 4, "double", false);
         results.push(solved_in_c(folder.path(), &files, sizes, &programs));
     }
@@ -332,21 +315,76 @@ fn constructs_outside_the_subset_are_named_with_their_place() {
             "calls itself",
         ),
     ] {
-        let source = Source {
-            path: "count.rs".to_owned(),
-            text: format!("fn count(n: usize) -> usize {{\n{body}\n}}\n"),
-        };
-        let unit = Unit {
-            prefix: "test",
-            users: "test_count()",
-            ..Unit::default()
-        };
-        let fault = translate(&[source], &unit).expect_err(body);
+        let text = format!("fn count(n: usize) -> usize {{\n{body}\n}}\n");
+        let fault = fault_of(&text, "test_count(1);");
         assert_eq!(
             (fault.path.as_str(), fault.line),
             ("count.rs", line),
             "{fault}"
         );
         assert!(fault.message.contains(word), "{fault}");
+    }
+}
+
+/// The fault of Rust that C calls functions of.
+fn fault_of(text: &str, user: &str) -> Fault {
+    let source = |path: &str, text: &str| Source {
+        path: path.to_owned(),
+        text: text.to_owned(),
+    };
+    let unit = Unit {
+        prefix: "test",
+        users: &[source("user.askama", user)],
+        ..Unit::default()
+    };
+    translate(&[source("count.rs", text)], &unit).expect_err(text)
+}
+
+#[test]
+fn functions_and_types_that_are_left_out_are_named_where_the_c_needs_them() {
+    let plain = "fn count(n: usize) -> usize {\n    n\n}\n";
+    for (text, user, place) in [
+        (
+            plain,
+            "/* A template. */\nint a = test_cuont(1);",
+            "user.askama:2: no such function: `test_cuont`",
+        ),
+        (
+            "fn count<const N: usize>(x: &[f64; N]) -> usize {\n    N\n}\n",
+            "test_count(x);",
+            "user.askama:1: no such function: `test_count`",
+        ),
+        (
+            "fn count(\n    n: Count,\n) -> usize {\n    1\n}\n",
+            "test_count(n);",
+            "count.rs:2: an unknown type `Count`",
+        ),
+        (
+            "fn count(x: [f64; 2]) -> usize {\n    1\n}\n",
+            "test_count(x);",
+            "count.rs:1: an array by value: pass a reference",
+        ),
+        (
+            "struct Count {}\nimpl Count {\n    fn of(n: (usize, usize)) -> usize {\n        1\n    }\n}\n",
+            "test_count_of(n);",
+            "count.rs:3: a type outside the subset",
+        ),
+        (
+            "struct Count {\n    n: usize,\n    of: (f64, f64),\n}\nfn count(c: &Count) -> usize {\n    1\n}\n",
+            "test_count(&c);",
+            "count.rs:3: a type outside the subset",
+        ),
+        (
+            "enum Count {\n    None,\n    Some(usize),\n}\nfn count(c: Count) -> usize {\n    1\n}\n",
+            "test_count(c);",
+            "count.rs:1: an enum with data",
+        ),
+        (
+            "settings! {\n    step => count: Count,\n}\nfn count(n: usize) -> usize {\n    n\n}\n",
+            "test_count(1);",
+            "count.rs:1: an unknown type `Count`",
+        ),
+    ] {
+        assert_eq!(fault_of(text, user).to_string(), place, "{text}");
     }
 }

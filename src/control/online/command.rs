@@ -1,5 +1,6 @@
 //! The result of a control step, and that of one without a trusted plan: first the last good plan, shifted, for as many
-//! stages as the settings allow; then a hold, in which the posture stays, the torque fades, the joints are damped.
+//! stages as the settings allow; then a hold, in which the posture stays, the torque fades, the joints are damped. C is
+//! made of [`Memory`].
 
 use super::control_model::{clamped_joint, clamped_torque};
 use super::controller::Controller;
@@ -153,19 +154,20 @@ impl Command {
     }
 }
 
-/// What stays from step to step. C is made of it.
+/// Controller state between steps.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Memory {
-    /// Of the present measurement, zero unless it is believed.
+    /// Joint velocities of the present measurement, rad/s; zero if it was refused.
     pub joint_velocity: [Real; 12],
-    /// Feed-forward part of the last torques, without a hold's damping.
+    /// Feed-forward part of the last torques, N m, without a hold's damping.
     pub feed_forward_nm: [Real; 12],
-    /// Posture of the last plan, or the one to hold.
+    /// Joint positions of the last plan, or those to hold, rad, if there are any.
     pub joint_position: [Real; 12],
     pub has_position: bool,
+    /// Time of the last command, s, if there was one.
     pub command_s: f64,
     pub has_command: bool,
-    /// Measurements in a row that were not believed.
+    /// Refused measurements in a row.
     pub disbelieved: usize,
 }
 

@@ -32,7 +32,7 @@ pub(super) const SOFTENED_FROM: Real = 1.05 * ROW_MARGIN;
 #[derive(Debug)]
 pub struct Controller {
     pub(super) plant: ControlModel,
-    /// The plant with its maps at the last state that was believed, if they depend on the state.
+    /// The plant with its maps at the last state that was not refused, if they depend on the state.
     local: Option<ControlModel>,
     dynamics: Box<dyn LatentDynamics>,
     pub(super) settings: MpcSettings,
@@ -47,7 +47,7 @@ pub struct Controller {
     /// Latent state of the posture that is commanded.
     pub(super) posture: Vec<f64>,
     pub(super) memory: Memory,
-    /// Latent state of the last measurement that was believed, and latent input of the last command.
+    /// Latent state of the last measurement, also of one that was refused as a jump, and latent input of the last command.
     pub(super) measured: Vec<f64>,
     pub(super) last_input: Vec<f64>,
     /// What the plan's inputs are lifted for; none without a plan.

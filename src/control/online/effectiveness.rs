@@ -29,14 +29,16 @@ const LARGEST_WEIGHT: Real = 2.0;
 const LEAST: Real = 0.7;
 const LARGEST: Real = 1.3;
 
+/// Estimate of the share of the commanded input that arrives.
 #[derive(Debug, Clone)]
 pub(super) struct Share {
-    /// `γ̂`.
+    /// `γ̂`, which inputs are divided by.
     pub estimate: Real,
-    /// Weights of the steps so far, and weights times what the steps say.
+    /// Sum of the faded weights of the steps so far.
     weight: Real,
+    /// Sum of these weights, each times the share that its step suggests.
     weighted: Real,
-    /// `φᵀ φ` of the first step, zero before.
+    /// `φᵀ φ` of the first step, which weights are relative to; zero before.
     unit: Real,
 }
 
@@ -91,16 +93,19 @@ impl Share {
         if !(size > 0.0 && size.is_finite() && agreement.is_finite()) {
             return;
         }
-        if self.unit == 0.0 {
-            self.unit = size;
-        }
-        let ratio = size / self.unit;
-        let weight = smaller(ratio, LARGEST_WEIGHT);
+        let unit = if self.unit == 0.0 { size } else { self.unit };
+        let own = smaller(size / unit, LARGEST_WEIGHT);
         let kept = (-part * step_s / time_constant_s).exp();
-        self.weight = kept * self.weight + weight;
-        self.weighted = kept * self.weighted + weight * self.estimate * (1.0 + agreement / size);
-        let mean = (PRIOR_WEIGHT + self.weighted) / (PRIOR_WEIGHT + self.weight);
-        self.estimate = greater(LEAST, smaller(mean, LARGEST));
+        let weight = kept * self.weight + own;
+        let weighted = kept * self.weighted + own * self.estimate * (1.0 + agreement / size);
+        let mean = (PRIOR_WEIGHT + weighted) / (PRIOR_WEIGHT + weight);
+        // The quotient of a large and a tiny number may be infinite: such a step says nothing.
+        if mean.is_finite() {
+            self.unit = unit;
+            self.weight = weight;
+            self.weighted = weighted;
+            self.estimate = greater(LEAST, smaller(mean, LARGEST));
+        }
     }
 }
 

@@ -6,12 +6,14 @@ use super::dense::{Real, greater};
 /// ahead of the motion and adds to the thrust; that of the middle takes from it.
 const POSTURE_SHARE: f64 = 0.9;
 
-/// Where the stages of a plan are in time.
+/// Times of the stages of a plan.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PlanTime {
     /// Whether there is a plan.
     pub is_made: bool,
+    /// Beginning of the first stage, s.
     pub start_s: f64,
+    /// Length of a stage, s.
     pub step_s: f64,
     /// Phase of the first stage.
     pub phase: usize,
@@ -24,17 +26,23 @@ impl PlanTime {
         if self.is_made { passed } else { -1.0 }
     }
 
-    /// Whether a time belongs to a stage or is beyond the last.
+    /// Whether a time is in a stage or beyond the last. Up to half a stage before the first, as where a clock jitters, it
+    /// belongs to the first.
     pub(super) fn reaches(&self, time_s: f64) -> bool {
         self.passed(time_s) > -0.5
     }
 
-    /// The stage that a time belongs to, at most `most`; that as well for a time before the plan.
-    pub(super) fn stage_at(&self, time_s: f64, most: usize) -> usize {
+    /// The stage that a time belongs to, or `otherwise` for a time that is not in the stages before that one or has no plan:
+    /// the last stage stands for all that is later, the number of stages means none.
+    pub(super) fn stage_at(&self, time_s: f64, otherwise: usize) -> usize {
         // A time that is a stage's beginning but for rounding belongs to that stage.
         let passed = self.passed(time_s) + 1e-6;
-        let is_within = self.reaches(time_s) && passed < most as f64;
-        if is_within { passed as usize } else { most }
+        let is_within = self.reaches(time_s) && passed < otherwise as f64;
+        if is_within {
+            passed as usize
+        } else {
+            otherwise
+        }
     }
 
     /// The instant whose posture is commanded for a stage, s.

@@ -95,9 +95,9 @@ impl<'a> Source<'a> {
             has_actuators: plant.input_rule().actuators().is_some(),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: solver_numbers(precision, mpc.qp.accepted_residual),
-            functions: of_horizon(FUNCTIONS, facts.name),
+            functions: for_controller(FUNCTIONS, facts.name),
             lift_functions: of_lift(),
-            online: of_horizon(ONLINE, facts.name),
+            online: for_controller(ONLINE, facts.name),
             numbers,
             plant,
             phase_of_feet: integers(feet.map(|phase| phase.unwrap_or(NO_PHASE) as i64)),
@@ -242,7 +242,8 @@ pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
     renamed(STAGE, rename) + &renamed(STATE, rename)
 }
 
-fn of_horizon(text: &str, name: &str) -> String {
+/// With the names of the settings, of the state and of the stages that the header of a controller has.
+fn for_controller(text: &str, name: &str) -> String {
     renamed(text, |word| match word {
         "online_settings" => Some(format!("{name}_controller_settings")),
         _ if is_state(word) || word == "solver_stage" => Some(format!("{name}_{word}")),

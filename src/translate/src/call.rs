@@ -22,16 +22,11 @@ impl Writer<'_> {
         };
         let segments = &path.path.segments;
         let name = segments.last().expect("a path has segments");
-        let owner = match segments.len() {
-            1 => String::new(),
-            count => segments[count - 2].ident.to_string(),
-        };
-        let owner = if owner == "Self" {
-            here.owner.to_owned()
-        } else {
-            owner
-        };
-        match (owner.as_str(), name.ident.to_string().as_str()) {
+        let owner = segments.iter().rev().nth(1);
+        let owner = owner.map_or(String::new(), |owner| owner.ident.to_string());
+        let is_own = owner == "Self";
+        let owner = if is_own { here.owner } else { &owner };
+        match (owner, name.ident.to_string().as_str()) {
             ("T", "of") => {
                 let value = self.value(here, &call.args[0])?;
                 let text = format!("(real){}", value.at_least(15));
@@ -117,11 +112,7 @@ impl Writer<'_> {
             let lengths = given.args.iter().filter_map(|argument| match argument {
                 syn::GenericArgument::Const(value) => Some(value.clone()),
                 syn::GenericArgument::Type(syn::Type::Path(path)) if !path.path.is_ident("T") => {
-                    Some(Expr::Path(syn::ExprPath {
-                        attrs: Vec::new(),
-                        qself: None,
-                        path: path.path.clone(),
-                    }))
+                    Some(syn::parse_quote!(#path))
                 }
                 _ => None,
             });
@@ -202,11 +193,6 @@ fn infer(
             };
             fits && infer(of, given, names, sizes)
         }
-        (Type::Real, Type::Real)
-        | (Type::Double, Type::Double)
-        | (Type::Int, Type::Int)
-        | (Type::Bool, Type::Bool) => true,
-        (Type::Named(of), Type::Named(given)) => of == given,
-        _ => false,
+        (parameter, argument) => parameter == argument,
     }
 }

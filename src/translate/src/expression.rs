@@ -6,7 +6,7 @@ use syn::{BinOp, Expr, Lit, UnOp};
 
 use crate::Found;
 use crate::function::{Instance, Writer};
-use crate::items::{Field, Items};
+use crate::items::Items;
 use crate::types::Type;
 
 #[derive(Debug, Clone)]
@@ -54,7 +54,7 @@ impl Value {
 }
 
 /// A binary operator of C, its rank, and whether its result is a condition.
-fn operator(op: &BinOp) -> Option<(&'static str, u8, bool)> {
+pub(crate) fn operator(op: &BinOp) -> Option<(&'static str, u8, bool)> {
     Some(match op {
         BinOp::Add(_) => ("+", 12, false),
         BinOp::Sub(_) => ("-", 12, false),
@@ -356,11 +356,8 @@ impl Writer<'_> {
         let first = self.value_as(here, &first, expected)?;
         let other = self.value_as(here, &other, expected)?.at_least(3);
         let (condition, value) = (condition.at_least(4), first.at_least(4));
-        Ok(Value::new(
-            format!("{condition} ? {value} : {other}"),
-            first.ty,
-            3,
-        ))
+        let text = format!("{condition} ? {value} : {other}");
+        Ok(Value::new(text, first.ty, 3))
     }
 
     fn repeat(
@@ -409,20 +406,16 @@ impl Writer<'_> {
         };
         let mut fields_in_c = Vec::new();
         for field in &literal.fields {
-            let items = self.items;
-            let is_it =
-                |of: &&Field| matches!(&field.member, syn::Member::Named(name) if *name == of.name);
-            let ty = items
-                .fields(&name)
-                .iter()
-                .find(is_it)
-                .map(|field| &field.ty);
-            let value = self.value_as(here, &field.expr, ty)?;
-            let is_copy = matches!(value.ty, Type::Array(..)) && value.repeated.is_none();
-            let (syn::Member::Named(name), false) = (&field.member, is_copy) else {
-                return Err(self.outside(here, field, "a field that is a copied array"));
+            let syn::Member::Named(member) = &field.member else {
+                return Err(self.outside(here, field, "a field without name"));
             };
-            fields_in_c.push(format!(".{name} = {}", value.text));
+            let mut fields = self.items.fields(&name).iter();
+            let ty = fields.find(|of| *member == of.name).map(|of| &of.ty);
+            let value = self.value_as(here, &field.expr, ty)?;
+            if matches!(value.ty, Type::Array(..)) && value.repeated.is_none() {
+                return Err(self.outside(here, field, "a field that is a copied array"));
+            }
+            fields_in_c.push(format!(".{member} = {}", value.text));
         }
         let text = format!("{{{}}}", fields_in_c.join(", "));
         let ty = self.resolve(&Type::Named(name), &BTreeMap::new());

@@ -12,8 +12,8 @@ use crate::types::Type;
 pub(crate) struct Writer<'a> {
     pub(crate) items: &'a Items<'a>,
     pub(crate) functions: String,
-    /// Functions by name in C: done, or begun.
-    done: BTreeMap<String, bool>,
+    /// Functions by name in C: done or defined elsewhere, or begun.
+    pub(crate) done: BTreeMap<String, bool>,
     pub(crate) types: BTreeSet<String>,
     pub(crate) constants: BTreeSet<String>,
     /// Fields whose length is read, by struct and name.
@@ -114,14 +114,10 @@ impl<'a> Writer<'a> {
     ) -> Found<String> {
         let prefix = self.items.unit.prefix.to_ascii_uppercase() + "_";
         let size = |size: &String| sizes[size].replace(&prefix, "").replace(' ', "");
-        let suffixes: Vec<String> = (function
-            .sizes
-            .iter()
-            .map(|own| size(own).to_ascii_lowercase()))
-        .collect();
-        let mut parts = vec![if owner == "Real" { "" } else { owner }, name];
-        parts.extend(suffixes.iter().map(String::as_str));
-        let c_name = self.items.name(&parts);
+        let mut c_name = self.items.method(owner, name);
+        for own in &function.sizes {
+            c_name += &format!("_{}", size(own).to_ascii_lowercase());
+        }
         match self.done.get(&c_name) {
             Some(true) => return Ok(c_name),
             Some(false) => {
@@ -130,10 +126,10 @@ impl<'a> Writer<'a> {
             }
             None => {}
         }
+        self.done.insert(c_name.clone(), function.body.is_none());
         let Some(body) = &function.body else {
             return Ok(c_name);
         };
-        self.done.insert(c_name.clone(), false);
         let text = self.definition(&c_name, owner, (function, body), sizes)?;
         self.functions += &text;
         self.done.insert(c_name.clone(), true);
@@ -171,10 +167,8 @@ impl<'a> Writer<'a> {
         }
         let signature = format!("{c_name}({})", declared.join(", "));
         let signature = output.declare(&signature, &|of| self.spelling(of));
-        here.lines.add(&format!(
-            "static inline {}{signature}",
-            self.items.unit.attribute
-        ));
+        let attribute = self.items.unit.attribute;
+        (here.lines).add(&format!("static inline {attribute}{signature}"));
         here.lines.open("{");
         self.block(&mut here, body, true)?;
         here.lines.close("}");

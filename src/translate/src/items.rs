@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use syn::spanned::Spanned;
-use syn::{Expr, FnArg, GenericParam, ImplItem, Item, Pat, ReturnType, TraitItem};
+use syn::{Attribute, Block, Expr, FnArg, ImplItem, Item, Pat, ReturnType, Signature, TraitItem};
 
+use crate::expression::operator;
 use crate::function::Writer;
 use crate::text::{comment, snake};
 use crate::types::Type;
@@ -23,6 +24,10 @@ pub(crate) struct Items<'a> {
     /// By owner and name; functions without one have an empty owner. The trait `Real` is the scalar; any other is a
     /// struct of C, its required methods are functions that whoever includes the C defines.
     pub(crate) functions: BTreeMap<(String, String), Function>,
+    /// Why functions and types are left out, by their names in C.
+    pub(crate) left_out: BTreeMap<String, Fault>,
+    /// Structs, enums and traits of the sources, also those that are left out.
+    type_names: BTreeSet<String>,
 }
 
 pub(crate) struct Struct {
@@ -53,16 +58,16 @@ pub(crate) struct Function {
     pub(crate) parameters: Vec<(String, Type, bool)>,
     pub(crate) output: Type,
     /// None of a function that is defined elsewhere.
-    pub(crate) body: Option<syn::Block>,
+    pub(crate) body: Option<Block>,
 }
 
-fn docs(attributes: &[syn::Attribute]) -> Vec<String> {
-    let line = |attribute: &syn::Attribute| match &attribute.meta {
-        syn::Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {
-            Expr::Lit(syn::ExprLit {
-                lit: syn::Lit::Str(text),
-                ..
-            }) => Some(text.value()),
+/// Attributes, signature and body of a function.
+type Parts<'s> = (&'s [Attribute], &'s Signature, Option<&'s Block>);
+
+fn docs(attributes: &[Attribute]) -> Vec<String> {
+    let line = |attribute: &Attribute| match &attribute.meta.require_name_value().ok()?.value {
+        Expr::Lit(literal) if attribute.path().is_ident("doc") => match &literal.lit {
+            syn::Lit::Str(text) => Some(text.value()),
             _ => None,
         },
         _ => None,
@@ -71,8 +76,17 @@ fn docs(attributes: &[syn::Attribute]) -> Vec<String> {
 }
 
 /// Whether an item is compiled under a condition only: copies for one processor, tests.
-fn is_conditional(attributes: &[syn::Attribute]) -> bool {
+fn is_conditional(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|a| a.path().is_ident("cfg"))
+}
+
+fn type_name(item: &Item) -> Option<String> {
+    match item {
+        Item::Struct(syn::ItemStruct { ident, .. })
+        | Item::Enum(syn::ItemEnum { ident, .. })
+        | Item::Trait(syn::ItemTrait { ident, .. }) => Some(ident.to_string()),
+        _ => None,
+    }
 }
 
 impl<'a> Items<'a> {
@@ -84,20 +98,28 @@ impl<'a> Items<'a> {
             enums: BTreeMap::new(),
             constants: BTreeMap::new(),
             functions: BTreeMap::new(),
+            left_out: BTreeMap::new(),
+            type_names: BTreeSet::new(),
         };
-        for (source, Source { path, text }) in sources.iter().enumerate() {
-            let file = syn::parse_file(text).map_err(|error| Fault {
-                path: path.clone(),
-                line: error.span().start().line,
-                message: error.to_string(),
-            })?;
+        let mut files = Vec::new();
+        for Source { path, text } in sources {
+            let file = syn::parse_file(text)
+                .map_err(|error| Fault::at(path, error.span().start().line, error))?;
+            let names = file.items.iter().filter_map(type_name);
+            items.type_names.extend(names);
+            files.push(file);
+        }
+        for (source, file) in files.iter().enumerate() {
             for item in &file.items {
-                let _ = match item {
-                    Item::Macro(item) if item.mac.path.is_ident("settings") => {
-                        items.add_settings(source, item)
-                    }
-                    _ => items.add(source, item),
-                };
+                if let Item::Macro(table) = item
+                    && table.mac.path.is_ident("settings")
+                {
+                    items.add_settings(source, table)?;
+                } else if let Err(fault) = items.add(source, item)
+                    && let Some(name) = type_name(item)
+                {
+                    items.left_out.insert(items.name(&[&name]), fault);
+                }
             }
         }
         Ok(items)
@@ -109,11 +131,8 @@ impl<'a> Items<'a> {
         at: &impl Spanned,
         message: impl Into<String>,
     ) -> Fault {
-        Fault {
-            path: self.sources[source].path.clone(),
-            line: at.span().start().line,
-            message: message.into(),
-        }
+        let line = at.span().start().line;
+        Fault::at(&self.sources[source].path, line, message.into())
     }
 
     /// The line comments directly above a line, in their order.
@@ -138,6 +157,11 @@ impl<'a> Items<'a> {
         let words = parts.iter().filter(|part| !part.is_empty());
         let words: Vec<String> = words.map(|part| snake(part)).collect();
         format!("{}_{}", self.unit.prefix, words.join("_"))
+    }
+
+    /// The name of a function, of which the scalar's own have no owner.
+    pub(crate) fn method(&self, owner: &str, name: &str) -> String {
+        self.name(&[if owner == "Real" { "" } else { owner }, name])
     }
 
     pub(crate) fn constant_name(&self, name: &str) -> String {
@@ -170,6 +194,7 @@ impl<'a> Items<'a> {
                 let plain = (docs(&item.attrs), names.collect());
                 self.enums.insert(item.ident.to_string(), plain);
             }
+            Item::Enum(item) => return Err(self.fault(source, &item.ident, "an enum with data")),
             Item::Const(item) => {
                 let constant = Constant {
                     docs: docs(&item.attrs),
@@ -180,14 +205,14 @@ impl<'a> Items<'a> {
                 self.constants.insert(item.ident.to_string(), constant);
             }
             Item::Fn(item) if !is_conditional(&item.attrs) => {
-                self.add_function(source, "", &item.attrs, &item.sig, Some(&item.block))?;
+                self.add_function(source, "", (&item.attrs, &item.sig, Some(&item.block)));
             }
             Item::Trait(item) => {
                 let owner = item.ident.to_string();
                 for method in &item.items {
                     if let TraitItem::Fn(method) = method {
-                        let (attributes, body) = (&method.attrs, method.default.as_ref());
-                        let _ = self.add_function(source, &owner, attributes, &method.sig, body);
+                        let parts = (&*method.attrs, &method.sig, method.default.as_ref());
+                        self.add_function(source, &owner, parts);
                     }
                 }
             }
@@ -197,8 +222,8 @@ impl<'a> Items<'a> {
                 };
                 for method in &item.items {
                     if let ImplItem::Fn(method) = method {
-                        let (attributes, body) = (&method.attrs, Some(&method.block));
-                        let _ = self.add_function(source, &owner, attributes, &method.sig, body);
+                        let parts = (&*method.attrs, &method.sig, Some(&method.block));
+                        self.add_function(source, &owner, parts);
                     }
                 }
             }
@@ -209,39 +234,41 @@ impl<'a> Items<'a> {
     }
 
     /// The settings that C has: `name: type,` behind an arrow, or behind `|` for more of one row.
-    fn add_settings(&mut self, source: usize, table: &syn::ItemMacro) -> Found<()> {
-        let table = table.mac.tokens.to_string();
+    fn add_settings(&mut self, source: usize, item: &syn::ItemMacro) -> Found<()> {
+        let table = item.mac.tokens.to_string();
         let words: Vec<&str> = table.split_whitespace().collect();
         let (docs, mut fields) = (Vec::new(), Vec::new());
         for words in words.windows(5) {
             if let ["=>" | "|", name, ":", ty, ","] = *words
                 && let Ok(ty) = syn::parse_str(ty)
             {
-                let (ty, name) = (self.ty(source, &ty, "")?, name.to_owned());
-                fields.push(Field {
-                    docs: Vec::new(),
-                    name,
-                    ty,
-                });
+                let ty = self.ty(source, &ty, "");
+                let ty = ty.map_err(|fault| self.fault(source, item, fault.message))?;
+                let (docs, name) = (Vec::new(), name.to_owned());
+                fields.push(Field { docs, name, ty });
             }
         }
         (self.structs).insert("Settings".to_owned(), Struct { docs, fields });
         Ok(())
     }
 
-    fn add_function(
-        &mut self,
+    fn add_function(&mut self, source: usize, owner: &str, parts: Parts<'_>) {
+        let name = parts.1.ident.to_string();
+        match self.function(source, owner, parts) {
+            Ok(function) => drop(self.functions.insert((owner.to_owned(), name), function)),
+            Err(fault) => drop(self.left_out.insert(self.method(owner, &name), fault)),
+        }
+    }
+
+    fn function(
+        &self,
         source: usize,
         owner: &str,
-        attributes: &[syn::Attribute],
-        signature: &syn::Signature,
-        body: Option<&syn::Block>,
-    ) -> Found<()> {
-        let const_parameters: Vec<String> = (signature.generics.params.iter())
-            .filter_map(|parameter| match parameter {
-                GenericParam::Const(size) => Some(size.ident.to_string()),
-                _ => None,
-            })
+        (attributes, signature, body): Parts<'_>,
+    ) -> Found<Function> {
+        let const_parameters = signature.generics.const_params();
+        let const_parameters: Vec<String> = const_parameters
+            .map(|size| size.ident.to_string())
             .collect();
         let parameter = |input: &FnArg| match input {
             FnArg::Receiver(receiver) => {
@@ -266,28 +293,21 @@ impl<'a> Items<'a> {
                 Ok((name.ident.to_string(), ty, name.mutability.is_some()))
             }
         };
-        let parameters = signature
-            .inputs
-            .iter()
-            .map(parameter)
-            .collect::<Found<_>>()?;
+        let parameters = signature.inputs.iter().map(parameter);
         let output = match &signature.output {
             ReturnType::Default => Type::Unit,
             ReturnType::Type(_, ty) => self.ty(source, ty, owner)?,
         };
         let is_own = |size: &&String| !SIZES.contains(&size.as_str());
-        let function = Function {
+        Ok(Function {
             docs: docs(attributes),
             source,
             sizes: const_parameters.iter().filter(is_own).cloned().collect(),
             const_parameters,
-            parameters,
+            parameters: parameters.collect::<Found<_>>()?,
             output,
             body: body.cloned(),
-        };
-        let key = (owner.to_owned(), signature.ident.to_string());
-        self.functions.insert(key, function);
-        Ok(())
+        })
     }
 
     /// A type as it is written; `owner` is what `Self` stands for.
@@ -313,7 +333,15 @@ impl<'a> Items<'a> {
                     "f64" => Type::Double,
                     "usize" | "u32" | "i32" => Type::Int,
                     "bool" => Type::Bool,
-                    name => Type::Named(self.with_sizes(source, name, last)?),
+                    name => {
+                        let name = self.with_sizes(source, name, last)?;
+                        let is_known = self.type_names.contains(&name);
+                        if !is_known && self.unit.elsewhere(&name).is_none() {
+                            let message = format!("an unknown type `{name}`");
+                            return Err(self.fault(source, ty, message));
+                        }
+                        Type::Named(name)
+                    }
                 }
             }
             syn::Type::ImplTrait(of) => match of.bounds.first() {
@@ -341,11 +369,10 @@ impl<'a> Items<'a> {
         };
         match arguments.args.iter().find(|argument| !is_plain(argument)) {
             None => Ok(name.to_owned()),
-            Some(other) => Err(self.fault(
-                source,
-                other,
-                "arguments of a struct are T, NX, NU and LINKED",
-            )),
+            Some(other) => {
+                let message = "arguments of a struct are T, NX, NU and LINKED";
+                Err(self.fault(source, other, message))
+            }
         }
     }
 
@@ -362,12 +389,8 @@ impl<'a> Items<'a> {
             Expr::Binary(binary) => {
                 let left = self.length(source, &binary.left)?;
                 let right = self.length(source, &binary.right)?;
-                let operator = match binary.op {
-                    syn::BinOp::Add(_) => "+",
-                    syn::BinOp::Sub(_) => "-",
-                    syn::BinOp::Mul(_) => "*",
-                    syn::BinOp::Div(_) => "/",
-                    _ => return Err(self.fault(source, length, "an operator in a length")),
+                let Some((operator, 12 | 13, _)) = operator(&binary.op) else {
+                    return Err(self.fault(source, length, "an operator in a length"));
                 };
                 format!("{left} {operator} {right}")
             }
@@ -382,13 +405,13 @@ impl Writer<'_> {
         let mut source = String::new();
         let mut written = BTreeSet::new();
         for name in unit.header {
-            self.write_type(name, &mut header, &mut written);
+            self.write_type(name, &mut header, &mut written)?;
         }
         for name in &self.constants {
             source += &self.constant_text(name, true)?;
         }
         for name in &self.types {
-            self.write_type(name, &mut source, &mut written);
+            self.write_type(name, &mut source, &mut written)?;
         }
         for name in &self.constants {
             source += &self.constant_text(name, false)?;
@@ -414,31 +437,28 @@ impl Writer<'_> {
     }
 
     /// A struct or enum, behind those that its fields are made of.
-    fn write_type(&self, name: &str, out: &mut String, written: &mut BTreeSet<String>) {
-        if self.items.unit.elsewhere(name).is_some() || !written.insert(name.to_owned()) {
-            return;
+    fn write_type(&self, name: &str, out: &mut String, done: &mut BTreeSet<String>) -> Found<()> {
+        if self.items.unit.elsewhere(name).is_some() || !done.insert(name.to_owned()) {
+            return Ok(());
         }
         let c_name = self.items.name(&[name]);
         if let Some((docs, variants)) = self.items.enums.get(name) {
-            let variants: Vec<String> = (variants
-                .iter()
-                .map(|variant| self.items.constant_name(variant)))
-            .collect();
-            let (docs, variants) = (comment(docs, ""), variants.join(", "));
+            let variants = variants.iter().map(|of| self.items.constant_name(of));
+            let variants = variants.collect::<Vec<_>>().join(", ");
+            let docs = comment(docs, "");
             *out += &format!("{docs}typedef enum {{ {variants} }} {c_name};\n\n");
-            return;
+            return Ok(());
         }
         let Some(found) = self.items.structs.get(name) else {
-            return;
+            return (self.items.left_out.get(&c_name)).map_or(Ok(()), |fault| Err(fault.clone()));
         };
         for of in found.fields.iter().filter_map(|field| field.ty.named()) {
-            self.write_type(of, out, written);
+            self.write_type(of, out, done)?;
         }
         let mut text = format!("{}typedef struct {{\n", comment(&found.docs, ""));
         for field in &found.fields {
-            let ty = field
-                .ty
-                .with_lengths(&mut |length| self.length(length, &BTreeMap::new()));
+            let mut in_c = |length: &str| self.length(length, &BTreeMap::new());
+            let ty = field.ty.with_lengths(&mut in_c);
             let declared = ty.declare(&field.name, &|of| self.spelling(of));
             text += &format!("{}    {declared};\n", comment(&field.docs, "    "));
             let key = (name.to_owned(), field.name.clone());
@@ -447,5 +467,6 @@ impl Writer<'_> {
             }
         }
         *out += &format!("{text}}} {c_name};\n\n");
+        Ok(())
     }
 }

@@ -28,7 +28,7 @@ mod statement;
 mod text;
 mod types;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::{fmt, fs};
 
@@ -54,14 +54,20 @@ pub struct Fault {
 
 pub(crate) type Found<T = expression::Value> = Result<T, Fault>;
 
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
+impl Fault {
+    fn at(path: &str, line: usize, message: impl ToString) -> Self {
+        let (path, message) = (path.to_owned(), message.to_string());
+        Self {
             path,
             line,
             message,
-        } = self;
-        write!(f, "{path}:{line}: {message}")
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}: {}", self.path, self.line, self.message)
     }
 }
 
@@ -72,8 +78,8 @@ impl std::error::Error for Fault {}
 pub struct Unit<'a> {
     /// Before every name: `solver` for `solver_solve` and `SOLVER_WIDE`.
     pub prefix: &'a str,
-    /// C that includes it: the functions that it calls and the constants that it names are those that are needed.
-    pub users: &'a str,
+    /// C that includes it: what it calls or names with the prefix is what is needed.
+    pub users: &'a [Source],
     /// Structs that nothing changes, which are `const` wherever they are pointed to.
     pub fixed: &'a [&'a str],
     /// Structs whose text stands apart, for a header.
@@ -101,45 +107,56 @@ pub struct Translated {
     pub source: String,
 }
 
+/// Words of C with the file and line where each is first, those that are called also with their parenthesis.
+fn words(users: &[Source]) -> BTreeMap<&str, (&str, usize)> {
+    let is_other = |letter: char| !letter.is_ascii_alphanumeric() && letter != '_';
+    let mut words = BTreeMap::new();
+    for Source { path, text } in users {
+        for (number, line) in text.lines().enumerate() {
+            for word in line.split_inclusive(is_other) {
+                for word in [word, word.trim_end_matches(is_other)] {
+                    words.entry(word).or_insert((path.as_str(), number + 1));
+                }
+            }
+        }
+    }
+    words
+}
+
 /// Translates the functions that a unit is for, and all that they need.
 pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Fault> {
     let items = items::Items::read(sources, unit)?;
     let mut writer = function::Writer::new(&items);
-    let is_other = |letter: char| !letter.is_ascii_alphanumeric() && letter != '_';
-    let words = unit.users.split_inclusive(is_other);
-    let words: BTreeSet<&str> = words
-        .flat_map(|word| [word, word.trim_end_matches(is_other)])
-        .collect();
+    let words = words(unit.users);
     for ((owner, name), function) in &items.functions {
-        if words.contains(format!("{}(", items.name(&[owner, name])).as_str()) {
+        let is_called = words.contains_key(format!("{}(", items.method(owner, name)).as_str());
+        if is_called && function.sizes.is_empty() {
             writer.function(owner, name, function, BTreeMap::new())?;
         }
     }
     for name in items.constants.keys() {
-        if words.contains(items.constant_name(name).as_str()) {
+        if words.contains_key(items.constant_name(name).as_str()) {
             writer.constant(name);
+        }
+    }
+    for (word, (path, line)) in words {
+        let name = word.strip_suffix('(').unwrap_or("");
+        if name.starts_with(&items.name(&[])) && !writer.done.contains_key(name) {
+            let missing = || Fault::at(path, line, format!("no such function: `{name}`"));
+            return Err(items.left_out.get(name).cloned().unwrap_or_else(missing));
         }
     }
     writer.finish(unit)
 }
 
-fn fault(path: &str, error: std::io::Error) -> Fault {
-    let (path, message) = (path.to_owned(), error.to_string());
-    Fault {
-        path,
-        line: 0,
-        message,
-    }
-}
-
 fn file(root: &Path, path: String) -> Result<Source, Fault> {
-    let text = fs::read_to_string(root.join(&path)).map_err(|error| fault(&path, error))?;
+    let text = fs::read_to_string(root.join(&path)).map_err(|error| Fault::at(&path, 0, error))?;
     Ok(Source { path, text })
 }
 
 /// The files of a folder whose names end so.
 fn read(root: &Path, folder: &str, end: &str) -> Result<Vec<Source>, Fault> {
-    let entries = fs::read_dir(root.join(folder)).map_err(|error| fault(folder, error))?;
+    let entries = fs::read_dir(root.join(folder)).map_err(|error| Fault::at(folder, 0, error))?;
     let names = entries.flatten().map(|entry| entry.file_name());
     let mut paths: Vec<String> = names
         .map(|name| format!("{folder}/{}", name.to_string_lossy()))
@@ -149,19 +166,34 @@ fn read(root: &Path, folder: &str, end: &str) -> Result<Vec<Source>, Fault> {
     paths.into_iter().map(|path| file(root, path)).collect()
 }
 
-fn head(what: &str) -> String {
-    format!(
-        "/* @generated from src/control by `cargo run -p romc-translate`: {what} Names that are defined\n \
-         * elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */\n\n"
-    )
+/// Types and functions of a unit that is made of the sources of folders, each behind a comment that names it.
+fn texts(root: &Path, folders: &[&str], what: &str, unit: &Unit<'_>) -> Found<[String; 2]> {
+    let mut sources = Vec::new();
+    for folder in folders {
+        sources.extend(read(root, folder, ".rs")?);
+    }
+    let Translated { header, source } = translate(&sources, unit)?;
+    let from = folders.join(" and ");
+    let head = |part: &str| {
+        format!(
+            "/* @generated from {from} by `cargo run -p romc-translate`: {part}{what}.\n * Names that are defined elsewhere: \
+             real, the type of numbers; NX and NU, how many states and inputs there are. */\n\n"
+        )
+    };
+    Ok([head("types of ") + &header, head("") + &source])
 }
 
 /// The C of the structured solver and of the controller, as paths below the workspace's folder and texts.
-pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
-    let mut texts = solver_of(&read(root, "src/control/solver", ".rs")?)?.to_vec();
-    let templates = read(root, "templates/controller_c", ".askama")?;
-    let users: String = templates.into_iter().map(|file| file.text).collect();
-    let unit = Unit {
+pub fn controller(root: &Path) -> Result<[(&'static str, String); 4], Fault> {
+    let users = read(root, "templates/controller_c", ".askama")?;
+    let solver = Unit {
+        prefix: "solver",
+        users: &users,
+        header: &["Stage"],
+        elsewhere: &[("is_linked", "LINKED")],
+        ..Unit::default()
+    };
+    let online = Unit {
         prefix: "online",
         users: &users,
         fixed: &["LegShape", "FallbackSettings", "Settings"],
@@ -175,30 +207,14 @@ pub fn controller(root: &Path) -> Result<Vec<(&'static str, String)>, Fault> {
         ],
         attribute: "MAYBE_UNUSED ",
     };
-    let mut sources = read(root, "src/control/online", ".rs")?;
-    sources.extend(read(root, "src/robot", ".rs")?);
-    let Translated { header, source } = translate(&sources, &unit)?;
-    let state = head("state of the controller's own steps.") + &header;
-    let steps = head("the controller's own steps.") + &source;
-    texts.push(("templates/controller_c/online_state.h", state));
-    texts.push(("templates/controller_c/online.c", steps));
-    Ok(texts)
-}
-
-/// The C of sources of the solver.
-pub fn solver_of(sources: &[Source]) -> Result<[(&'static str, String); 2], Fault> {
-    let unit = Unit {
-        prefix: "solver",
-        users: "solver_program_bounds_mut(), solver_program_shift(), solver_program_prepare(), solver_program_solve()",
-        header: &["Stage"],
-        elsewhere: &[("is_linked", "LINKED")],
-        ..Unit::default()
-    };
-    let Translated { header, source } = translate(sources, &unit)?;
-    let types = head("a stage of the structured solver.") + &header;
-    let functions = head("the structured solver.") + &source;
+    let folders = ["src/control/solver"];
+    let [stage, solver] = texts(root, &folders, "the structured solver", &solver)?;
+    let folders = ["src/control/online", "src/robot"];
+    let [state, steps] = texts(root, &folders, "the controller's own steps", &online)?;
     Ok([
-        ("templates/controller_c/solver_stage.h", types),
-        ("templates/controller_c/solver.c", functions),
+        ("templates/controller_c/solver_stage.h", stage),
+        ("templates/controller_c/solver.c", solver),
+        ("templates/controller_c/online_state.h", state),
+        ("templates/controller_c/online.c", steps),
     ])
 }

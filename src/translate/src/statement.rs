@@ -121,12 +121,8 @@ impl Writer<'_> {
         };
         let name = pattern.ident.to_string();
         let known = here.scopes.last().expect("a block is open").get(&name);
-        let known = known.or(if here.scopes.len() == 2 {
-            here.scopes[0].get(&name)
-        } else {
-            None
-        });
-        match known {
+        let parameter = (here.scopes[0].get(&name)).filter(|_| here.scopes.len() == 2);
+        match known.or(parameter) {
             Some(ty) if matches!(ty, Type::Ref(..)) && *ty.referent() == *value.ty.referent() => {
                 if value.text != name {
                     here.lines.add(&format!("{name} = {};", value.text));
@@ -145,9 +141,7 @@ impl Writer<'_> {
         let declared = ty.declare(&name, &|of| self.spelling(of));
         match &ty {
             Type::Array(_, length) => self.declare_array(here, &declared, &name, length, &value),
-            _ => here
-                .lines
-                .add(&format!("{start}{declared} = {};", value.text)),
+            _ => (here.lines).add(&format!("{start}{declared} = {};", value.text)),
         }
         let scope = here.scopes.last_mut().expect("a block is open");
         scope.insert(name, ty);
@@ -183,63 +177,54 @@ impl Writer<'_> {
             Expr::If(branch) => {
                 let condition = self.value(here, &branch.cond)?;
                 here.lines.open(&format!("if ({}) {{", condition.text));
-                self.branches(here, branch)
+                self.branches(here, branch)?;
             }
             Expr::While(turns) => {
                 let condition = self.value(here, &turns.cond)?;
-                self.turns(here, &format!("while ({})", condition.text), &turns.body)
+                self.turns(here, &format!("while ({})", condition.text), &turns.body)?;
             }
-            Expr::Loop(turns) if turns.label.is_none() => self.turns(here, "for (;;)", &turns.body),
-            Expr::ForLoop(turns) if turns.label.is_none() => self.for_loop(here, turns),
+            Expr::Loop(turns) if turns.label.is_none() => {
+                self.turns(here, "for (;;)", &turns.body)?;
+            }
+            Expr::ForLoop(turns) if turns.label.is_none() => self.for_loop(here, turns)?,
             Expr::Break(end) if end.label.is_none() && end.expr.is_none() => {
                 here.lines.add("break;");
-                Ok(())
             }
-            Expr::Continue(next) if next.label.is_none() => {
-                here.lines.add("continue;");
-                Ok(())
-            }
+            Expr::Continue(next) if next.label.is_none() => here.lines.add("continue;"),
             Expr::Return(returned) => match &returned.expr {
-                Some(expression) => self.return_value(here, expression),
-                None => {
-                    here.lines.add("return;");
-                    Ok(())
-                }
+                Some(expression) => self.return_value(here, expression)?,
+                None => here.lines.add("return;"),
             },
-            Expr::Assign(assign) => self.assign(here, assign),
+            Expr::Assign(assign) => self.assign(here, assign)?,
             Expr::Binary(_) | Expr::Call(_) | Expr::MethodCall(_) => {
                 let value = self.value(here, expression)?;
                 here.lines.add(&format!("{};", value.text));
-                Ok(())
             }
-            other => Err(self.outside(here, other, "this statement")),
+            other => return Err(self.outside(here, other, "this statement")),
         }
+        Ok(())
     }
 
     /// The branches of an `if` whose condition is written.
     fn branches(&mut self, here: &mut Instance<'_>, branch: &syn::ExprIf) -> Found<()> {
         self.block(here, &branch.then_branch, false)?;
         match branch.else_branch.as_ref().map(|(_, other)| other.as_ref()) {
-            None => {
-                here.lines.close("}");
-                Ok(())
-            }
+            None => here.lines.close("}"),
             Some(Expr::If(next)) => {
-                let condition = self.value(here, &next.cond)?;
+                let condition = self.value(here, &next.cond)?.text;
                 here.lines.depth -= 1;
-                here.lines
-                    .open(&format!("}} else if ({}) {{", condition.text));
-                self.branches(here, next)
+                here.lines.open(&format!("}} else if ({condition}) {{"));
+                self.branches(here, next)?;
             }
             Some(Expr::Block(block)) => {
                 here.lines.depth -= 1;
                 here.lines.open("} else {");
                 self.block(here, &block.block, false)?;
                 here.lines.close("}");
-                Ok(())
             }
-            Some(other) => Err(self.outside(here, other, "this branch")),
+            Some(other) => return Err(self.outside(here, other, "this branch")),
         }
+        Ok(())
     }
 
     fn for_loop(&mut self, here: &mut Instance<'_>, turns: &syn::ExprForLoop) -> Found<()> {
@@ -274,11 +259,8 @@ impl Writer<'_> {
             (false, _, step) => {
                 let less = if is_closed { "<=" } else { "<" };
                 let next = step.map_or(format!("++{i}"), |by| format!("{i} += {}", by.text));
-                format!(
-                    "int {i} = {}; {i} {less} {}; {next}",
-                    from.text,
-                    to.at_least(11)
-                )
+                let (from, to) = (from.text, to.at_least(11));
+                format!("int {i} = {from}; {i} {less} {to}; {next}")
             }
             (true, false, None) => {
                 let last = to.at_least(12);
@@ -303,24 +285,18 @@ impl Writer<'_> {
         let left = self.value(here, &assign.left)?;
         let right = self.value_as(here, &assign.right, Some(&left.ty))?;
         let place = left.at_least(16);
-        let size = left
-            .ty
-            .declare("", &|of| self.spelling(of))
-            .replace(" [", "[");
-        match (&left.ty, &right.repeated) {
-            (Type::Array(..), Some(element)) if element == "0" => {
-                here.lines
-                    .add(&format!("memset({place}, 0, sizeof({size}));"));
-            }
-            (Type::Array(..), None) => {
-                let text = format!("memcpy({place}, {}, sizeof({size}));", right.text);
-                here.lines.add(&text);
-            }
+        let size = left.ty.declare("", &|of| self.spelling(of));
+        let size = size.replace(" [", "[");
+        let text = right.text;
+        let line = match (&left.ty, right.repeated.as_deref()) {
+            (Type::Array(..), Some("0")) => format!("memset({place}, 0, sizeof({size}));"),
+            (Type::Array(..), None) => format!("memcpy({place}, {text}, sizeof({size}));"),
             (Type::Array(..), Some(_)) => {
                 return Err(self.outside(here, assign, "assigning repeated numbers"));
             }
-            _ => here.lines.add(&format!("{} = {};", left.text, right.text)),
-        }
+            _ => format!("{} = {text};", left.text),
+        };
+        here.lines.add(&line);
         Ok(())
     }
 }

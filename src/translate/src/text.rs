@@ -40,19 +40,12 @@ pub(crate) fn wrapped(text: &str) -> String {
         let depth = line.len() - line.trim_start().len();
         let mut rest = line.to_owned();
         while rest.len() > WIDTH && !rest.trim_start().starts_with("/*") {
-            let at = |mark: &str, keep: usize| {
-                let found = rest[..WIDTH.min(rest.len())].rfind(mark)?;
-                (found > depth + 12).then_some(found + keep)
+            let at = |mark: &&str| {
+                let found = rest[..WIDTH.min(rest.len())].rfind(*mark)?;
+                (found > depth + 12).then_some(found + usize::from(*mark == ", "))
             };
-            let places = [
-                (" || ", 0),
-                (" && ", 0),
-                (" ? ", 0),
-                (" : ", 0),
-                (", ", 1),
-                (" + ", 0),
-            ];
-            let Some(at) = places.iter().find_map(|(mark, keep)| at(mark, *keep)) else {
+            let marks = [" || ", " && ", " ? ", " : ", ", ", " + "];
+            let Some(at) = marks.iter().find_map(at) else {
                 break;
             };
             out += rest[..at].trim_end();
