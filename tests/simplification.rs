@@ -1,7 +1,5 @@
 //! Simplification, exact: a table of sums with their simplest forms, and random models; within a tolerance: certificates.
 
-#[path = "simplification/certificates.rs"]
-mod certificates;
 #[path = "simplification/far_out.rs"]
 mod far_out;
 mod tools;

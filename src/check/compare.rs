@@ -14,18 +14,18 @@ const MAX_TERMS: usize = 5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// Phases of the first file in its order, then those that only the second has.
-    pub phases: Vec<PhaseComparison>,
+    pub(crate) phases: Vec<PhaseComparison>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct PhaseComparison {
+pub(crate) struct PhaseComparison {
     /// Its name, or its place from 1 where no file names it.
     pub name: String,
     pub equations: Vec<EquationComparison>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct EquationComparison {
+pub(crate) struct EquationComparison {
     pub output: String,
     pub verdict: Verdict,
     /// A point where only one side has a value.
@@ -49,7 +49,7 @@ pub enum Verdict {
 pub struct Difference {
     pub gap: Gap,
     /// Terms with different coefficients as the files write them, largest difference first.
-    pub terms: Vec<TermDifference>,
+    pub(crate) terms: Vec<TermDifference>,
     /// The terms differ by more than their own rounding explains, but at no one point by more than all rounding.
     pub beside_rounding: bool,
 }
@@ -63,7 +63,7 @@ pub struct TermDifference {
 }
 
 impl Verdict {
-    pub fn is_equal(&self) -> bool {
+    pub(crate) fn is_equal(&self) -> bool {
         matches!(self, Verdict::Equal | Verdict::EqualAsPrinted(_))
     }
 }

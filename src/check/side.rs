@@ -115,7 +115,7 @@ impl Side {
         Ok(side)
     }
 
-    pub fn of_model(file: &str, model: &ReducedModel) -> Self {
+    pub(crate) fn of_model(file: &str, model: &ReducedModel) -> Self {
         let equations = Equations::as_learned(model);
         let phases = equations.phases().iter().map(|phase| {
             let ddz = (0..model.latent_dim()).map(|output| {

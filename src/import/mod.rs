@@ -26,16 +26,16 @@ mod options;
 mod role;
 mod run;
 mod tensors;
+#[cfg(test)]
+#[path = "../../tests/import/units.rs"]
+mod units;
 
-pub use equations::{Equation, Section, Sections};
 pub use latex::variables::{NameError, SymbolNames};
-pub use library::read_terms;
+pub(crate) use library::read_terms;
 pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
-pub use role::{Mapping, Part, Role};
-pub use run::{
-    Chosen, ImportReport, Imported, Layout, ReadEquation, UnusedTensor, UsedTensor, import,
-    import_from_bytes, import_tensors, read_equations,
-};
+pub use role::Mapping;
+pub(crate) use run::{Chosen, import, read_equations};
+pub use run::{ImportReport, Imported, import_from_bytes, import_tensors};
 pub use tensors::Tensor;
 
 /// A fault and its place: the file, a tensor with its use, a character of a text, or an option.

@@ -89,7 +89,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::Domain`] for another number of boxes or ranges, and for a range that is empty or infinite.
-    pub fn new(
+    pub(crate) fn new(
         model: &ReducedModel,
         boxes: Vec<Option<Vec<Interval>>>,
     ) -> Result<Self, SimplifyError> {

@@ -5,6 +5,9 @@
 //! `equation.rs` (the changes made to one equation) and `ranges.rs` (the intervals).
 
 mod certificate;
+#[cfg(test)]
+#[path = "../../tests/simplification/certificates.rs"]
+mod certificates;
 mod domain;
 mod equation;
 mod measure;

@@ -492,8 +492,8 @@ fn ranges_are_those_that_the_rooms_keep_themselves() {
 
 #[test]
 fn ends_are_inside_and_what_lies_beyond_is_not() {
-    const COUNT: Range = Range::whole("count", 1, 500);
-    const SHARE: Range = Range::above("share", 0.0, 1.0);
+    const COUNT: Range = table::HORIZON; // 1 to 500
+    const SHARE: Range = table::BPTT_DECAY; // above 0, at most 1
     for (text, expected) in [
         ("1", Ok(1)),
         (" 500", Ok(500)),
@@ -517,7 +517,7 @@ fn ends_are_inside_and_what_lies_beyond_is_not() {
 
 #[test]
 fn refusal_names_the_setting_the_number_and_the_range() {
-    let refused = Range::real("state-scaling", 1e-6, 1e4).check(1e-200);
+    let refused = table::STATE_SCALING.check(1e-200);
     assert_eq!(
         refused.expect_err("too small").to_string(),
         "state-scaling is 1e-200, expected a number from 1e-6 to 1e4"

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser as _};
 
+use super::Arguments;
 use romc::Error;
-use romc::cli::Arguments;
 use romc::limits::{Range, table};
 
 /// Command lines with a flag that does nothing there, and that flag.

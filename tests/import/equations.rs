@@ -5,11 +5,12 @@ use std::fmt::Write as _;
 use nalgebra::DVector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use romc::import::equations::{Equation, Sections};
 use romc::import::*;
 use romc::model::{LibraryChoice, ReducedModel, StandardLibrary};
 use romc::symbolic::{ExprId, ExprPool};
 
-use crate::store::*;
+use super::store::*;
 
 /// A model's equations as a person would write them.
 fn text_of(model: &ReducedModel) -> String {

@@ -3,11 +3,12 @@
 use std::fs;
 
 use romc::files::Place;
+use romc::import::role::Role;
 use romc::import::*;
 use romc::model::{FeetRule, LibraryChoice, StandardLibrary};
 use zip::CompressionMethod;
 
-use crate::store::{Number, Order, Stored, npz, zip};
+use super::store::{Number, Order, Stored, npz, zip};
 
 fn options(terms: &[&str]) -> ImportOptions {
     let terms = terms.iter().map(|term| (*term).to_owned()).collect();

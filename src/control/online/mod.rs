@@ -49,7 +49,7 @@ pub use plan::Plan;
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, SparseColumns, sparse};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
-    Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput,
-    MpcSettings, RowSelection, Solver,
+    Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MissingInput, MpcSettings,
+    RowSelection, Solver,
 };
 pub use trajectory::NO_PHASE;
