@@ -74,7 +74,7 @@ fn parsed(text: &str) -> Vec<(f64, String)> {
 fn printed(equations: &Equations<'_>) -> String {
     let terms = equations.phases()[0].summands(equations, 0);
     let terms: Vec<String> = terms
-        .map(|(c, term)| format!("{c} {}", term.text()))
+        .map(|(c, term)| format!("{c} {}", term.text))
         .collect();
     terms.join(" ; ")
 }
@@ -116,7 +116,7 @@ fn size(equations: &Equations<'_>, point: &[f64]) -> f64 {
     let value_of = |symbol: SymbolId| point[symbol.index()];
     let terms = equations.phases()[0].summands(equations, 0);
     terms
-        .map(|(c, term)| c.abs() * size_of(pool, term.expr(), &value_of))
+        .map(|(c, term)| c.abs() * size_of(pool, term.expr, &value_of))
         .sum()
 }
 
@@ -373,7 +373,7 @@ fn random_models_keep_their_values_and_never_get_longer() {
         // A sum with the coefficient 1 is written as its terms.
         let count = |equations: &Equations<'_>| {
             let summands = equations.phases()[0].summands(equations, 0);
-            let lengths = summands.map(|(c, term)| match equations.pool().node(term.expr()) {
+            let lengths = summands.map(|(c, term)| match equations.pool().node(term.expr) {
                 Node::Sum(terms) if c.abs() == 1.0 => terms.len(),
                 _ => 1,
             });

@@ -153,7 +153,7 @@ impl Model {
     #[getter]
     fn library(&self) -> Vec<String> {
         let terms = self.data.library().terms().iter();
-        terms.map(|term| term.text().to_owned()).collect()
+        terms.map(|term| term.text.clone()).collect()
     }
 
     /// Name, feet and coefficients (terms x latent) of each phase.

@@ -120,7 +120,7 @@ impl Side {
         let phases = equations.phases().iter().map(|phase| {
             let ddz = (0..model.latent_dim()).map(|output| {
                 let summands = phase.summands(&equations, output);
-                let texts = summands.map(|(c, term)| (c, term.text().to_owned()));
+                let texts = summands.map(|(c, term)| (c, term.text.clone()));
                 RightSide::Summands(texts.collect())
             });
             SidePhase {

@@ -125,7 +125,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         "digest": artifact::digest(model).to_string(),
         "latent_dim": model.latent_dim(),
         "library_dim": model.library().len(),
-        "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
+        "library": model.library().terms().iter().map(|term| term.text.as_str()).collect::<Vec<_>>(),
         "phases": phases,
         "exact": equations.steps(),
         "dominant_coordinates": dominant,

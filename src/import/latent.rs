@@ -139,7 +139,7 @@ fn phases_in_order<'s>(
 
 fn rows_of(library: &Library) -> HashMap<ExprId, Row> {
     let rows = library.terms().iter().enumerate().map(|(index, term)| {
-        let (factor, rest) = library.pool().split(term.expr());
+        let (factor, rest) = library.pool().split(term.expr);
         let factor = factor.to_f64();
         (rest, Row { index, factor })
     });

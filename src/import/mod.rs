@@ -10,7 +10,7 @@
 //! let text = "[contact]\nddz1 = -4*z1 - 0.1*dz1 + 2*(u1 - 0.5)\n[flight]\nddz1 = -1\n";
 //! let options = ImportOptions { name: "hopper".into(), ..ImportOptions::default() };
 //! let imported = import_from_bytes("hopper.txt", Format::Equations, text.as_bytes(), &options)?;
-//! let terms: Vec<&str> = imported.model.library().terms().iter().map(|t| t.text()).collect();
+//! let terms: Vec<&str> = imported.model.library().terms().iter().map(|t| t.text.as_str()).collect();
 //! assert_eq!(terms, ["1", "z1", "dz1", "u1"]);
 //! assert_eq!(imported.model.phases()[0].xi.as_slice(), [-1.0, -4.0, -0.1, 2.0]);
 //! # Ok::<(), romc::import::ImportError>(())

@@ -32,8 +32,8 @@ impl Workspace {
     /// The terms of `equations`, with `1` and the variables of summands that are not affine if a library holds them.
     pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, ModelError> {
         let own = equations.terms();
-        let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
-        let known: BTreeSet<ExprId> = own.iter().map(|term| term.expr()).collect();
+        let mut texts: Vec<String> = own.iter().map(|term| term.text.clone()).collect();
+        let known: BTreeSet<ExprId> = own.iter().map(|term| term.expr).collect();
         let wanted = wanted(equations).into_iter();
         texts.extend(
             wanted
@@ -48,7 +48,7 @@ impl Workspace {
             symbol => symbol.map(Some),
         };
         let terms = library.terms().iter().enumerate();
-        let rows = terms.filter_map(|(row, term)| Some((of(term.expr())?, row)));
+        let rows = terms.filter_map(|(row, term)| Some((of(term.expr)?, row)));
         Ok(Self {
             original: own.len(),
             rows: rows.collect(),
@@ -57,7 +57,7 @@ impl Workspace {
     }
 
     pub(crate) fn text(&self, row: usize) -> &str {
-        self.library.terms()[row].text()
+        &self.library.terms()[row].text
     }
 
     pub(crate) fn constant(&self) -> Option<usize> {
@@ -106,8 +106,8 @@ fn wanted(equations: &Equations<'_>) -> Vec<(ExprId, String)> {
     let active: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
     let mut wanted = vec![(ExprId::ONE, "1".to_owned())];
     for term in active.into_iter().map(|term| &equations.terms()[term]) {
-        if pool.as_symbol(term.expr()).is_none() {
-            let symbols = pool.symbols_of(term.expr()).into_iter();
+        if pool.as_symbol(term.expr).is_none() {
+            let symbols = pool.symbols_of(term.expr).into_iter();
             wanted.extend(symbols.map(|s| (pool.symbol_expr(s), pool.symbol_name(s).to_owned())));
         }
     }
@@ -151,7 +151,7 @@ impl<'a> Ranges<'a> {
     }
 
     pub(crate) fn expr(&self, row: usize) -> ExprId {
-        self.workspace.library.terms()[row].expr()
+        self.workspace.library.terms()[row].expr
     }
 
     pub(crate) fn term(&mut self, row: usize) -> Interval {

@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 use romc::limits::{Range, table};
 use romc::model::{
-    Activation, AffineMap, CandidateTerm, CoordinateOrder, FeetRule, Identifier, InputGivenState,
-    LatentVariable, Layer, Library, LibraryOrder, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError,
-    StandardLibrary, StateMap,
+    Activation, AffineMap, CoordinateOrder, FeetRule, Identifier, InputGivenState, LatentVariable,
+    Layer, Library, LibraryOrder, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError, StandardLibrary,
+    StateMap,
 };
 use romc::robot::STATE_DIM;
 use romc::symbolic::{ExprId, ParseErrorKind, SymbolId};
@@ -268,7 +268,7 @@ fn values_agree_with_the_pool_for_every_node() {
         let [z, dz, u_lat] = values.map(|value| DVector::from_element(1, value));
         let alone = library.evaluate(&z, &dz, &u_lat).unwrap();
         assert_eq!(alone.transpose(), all.row(point));
-        let exprs: Vec<ExprId> = library.terms().iter().map(CandidateTerm::expr).collect();
+        let exprs: Vec<ExprId> = library.terms().iter().map(|term| term.expr).collect();
         let value_of = |symbol: SymbolId| values[symbol.index()];
         let expected = library.pool().evaluate_all(&exprs, &value_of);
         assert_eq!(all.row(point), DVector::from_vec(expected).transpose());
@@ -427,15 +427,15 @@ proptest::proptest! {
 #[test]
 fn order_by_names_and_groups_sorts_into_that_of_romc() {
     let order: CoordinateOrder = "body, fl,fr,rl.kn,rl.hy,rl.hx,rr".parse().unwrap();
-    assert_eq!(order.places()[..9], [12, 13, 14, 15, 16, 17, 3, 4, 5]);
-    assert_eq!(order.places()[12..15], [11, 10, 9]);
-    let foreign = DVector::from_fn(18, |place, _| order.places()[place] as f64);
+    assert_eq!(order.places[..9], [12, 13, 14, 15, 16, 17, 3, 4, 5]);
+    assert_eq!(order.places[12..15], [11, 10, 9]);
+    let foreign = DVector::from_fn(18, |place, _| order.places[place] as f64);
     let sorted = order.sorted(&foreign);
     assert_eq!(sorted, DVector::from_fn(18, |index, _| index as f64));
     let columns = DMatrix::from_columns(&[foreign.clone(), foreign]);
     assert_eq!(order.sorted(&columns).column(1), sorted);
     let by_kind: CoordinateOrder = "kn,hx,hy,body".parse().unwrap();
-    assert_eq!(by_kind.places()[..5], [2, 5, 8, 11, 0]);
+    assert_eq!(by_kind.places[..5], [2, 5, 8, 11, 0]);
 }
 
 #[test]
@@ -453,10 +453,7 @@ fn order_with_a_coordinate_twice_or_missing_or_unknown_is_refused() {
 
 #[test]
 fn common_orders_are_all_different() {
-    let mut orders: Vec<_> = CoordinateOrder::common()
-        .iter()
-        .map(|o| *o.places())
-        .collect();
+    let mut orders: Vec<_> = CoordinateOrder::common().iter().map(|o| o.places).collect();
     orders.sort_unstable();
     orders.dedup();
     assert_eq!(orders.len(), 96);

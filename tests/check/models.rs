@@ -119,7 +119,7 @@ fn text_of(model: &ReducedModel) -> String {
         for output in 0..model.latent_dim() {
             let _ = write!(text, "ddz{} = 0", output + 1);
             for (coefficient, term) in model.active_terms(index, output).expect("in range") {
-                let _ = write!(text, " + {coefficient:?}*({})", term.text());
+                let _ = write!(text, " + {coefficient:?}*({})", term.text);
             }
             text.push('\n');
         }

@@ -32,7 +32,7 @@ fn separate(text: &str) -> String {
     let terms = model.library().terms().iter().zip(xi.iter());
     let texts: Vec<String> = terms
         .filter(|(_, coefficient)| **coefficient != 0.0)
-        .map(|(term, coefficient)| format!("{coefficient:?} {}", term.text()))
+        .map(|(term, coefficient)| format!("{coefficient:?} {}", term.text))
         .collect();
     texts.join("; ")
 }
@@ -81,7 +81,7 @@ fn listed(terms: &[&str]) -> Result<Vec<String>, ImportError> {
     };
     let model = import_tensors("arrays", &[xi], &options)?.model;
     let terms = model.library().terms().iter();
-    Ok(terms.map(|term| term.text().to_owned()).collect())
+    Ok(terms.map(|term| term.text.clone()).collect())
 }
 
 #[test]

@@ -141,7 +141,7 @@ fn reference(equations: &Equations<'_>, point: &[f64]) -> (Wide, f64) {
     };
     let (mut sum, mut size) = (Wide::of(0.0), 0.0);
     for (coefficient, term) in equations.phases()[0].summands(equations, 0) {
-        let values = pool.fold_up(&[term.expr()], |pool, expr, child| match pool.node(expr) {
+        let values = pool.fold_up(&[term.expr], |pool, expr, child| match pool.node(expr) {
             Node::Number(number) => Wide::of(number.to_f64()),
             Node::Symbol(symbol) => input(*symbol),
             Node::Sum(terms) => (terms.iter()).fold(Wide::of(0.0), |a, b| a.plus(child(*b))),

@@ -23,7 +23,7 @@ pub(super) fn terms<'e>(
     let layout = |expr| expression(equations.pool(), expr, symbols);
     let terms = equations.terms().iter();
     terms
-        .map(|term| (term.text(), layout(term.expr())))
+        .map(|term| (term.text.as_str(), layout(term.expr)))
         .collect()
 }
 

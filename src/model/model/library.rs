@@ -69,23 +69,9 @@ impl fmt::Display for LatentVariable {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CandidateTerm {
-    text: String,
-    expr: ExprId,
-}
-
-impl CandidateTerm {
-    /// A term of a pool with its text in the syntax of the model file.
-    pub fn new(text: String, expr: ExprId) -> Self {
-        Self { text, expr }
-    }
-
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-
-    pub fn expr(&self) -> ExprId {
-        self.expr
-    }
+    /// In the syntax of the model file.
+    pub text: String,
+    pub expr: ExprId,
 }
 
 /// The terms of a library as they are given; the model file keeps the form.
@@ -134,7 +120,7 @@ impl Library {
             let expr = parse_term(&mut pool, latent_dim, index, &text)?;
             terms.push(CandidateTerm { text, expr });
         }
-        let exprs: Vec<ExprId> = terms.iter().map(CandidateTerm::expr).collect();
+        let exprs: Vec<ExprId> = terms.iter().map(|term| term.expr).collect();
         let tape = Tape::new(&pool, &exprs, &symbols);
         Ok(Self {
             latent_dim,
@@ -187,7 +173,7 @@ impl Library {
             return Some((standard, (0..self.len()).collect()));
         }
         let mut pool = self.pool.clone();
-        let rows = self.terms.iter().map(CandidateTerm::expr).zip(0..);
+        let rows = self.terms.iter().map(|term| term.expr).zip(0..);
         let rows: HashMap<ExprId, usize> = rows.collect();
         StandardLibrary::small().find_map(|standard| {
             if standard.term_count(self.latent_dim) != Some(rows.len().max(self.len())) {
@@ -248,8 +234,8 @@ impl PartialEq for Library {
     fn eq(&self, other: &Self) -> bool {
         self.latent_dim == other.latent_dim
             && self.standard == other.standard
-            && (self.terms.iter().map(CandidateTerm::text))
-                .eq(other.terms.iter().map(CandidateTerm::text))
+            && (self.terms.iter().map(|term| &term.text))
+                .eq(other.terms.iter().map(|term| &term.text))
     }
 }
 
