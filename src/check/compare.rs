@@ -220,7 +220,7 @@ fn proof(
     }
     let mut forms = CanonicalForms::new(pool, restrictions);
     let [first, second] = order.map(|side| forms.of(rest[side]));
-    let difference = first.minus(&second);
+    let difference = &first - &second;
     let verdict = |form: &CanonicalForm, rounding: f64| {
         let sizes = form.coefficients().map(Coefficient::magnitude);
         match (form.is_zero() && rounding == 0.0, form.may_be_zero()) {
@@ -255,7 +255,7 @@ struct Row {
 
 impl Row {
     fn difference(&self) -> Coefficient {
-        self.coefficients[0].minus(&self.coefficients[1])
+        &self.coefficients[0] - &self.coefficients[1]
     }
 }
 
@@ -270,8 +270,8 @@ impl Table {
                 let (numbers, rest): (Vec<ExprId>, Vec<ExprId>) =
                     factors.partition(|factor| value_of(pool, **factor).is_some());
                 let values = numbers.iter().filter_map(|number| value_of(pool, *number));
-                let value = values.reduce(|product, value| product.times(&value));
-                let coefficient = value.map_or_else(|| scale.clone(), |value| scale.times(&value));
+                let value = values.reduce(|product, value| &product * &value);
+                let coefficient = value.map_or_else(|| scale.clone(), |value| &scale * &value);
                 let rest = pool.product(&rest);
                 let factor = pool.product(&[&[factor], numbers.as_slice()].concat());
                 if let Node::Sum(terms) = pool.node(rest) {
@@ -290,7 +290,7 @@ impl Table {
                 });
                 let term = pool.product(&[factor, rest]);
                 let row = &mut rows[place];
-                row.coefficients[side] = row.coefficients[side].plus(&coefficient);
+                row.coefficients[side] = &row.coefficients[side] + &coefficient;
                 row.terms[side].push(term);
             }
         }

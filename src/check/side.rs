@@ -176,7 +176,7 @@ impl Side {
             None => (self.is_rounded, number.to_owned()),
         };
         let literal = Coefficient::parse(&text, is_rounded)?;
-        let is_half = literal.plus(&literal).is_integer();
+        let is_half = (&literal + &literal).is_integer();
         if !is_rounded && is_half && literal.to_f64() < LARGEST_HALF && float.is_none() {
             return None;
         }

@@ -52,7 +52,7 @@ pub(super) fn parts(
                 terms: coefficients.len(),
             });
         }
-        let mut xi = DMatrix::zeros(library.len(), latent_dim);
+        let mut xi = DMatrix::zeros(library.terms().len(), latent_dim);
         for (column, coefficients) in columns.iter().enumerate() {
             for (term, coefficient) in coefficients {
                 let row = &rows[term];

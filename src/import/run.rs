@@ -155,7 +155,7 @@ fn finish(
     report.state_dim = parts.state_dim();
     let model = build(&report.file, parts, provenance(&report, digest), options)?;
     report.latent_dim = model.latent_dim();
-    report.library_dim = model.library().len();
+    report.library_dim = model.library().terms().len();
     Ok(Imported { model, report })
 }
 

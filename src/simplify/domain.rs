@@ -207,7 +207,7 @@ impl Domain {
         library: &Library,
     ) -> Result<DMatrix<f64>, ModelError> {
         let Some(samples) = samples.map(|samples| &samples.phases[phase]) else {
-            return Ok(DMatrix::zeros(0, library.len()));
+            return Ok(DMatrix::zeros(0, library.terms().len()));
         };
         let inside: Vec<usize> = (0..samples.ncols())
             .filter(|&k| self.contains(phase, samples.column(k).iter().copied()))

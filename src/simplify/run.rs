@@ -64,7 +64,7 @@ pub fn simplify(
     }
     let mut certificate = Certificate {
         tolerance,
-        exact: equations.steps().to_vec(),
+        exact: equations.steps.clone(),
         phases,
     };
     let mut simplified = equations.to_model()?.into_owned();
@@ -294,7 +294,7 @@ fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyErr
 /// The variables that any `ddz` of a phase depends on, in the order of [`LatentVariable::all`].
 fn variables(system: &Equations<'_>, phase: usize) -> Vec<LatentVariable> {
     let summands = system.phases()[phase].ddz.iter().flatten();
-    let exprs = summands.map(|summand| system.terms()[summand.term].expr);
+    let exprs = summands.map(|summand| system.terms[summand.term].expr);
     let symbols: BTreeSet<SymbolId> = exprs.flat_map(|e| system.pool().symbols_of(e)).collect();
     LatentVariable::all(system.latent_dim())
         .filter(|variable| symbols.contains(&system.symbol(*variable)))

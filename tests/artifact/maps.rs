@@ -216,7 +216,7 @@ fn first_phase_whose_rule_matches_the_feet_wins_if_any_does() {
     assert_eq!(model.phase_for(FOUR_FEET), Some(1));
     assert_eq!(model.phase_for([true, false, false, false]), Some(1));
     assert_eq!(model.phase_for(NO_FOOT), Some(2));
-    assert_eq!(model.phase_named("stance"), Some(1));
+    assert_eq!(model.phases()[1].name, "stance");
     assert_eq!(model.phase_identifier(1).as_str(), "stance");
     let without_flight = model.phases()[..2].to_vec();
     let partial = model.into_builder().phases(without_flight).build().unwrap();

@@ -227,7 +227,7 @@ fn compared(count: usize, is_single: bool) -> (Vec<Compared>, usize) {
         let model = model_of(&sum);
         let learned = Equations::as_learned(&model);
         let simplified = Equations::of(&model);
-        n_simplified += usize::from(!simplified.steps().is_empty());
+        n_simplified += usize::from(!simplified.steps.is_empty());
         let program = |equations| lower::dynamics(equations, 0, Form::default()).expect("lowers");
         let programs = [program(&learned), program(&simplified)];
         for _ in 0..POINTS {

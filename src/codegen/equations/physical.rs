@@ -147,14 +147,14 @@ impl Equations<'_> {
                 (symbol, pool.mul(number, expr))
             })
             .collect();
-        let exprs: Vec<ExprId> = self.terms().iter().map(|term| term.expr).collect();
+        let exprs: Vec<ExprId> = self.terms.iter().map(|term| term.expr).collect();
         let scaled = pool.substitute_all(&exprs, &replacements);
         let split = |expr: ExprId| match pool.terms_of(expr).as_slice() {
             [(number, rest)] => (number.to_f64(), *rest),
             _ => (1.0, expr),
         };
         let (factors, exprs): (Vec<f64>, Vec<ExprId>) = scaled.into_iter().map(split).unzip();
-        let terms = (exprs.iter().zip(self.terms())).map(|(&expr, term)| match expr == term.expr {
+        let terms = (exprs.iter().zip(&self.terms)).map(|(&expr, term)| match expr == term.expr {
             true => term.clone(),
             false => CandidateTerm {
                 text: pool.display(expr).to_string(),

@@ -37,9 +37,11 @@ pub struct PhaseEquations {
 pub struct Equations<'a> {
     pub(super) model: Cow<'a, ReducedModel>,
     pub(super) pool: ExprPool,
-    pub(super) terms: Vec<CandidateTerm>,
+    /// The terms of all phases.
+    pub terms: Vec<CandidateTerm>,
     pub(super) phases: Vec<PhaseEquations>,
-    pub(super) steps: Vec<ExactStep>,
+    /// What exact simplification did, in the order of phases and equations.
+    pub steps: Vec<ExactStep>,
     /// The units of equations in physical units, and what these were made from.
     pub(super) physical: Option<(LatentUnits, Box<Equations<'static>>)>,
 }
@@ -72,11 +74,6 @@ impl<'a> Equations<'a> {
             steps: Vec::new(),
             physical: None,
         }
-    }
-
-    /// What exact simplification did, in the order of phases and equations.
-    pub fn steps(&self) -> &[ExactStep] {
-        &self.steps
     }
 
     /// A model whose Xi and library are these equations: the one they were made from if nothing was simplified.
@@ -152,11 +149,6 @@ impl<'a> Equations<'a> {
         &self.pool
     }
 
-    /// The distinct terms in the order in which they are printed; a term may be unused.
-    pub fn terms(&self) -> &[CandidateTerm] {
-        &self.terms
-    }
-
     /// All phases, in the model's order.
     pub fn phases(&self) -> &[PhaseEquations] {
         &self.phases
@@ -195,7 +187,7 @@ impl PhaseEquations {
         equations: &'e Equations<'_>,
         output: usize,
     ) -> impl Iterator<Item = (f64, &'e CandidateTerm)> + 'e {
-        let terms = equations.terms();
+        let terms = &equations.terms;
         (self.ddz[output].iter()).map(|summand| (summand.coefficient, &terms[summand.term]))
     }
 

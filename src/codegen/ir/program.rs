@@ -27,7 +27,7 @@ impl ValueId {
 pub(crate) const LANES: usize = 2;
 
 /// A number per lane.
-pub type Vector = [ValueId; LANES];
+pub(crate) type Vector = [ValueId; LANES];
 
 /// A constant matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]

@@ -191,7 +191,7 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
             Some((library.symbol(variable)?, renamed))
         })
         .collect();
-    let renamed = terms.map(|term| pool.substitute(term.expr, &replacements));
+    let renamed = terms.map(|term| pool.substitute_all(&[term.expr], &replacements)[0]);
     renamed.map(|term| known.get(&term).copied()).collect()
 }
 

@@ -53,12 +53,8 @@ impl Range {
         }
     }
 
-    pub fn is_whole(&self) -> bool {
-        self.kind == Kind::Whole
-    }
-
     /// Whether a number is in the range; NaN never is.
-    pub fn contains(&self, value: f64) -> bool {
+    pub(crate) fn contains(&self, value: f64) -> bool {
         let is_kind = match self.kind {
             Kind::Whole => value.fract() == 0.0,
             Kind::Real => true,

@@ -153,14 +153,6 @@ impl Library {
         self.latent_dim
     }
 
-    pub fn len(&self) -> usize {
-        self.terms.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.terms.is_empty()
-    }
-
     pub fn choice(&self) -> LibraryChoice {
         let texts = || self.terms.iter().map(|term| term.text.clone()).collect();
         let standard = self.standard.map(LibraryChoice::Standard);
@@ -170,13 +162,13 @@ impl Library {
     /// The standard library of the same terms, and for each of its terms in romc's order the row of this one.
     pub fn as_standard(&self) -> Option<(StandardLibrary, Vec<usize>)> {
         if let Some(standard) = self.standard {
-            return Some((standard, (0..self.len()).collect()));
+            return Some((standard, (0..self.terms.len()).collect()));
         }
         let mut pool = self.pool.clone();
         let rows = self.terms.iter().map(|term| term.expr).zip(0..);
         let rows: HashMap<ExprId, usize> = rows.collect();
         StandardLibrary::small().find_map(|standard| {
-            if standard.term_count(self.latent_dim) != Some(rows.len().max(self.len())) {
+            if standard.term_count(self.latent_dim) != Some(rows.len().max(self.terms.len())) {
                 return None;
             }
             let texts = standard.texts(self.latent_dim).ok()?;
@@ -220,8 +212,8 @@ impl Library {
         let expected = (3 * self.latent_dim, variables.ncols());
         check_shape("z, dz, u_lat", variables.shape(), expected)?;
         let mut values = vec![0.0; self.tape.steps.len()];
-        let mut theta = vec![0.0; self.len()];
-        let mut all = DMatrix::zeros(variables.ncols(), self.len());
+        let mut theta = vec![0.0; self.terms.len()];
+        let mut all = DMatrix::zeros(variables.ncols(), self.terms.len());
         for (point, mut row) in variables.column_iter().zip(all.row_iter_mut()) {
             self.tape.run(point.as_slice(), &mut values, &mut theta);
             row.copy_from_slice(&theta);
