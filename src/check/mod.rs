@@ -43,7 +43,7 @@ use crate::symbolic::{Coefficient, ExprId, ExprPool, Number};
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {
-    pub(crate) exact: bool,
+    pub exact: bool,
     pub(crate) symbols: SymbolNames,
     pub(crate) domain: CheckDomain,
 }

@@ -54,7 +54,7 @@ pub(super) fn read_file(path: &Path, max: u64) -> Read<(String, Vec<u8>)> {
 /// Imports a model from a file in memory; `file` names it in errors.
 ///
 /// # Errors
-/// As [`import`]. Never panics, whatever the bytes are.
+/// As `import`. Never panics, whatever the bytes are.
 pub fn import_from_bytes(
     file: &str,
     format: Format,
@@ -82,7 +82,7 @@ pub fn import_from_bytes(
     finish(parts, report, &Sha256::digest(bytes), options)
 }
 
-/// Imports tensors in memory, named as those of a file; `source` names them in errors, which are those of [`import`].
+/// Imports tensors in memory, named as those of a file; `source` names them in errors, which are those of `import`.
 pub fn import_tensors(
     source: &str,
     arrays: &[Tensor<'_>],

@@ -6,8 +6,7 @@ use crate::recording::clock::{Timed, elapsed, timed};
 use crate::recording::{Segment, read};
 
 fn jump() -> Segment {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/recordings/go1/test_01.csv.gz");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/recordings/go1/test_01.csv.gz");
     read(&path).expect("a shipped jump").segments.swap_remove(0)
 }
 
