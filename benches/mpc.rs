@@ -299,7 +299,7 @@ fn dump(model: &romc::model::ReducedModel, segments: &[Segment], push: f64, path
             step_pushed(&mut controller, segment, sample, push, &mut command);
             let program = conic(&controller).program();
             let equalities = program.cones.first().map_or(0, |cone| cone.dim());
-            let matrix = |matrix: &romc::mpc::SparseColumns| {
+            let matrix = |matrix: &clarabel::algebra::CscMatrix<f64>| {
                 serde_json::json!({
                     "shape": [matrix.m, matrix.n],
                     "indptr": matrix.colptr,

@@ -19,7 +19,7 @@
 use std::io::Write as _;
 
 use romc::mpc::problem::{Row, RowKind, needed_rows};
-use romc::mpc::structured::{has_avx2, prepare, solve};
+use romc::mpc::structured::{prepare, solve};
 use romc::mpc::{Cone, ConeProgram, QpSettings, QpSolver, sparse};
 use romc::solver::{Cost, Links, Outcome, Program, RowMatrices, Settings, Shape, Stage};
 
@@ -235,13 +235,17 @@ fn run<const NX: usize, const NU: usize>(
                 cost,
             };
             let mut report = None;
+            #[cfg(target_arch = "x86_64")]
+            let is_wide = is_x86_feature_detected!("avx2");
+            #[cfg(not(target_arch = "x86_64"))]
+            let is_wide = false;
             let time = clock::timed(|| {
                 if tick > 0 {
                     program.shift();
                 }
                 write(&mut program, &shared, step);
                 let x0 = std::array::from_fn(|i| step.x0[i] - step.reference[i]);
-                report = Some(match has_avx2() {
+                report = Some(match is_wide {
                     true => {
                         prepare::<true, NX, NU, false>(&mut program);
                         solve::<true, NX, NU, false>(&mut program, &x0, is_warm, &settings)

@@ -97,7 +97,7 @@ impl Error {
     }
 
     /// Whether an option had a value that it cannot have, as opposed to a run that failed.
-    pub fn is_usage(&self) -> bool {
+    pub(crate) fn is_usage(&self) -> bool {
         match self {
             Self::Robot(error) => matches!(error, RobotError::UnknownRobot { .. }),
             Self::RobotFile(error) => error.file.is_empty(),

@@ -44,6 +44,9 @@
 //! `examples/train_model.rs` trains one, `examples/latent_mpc.rs` runs the controller. `ARCHITECTURE.md` has the rooms
 //! and who may import whom, `docs/mathematics.md` the equations.
 
+#[cfg(test)]
+extern crate self as romc; // for test files that were written from outside
+
 pub mod check;
 pub mod cli;
 pub mod deploy;

@@ -46,7 +46,7 @@ fn with_xi(model: &ReducedModel, change: impl Fn(&str, f64) -> f64) -> ReducedMo
     let terms = model.library().terms();
     let phases = model.phases().iter().cloned().map(|mut phase| {
         phase.xi = DMatrix::from_fn(phase.xi.nrows(), phase.xi.ncols(), |row, col| {
-            change(terms[row].text(), phase.xi[(row, col)])
+            change(&terms[row].text, phase.xi[(row, col)])
         });
         phase
     });

@@ -145,7 +145,7 @@ fn paper_model_has_the_printed_equations() {
         let terms = model.active_terms(phase, output).expect("in range");
         terms
             .into_iter()
-            .map(|(coefficient, term)| (coefficient, term.text().to_owned()))
+            .map(|(coefficient, term)| (coefficient, term.text.clone()))
             .collect()
     };
     let expected = |terms: &[(f64, &str)]| -> Vec<(f64, String)> {
@@ -929,7 +929,7 @@ fn library_with_equal_terms_is_kept_as_given() {
     value["library"][6] = json!("dz2*z1");
     let model = read_value(&value).expect("equal terms are summed in print");
     let texts: Vec<&str> = (model.library().terms().iter())
-        .map(|term| term.text())
+        .map(|term| term.text.as_str())
         .collect();
     assert_eq!(texts[5..7], ["z1*dz2", "dz2*z1"]);
 }

@@ -1,14 +1,5 @@
-//! `romc check`: models against their own print, mutated ones, papers typed by hand, and the command.
+//! `romc check`: the command; what it compares is in `check/units.rs`.
 
 #[path = "check/command.rs"]
 mod command;
 mod command_line;
-#[path = "check/domains.rs"]
-mod domains;
-#[path = "check/models.rs"]
-mod models;
-#[path = "check/papers.rs"]
-mod papers;
-#[path = "check/printed.rs"]
-mod printed;
-mod tools;

@@ -4,8 +4,6 @@
 mod bounds;
 #[path = "cli/failed_runs.rs"]
 mod failed_runs;
-#[path = "cli/flags.rs"]
-mod flags;
 #[path = "cli/outputs.rs"]
 mod outputs;
 mod outside;

@@ -190,7 +190,7 @@ fn generated_code_of_a_large_polynomial_equals_the_interpreter() {
     case.interpret();
     let is_of_lanes = |s: &Statement| matches!(s, Statement::Lanes { .. });
     let mut programs = case.functions.iter().map(|function| &function.program);
-    assert!(programs.any(|program| program.statements().iter().any(is_of_lanes)));
+    assert!(programs.any(|program| program.statements.iter().any(is_of_lanes)));
     check_all("cubic", &[case], |_| {
         tools::thorough_or(Build::all(), Build::exact())
     });
@@ -214,7 +214,7 @@ fn random_models_have_all_shapes() {
     }
     let has = |model: &ReducedModel, part: &str| {
         let terms = model.library().terms();
-        terms.iter().any(|term| term.text().contains(part))
+        terms.iter().any(|term| term.text.contains(part))
     };
     for part in [
         "sin(", "tanh(", "exp(", "log(", "sqrt(", "abs(", "^1.5", "^3",
@@ -315,7 +315,7 @@ fn lowered_maps_of_nonlinear_models_equal_the_models_own_evaluation() {
                     error <= 1e-9 * scale,
                     "{} {}: {found} {expected}",
                     model.name(),
-                    program.name()
+                    program.name
                 );
             }
             let back = &tangent.project * (&tangent.lift * &u_lat);
@@ -446,7 +446,7 @@ fn sums(equations: &Equations<'_>, phase: usize) -> (ExprPool, Vec<ExprId>) {
         let mut products = Vec::new();
         for (coefficient, term) in phase.summands(equations, output) {
             let factor = pool.number(coefficient);
-            products.push(pool.mul(factor, term.expr()));
+            products.push(pool.mul(factor, term.expr));
         }
         pool.sum(&products)
     };
@@ -522,7 +522,7 @@ fn jacobian_pattern_lists_each_entry_once_in_row_major_order() {
                 .collect();
             assert!(places.is_sorted(), "{places:?}");
             assert!(places.windows(2).all(|pair| pair[0] != pair[1]));
-            let stored = program.outputs().get(1).map_or(0, |slot| slot.len);
+            let stored = program.outputs.get(1).map_or(0, |slot| slot.len);
             assert_eq!(stored, places.len());
         }
     }

@@ -258,7 +258,7 @@ fn the_derivative_of_a_power_of_a_product_has_a_value_where_the_product_is_zero(
         let equations = Equations::of(&model);
         let lowered = dynamics_jacobian(&equations, 0, Form::default());
         let (program, _) = lowered.expect("lowers");
-        let lens = program.outputs().iter().map(|slot| slot.len);
+        let lens = program.outputs.iter().map(|slot| slot.len);
         let mut outputs: Vec<Vec<f64>> = lens.map(|len| vec![f64::NAN; len]).collect();
         let mut written: Vec<&mut [f64]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
         let zero = [0.0; 2];

@@ -47,7 +47,7 @@ fn against_the_go1(found: &Identification) -> Vec<(&'static str, f64, f64, f64)>
             [0.01; 3],
         ),
     ] {
-        let (values, errors) = (values.to_array(), errors.to_array());
+        let [values, errors] = [values, errors].map(|of| [of.hx, of.hy, of.kn]);
         for kind in 0..3 {
             all.push((names[kind], values[kind], errors[kind], truth[kind]));
         }

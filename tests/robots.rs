@@ -94,7 +94,7 @@ fn feet_and_jacobians_are_those_of_pinocchio() {
                     .iter()
                     .flat_map(numbers);
                 let expected = Matrix3::from_row_iterator(rows);
-                let found = robot.foot_jacobian(leg, &q);
+                let found = robot.geometry(leg).foot_jacobian(&q);
                 assert!(
                     (found - expected).amax() < 1e-9,
                     "{name} {leg}: {found} {expected}"
@@ -635,9 +635,15 @@ fn signs_and_offsets_turn_the_same_leg_at_other_angles() {
     for leg in Leg::ALL {
         let q = [0.1, 0.7, -1.4];
         let read = [q[0], q[1], 0.4 - q[2]];
-        let (a, b) = (own.foot_position(leg, &q), turned.foot_position(leg, &read));
+        let (a, b) = (
+            own.geometry(leg).foot_position(&q),
+            turned.geometry(leg).foot_position(&read),
+        );
         assert!((a - b).norm() < 1e-15, "{leg}: {a} {b}");
-        let (a, b) = (own.foot_jacobian(leg, &q), turned.foot_jacobian(leg, &read));
+        let (a, b) = (
+            own.geometry(leg).foot_jacobian(&q),
+            turned.geometry(leg).foot_jacobian(&read),
+        );
         assert!((a.column(2) + b.column(2)).norm() < 1e-15);
     }
 }

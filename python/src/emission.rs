@@ -153,9 +153,7 @@ pub fn equations(
             .map(|((system, phase), rule)| {
                 let summands = |output| {
                     let summands = phase.summands(&equations, output);
-                    summands
-                        .map(|(xi, term)| (xi, term.text().to_owned()))
-                        .collect()
+                    summands.map(|(xi, term)| (xi, term.text.clone())).collect()
                 };
                 PhaseText {
                     name: phase.name.clone(),

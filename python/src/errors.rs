@@ -343,7 +343,7 @@ fn unknown(py: Python<'_>, option: &str, name: &str, expected: &str) -> PyErr {
 
 /// The axes of force and moment, by their name on the command line.
 pub fn wrench_frame(py: Python<'_>, name: &str) -> PyResult<WrenchFrame> {
-    WrenchFrame::by_name(name).ok_or_else(|| {
+    name.parse().map_err(|()| {
         let names = WrenchFrame::ALL.map(WrenchFrame::name).join(", ");
         usage(
             py,

@@ -153,7 +153,7 @@ impl Model {
     #[getter]
     fn library(&self) -> Vec<String> {
         let terms = self.data.library().terms().iter();
-        terms.map(|term| term.text().to_owned()).collect()
+        terms.map(|term| term.text.clone()).collect()
     }
 
     /// Name, feet and coefficients (terms x latent) of each phase.
@@ -226,7 +226,8 @@ impl Model {
         u_lat: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (py, d) = (z.py(), self.data.latent_dim());
-        let Some(index) = self.data.phase_named(phase) else {
+        let mut phases = self.data.phases().iter();
+        let Some(index) = phases.position(|known| known.name == phase) else {
             let phases = self.data.phases().iter();
             let known: Vec<&str> = phases.map(|phase| phase.name.as_str()).collect();
             let expected = known.join(", ");

@@ -9,7 +9,7 @@ use romc::limits::table;
 use romc::model::ReducedModel;
 use romc::sim::LatentSegment;
 use romc::simplify::{
-    Domain, MARGIN, Samples, SimplifyError, Tolerance, certificate_json, markdown,
+    Domain, MARGIN, Samples, SimplifyError, Tolerance, certificate_json, certificate_page,
 };
 
 use crate::errors::{python_error, usage, within};
@@ -50,7 +50,7 @@ pub fn simplify(
             romc::simplify::simplify(&equations, &domain, samples.as_ref(), tolerance)?;
         let (model, certificate) = (simplified.model, simplified.certificate);
         let json = certificate_json(&certificate).to_string();
-        let page = markdown([original, &model], &certificate, None, &[]);
+        let page = certificate_page([original, &model], &certificate);
         let is_changed = certificate.n_changes() > 0;
         Ok((Model::new(model), is_changed, json, page))
     });

@@ -135,7 +135,11 @@ impl ExprPool {
     }
 
     /// `expr` with symbols replaced all at once, so that `x` and `y` can be exchanged; the first entry of each counts.
-    pub fn substitute(&mut self, expr: ExprId, replacements: &[(SymbolId, ExprId)]) -> ExprId {
+    pub(crate) fn substitute(
+        &mut self,
+        expr: ExprId,
+        replacements: &[(SymbolId, ExprId)],
+    ) -> ExprId {
         self.substitute_all(&[expr], replacements)[0]
     }
 

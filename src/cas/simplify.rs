@@ -184,7 +184,7 @@ impl ExprPool {
             0 | 1 => false,
             2..=PROVEN_LEVELS if self.affords(1) => {
                 let mut forms = CanonicalForms::new(self, &[before, form]);
-                let difference = forms.of(before).minus(&forms.of(form));
+                let difference = &forms.of(before) - &forms.of(form);
                 let difference = forms.without_fractions(&difference);
                 difference.is_none_or(|difference| !difference.is_zero())
             }

@@ -14,18 +14,18 @@ const MAX_TERMS: usize = 5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// Phases of the first file in its order, then those that only the second has.
-    pub phases: Vec<PhaseComparison>,
+    pub(crate) phases: Vec<PhaseComparison>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct PhaseComparison {
+pub(crate) struct PhaseComparison {
     /// Its name, or its place from 1 where no file names it.
     pub name: String,
     pub equations: Vec<EquationComparison>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct EquationComparison {
+pub(crate) struct EquationComparison {
     pub output: String,
     pub verdict: Verdict,
     /// A point where only one side has a value.
@@ -49,7 +49,7 @@ pub enum Verdict {
 pub struct Difference {
     pub gap: Gap,
     /// Terms with different coefficients as the files write them, largest difference first.
-    pub terms: Vec<TermDifference>,
+    pub(crate) terms: Vec<TermDifference>,
     /// The terms differ by more than their own rounding explains, but at no one point by more than all rounding.
     pub beside_rounding: bool,
 }
@@ -63,7 +63,7 @@ pub struct TermDifference {
 }
 
 impl Verdict {
-    pub fn is_equal(&self) -> bool {
+    pub(crate) fn is_equal(&self) -> bool {
         matches!(self, Verdict::Equal | Verdict::EqualAsPrinted(_))
     }
 }
@@ -220,7 +220,7 @@ fn proof(
     }
     let mut forms = CanonicalForms::new(pool, restrictions);
     let [first, second] = order.map(|side| forms.of(rest[side]));
-    let difference = first.minus(&second);
+    let difference = &first - &second;
     let verdict = |form: &CanonicalForm, rounding: f64| {
         let sizes = form.coefficients().map(Coefficient::magnitude);
         match (form.is_zero() && rounding == 0.0, form.may_be_zero()) {
@@ -255,7 +255,7 @@ struct Row {
 
 impl Row {
     fn difference(&self) -> Coefficient {
-        self.coefficients[0].minus(&self.coefficients[1])
+        &self.coefficients[0] - &self.coefficients[1]
     }
 }
 
@@ -270,8 +270,8 @@ impl Table {
                 let (numbers, rest): (Vec<ExprId>, Vec<ExprId>) =
                     factors.partition(|factor| value_of(pool, **factor).is_some());
                 let values = numbers.iter().filter_map(|number| value_of(pool, *number));
-                let value = values.reduce(|product, value| product.times(&value));
-                let coefficient = value.map_or_else(|| scale.clone(), |value| scale.times(&value));
+                let value = values.reduce(|product, value| &product * &value);
+                let coefficient = value.map_or_else(|| scale.clone(), |value| &scale * &value);
                 let rest = pool.product(&rest);
                 let factor = pool.product(&[&[factor], numbers.as_slice()].concat());
                 if let Node::Sum(terms) = pool.node(rest) {
@@ -290,7 +290,7 @@ impl Table {
                 });
                 let term = pool.product(&[factor, rest]);
                 let row = &mut rows[place];
-                row.coefficients[side] = row.coefficients[side].plus(&coefficient);
+                row.coefficients[side] = &row.coefficients[side] + &coefficient;
                 row.terms[side].push(term);
             }
         }

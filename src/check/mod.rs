@@ -23,9 +23,12 @@
 mod compare;
 mod point;
 mod side;
+#[cfg(test)]
+#[path = "../../tests/check/units.rs"]
+mod units;
 
 pub(crate) use compare::TermDifference;
-pub use compare::{Comparison, Difference, EquationComparison, PhaseComparison, Verdict, compare};
+pub use compare::{Comparison, Difference, Verdict, compare};
 pub(crate) use point::CheckDomain;
 pub use point::Gap;
 pub(crate) use side::read_sides;
@@ -41,6 +44,6 @@ use crate::symbolic::{Coefficient, ExprId, ExprPool, Number};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {
     pub exact: bool,
-    pub symbols: SymbolNames,
-    pub domain: CheckDomain,
+    pub(crate) symbols: SymbolNames,
+    pub(crate) domain: CheckDomain,
 }

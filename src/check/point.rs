@@ -189,7 +189,7 @@ impl Sides<'_> {
 
 /// A range per variable and phase; -1 to 1 where there is none.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct CheckDomain {
+pub(crate) struct CheckDomain {
     phases: BTreeMap<String, BTreeMap<String, [f64; 2]>>,
 }
 

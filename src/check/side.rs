@@ -115,12 +115,12 @@ impl Side {
         Ok(side)
     }
 
-    pub fn of_model(file: &str, model: &ReducedModel) -> Self {
+    pub(crate) fn of_model(file: &str, model: &ReducedModel) -> Self {
         let equations = Equations::as_learned(model);
         let phases = equations.phases().iter().map(|phase| {
             let ddz = (0..model.latent_dim()).map(|output| {
                 let summands = phase.summands(&equations, output);
-                let texts = summands.map(|(c, term)| (c, term.text().to_owned()));
+                let texts = summands.map(|(c, term)| (c, term.text.clone()));
                 RightSide::Summands(texts.collect())
             });
             SidePhase {
@@ -176,7 +176,7 @@ impl Side {
             None => (self.is_rounded, number.to_owned()),
         };
         let literal = Coefficient::parse(&text, is_rounded)?;
-        let is_half = literal.plus(&literal).is_integer();
+        let is_half = (&literal + &literal).is_integer();
         if !is_rounded && is_half && literal.to_f64() < LARGEST_HALF && float.is_none() {
             return None;
         }

@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
         "name": model.name(),
         "digest": artifact::digest(model).to_string(),
         "targets": arguments.emit.iter().map(|target| target.name()).collect::<Vec<_>>(),
-        "exact": exact.steps(),
+        "exact": exact.steps,
         "simplification": certificate,
         "saved_model": shown(&simplification.save_model),
         "files": files.collect::<Vec<_>>(),

@@ -213,7 +213,7 @@ fn describe(report: &ImportReport) -> String {
         .column("line", "", |equation| equation.line)
         .column("terms", "", |equation| equation.terms)
         .table();
-    let filled = |table: Table| lines("", Some(table).filter(|table| !table.is_empty()));
+    let filled = |table: Table| lines("", Some(table).filter(|table| !table.rows.is_empty()));
     let unused = report.unused.iter();
     let unused = unused.map(|of| format!("{} ({})", of.tensor, shape(&of.shape)));
     let state = (report.state_dim).map(|dim| format!("{dim} robot coordinates, "));

@@ -86,12 +86,12 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         "{file}: model `{}`, {} latent coordinates, {} candidate terms\n",
         model.name(),
         model.latent_dim(),
-        model.library().len()
+        model.library().terms().len()
     );
     let description = Some(model.description()).filter(|text| !text.is_empty());
     text += &lines("  ", description);
     text += &input_rule(model);
-    let coefficients = equations.terms().len() * equations.latent_dim();
+    let coefficients = equations.terms.len() * equations.latent_dim();
     let phases = equations.phases().iter().map(|phase| {
         let (feet, active) = (phase.feet.to_string(), phase.active_count());
         json!({"name": phase.name, "feet": feet, "active_terms": active, "coefficients": coefficients})
@@ -99,7 +99,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     let phases: Vec<Value> = phases.collect();
     let table = phase_table(&equations, coefficients);
     text += &format!("\n{table}\n{}", exact_words(&equations));
-    if equations.terms().len() <= PATTERN_WIDTH {
+    if equations.terms.len() <= PATTERN_WIDTH {
         text.extend((0..phases.len()).map(|phase| pattern(&equations, phase)));
     }
     let dominant = dominant_coordinates(model);
@@ -115,7 +115,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         None
     });
     if let Some(table) = invariance.as_ref().map(invariance_table) {
-        let _ = write!(text, "\n{}\n\n{table}", table.caption());
+        let _ = write!(text, "\n{}\n\n{table}", table.caption);
     }
     let json = json!({
         "kind": "model",
@@ -124,10 +124,10 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         "description": model.description(),
         "digest": artifact::digest(model).to_string(),
         "latent_dim": model.latent_dim(),
-        "library_dim": model.library().len(),
-        "library": model.library().terms().iter().map(|term| term.text()).collect::<Vec<_>>(),
+        "library_dim": model.library().terms().len(),
+        "library": model.library().terms().iter().map(|term| term.text.as_str()).collect::<Vec<_>>(),
         "phases": phases,
-        "exact": equations.steps(),
+        "exact": equations.steps,
         "dominant_coordinates": dominant,
         "encoder": encoder,
         "decoder": decoder,

@@ -8,6 +8,9 @@ mod check;
 mod compile;
 mod convert;
 mod demo;
+#[cfg(test)]
+#[path = "../../tests/cli/flags.rs"]
+mod flags;
 mod identify;
 mod import;
 mod inspect;
@@ -24,7 +27,7 @@ mod study;
 mod train;
 mod train_settings;
 
-pub use args::{command::Arguments, compile::UnitsChoice};
+pub use args::compile::UnitsChoice;
 pub use import::{Compared, import_compared};
 
 use std::borrow::Cow;

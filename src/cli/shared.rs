@@ -20,9 +20,7 @@ use crate::report::{Figure, figure_files};
 use crate::robot::Robot;
 use crate::train::sha256;
 
-pub(crate) use crate::files::{
-    shell_path as quoted, shell_paths as quoted_all, shell_word as quoted_text,
-};
+pub(crate) use crate::files::{shell_path as quoted, shell_word as quoted_text};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Format(&'static [&'static str]);
@@ -356,4 +354,10 @@ fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
 pub(super) fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
     bar.set_length(total as u64);
     bar.set_position(done as u64);
+}
+
+/// Paths as a shell reads them, in one line.
+pub(super) fn quoted_all(paths: &[PathBuf]) -> String {
+    let words: Vec<String> = paths.iter().map(|path| quoted(path)).collect();
+    words.join(" ")
 }

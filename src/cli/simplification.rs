@@ -199,7 +199,7 @@ impl Outcome {
 }
 
 pub(super) fn exact_words(equations: &Equations<'_>) -> String {
-    match equations.steps() {
+    match equations.steps.as_slice() {
         [] => String::new(),
         steps => format!("simplified exactly:\n{}\n", lines("  ", steps)),
     }

@@ -198,7 +198,7 @@ impl<'a> Assembly<'a, '_> {
     /// Brings rows over a standard library from the file's order into romc's; returns the terms in the file's order.
     fn sort_terms(&mut self, library: &Library, phases: &mut [Phase]) -> Read<Vec<String>> {
         let LibraryChoice::Standard(standard) = library.choice() else {
-            let terms = library.terms().iter().map(|term| term.text().to_owned());
+            let terms = library.terms().iter().map(|term| term.text.clone());
             return Ok(terms.collect());
         };
         let latent_dim = library.latent_dim();

@@ -19,7 +19,7 @@ pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 
 /// The equations of one phase.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Section {
+pub(crate) struct Section {
     /// The phase, if the file names it.
     pub phase: Option<String>,
     /// Line of its start, from 1.
@@ -40,7 +40,7 @@ impl Section {
 
 /// The right side of one equation and where it came from.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Equation {
+pub(crate) struct Equation {
     /// Latent coordinate, from 0.
     pub output: usize,
     /// Line of the left side, from 1.
@@ -56,7 +56,7 @@ pub(super) type Position = (usize, usize);
 
 /// The equations of a text or LaTeX file in sections, every one with the same left sides.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sections {
+pub(crate) struct Sections {
     /// Number of latent coordinates.
     pub latent_dim: usize,
     /// In the file's order.
@@ -252,7 +252,7 @@ impl Equation {
     }
 
     /// The right side in the grammar of candidate terms, numbers as they are written.
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let texts: Vec<&str> = self.pieces.iter().map(|(_, text)| text.as_str()).collect();
         texts.join("\n")
     }

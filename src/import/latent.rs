@@ -52,7 +52,7 @@ pub(super) fn parts(
                 terms: coefficients.len(),
             });
         }
-        let mut xi = DMatrix::zeros(library.len(), latent_dim);
+        let mut xi = DMatrix::zeros(library.terms().len(), latent_dim);
         for (column, coefficients) in columns.iter().enumerate() {
             for (term, coefficient) in coefficients {
                 let row = &rows[term];
@@ -139,7 +139,7 @@ fn phases_in_order<'s>(
 
 fn rows_of(library: &Library) -> HashMap<ExprId, Row> {
     let rows = library.terms().iter().enumerate().map(|(index, term)| {
-        let (factor, rest) = library.pool().split(term.expr());
+        let (factor, rest) = library.pool().split(term.expr);
         let factor = factor.to_f64();
         (rest, Row { index, factor })
     });

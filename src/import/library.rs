@@ -77,7 +77,7 @@ pub(super) fn standards_with(term_count: usize, latent_dim: usize) -> Vec<String
 }
 
 /// Reads a list of terms: JSON, alone or under `library`, or one per line (`#` starts a comment); faults have a place.
-pub fn read_terms(path: &Path) -> Read<Vec<String>> {
+pub(crate) fn read_terms(path: &Path) -> Read<Vec<String>> {
     let (file, bytes) = read_file(path, MAX_TERMS_BYTES)?;
     check_size(&file, &bytes, MAX_TERMS_BYTES)?;
     parse_terms(&file, &String::from_utf8_lossy(&bytes))

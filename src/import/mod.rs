@@ -10,7 +10,7 @@
 //! let text = "[contact]\nddz1 = -4*z1 - 0.1*dz1 + 2*(u1 - 0.5)\n[flight]\nddz1 = -1\n";
 //! let options = ImportOptions { name: "hopper".into(), ..ImportOptions::default() };
 //! let imported = import_from_bytes("hopper.txt", Format::Equations, text.as_bytes(), &options)?;
-//! let terms: Vec<&str> = imported.model.library().terms().iter().map(|t| t.text()).collect();
+//! let terms: Vec<&str> = imported.model.library().terms().iter().map(|t| t.text.as_str()).collect();
 //! assert_eq!(terms, ["1", "z1", "dz1", "u1"]);
 //! assert_eq!(imported.model.phases()[0].xi.as_slice(), [-1.0, -4.0, -0.1, 2.0]);
 //! # Ok::<(), romc::import::ImportError>(())
@@ -26,16 +26,16 @@ mod options;
 mod role;
 mod run;
 mod tensors;
+#[cfg(test)]
+#[path = "../../tests/import/units.rs"]
+mod units;
 
-pub use equations::{Equation, Section, Sections};
 pub use latex::variables::{NameError, SymbolNames};
-pub use library::read_terms;
+pub(crate) use library::read_terms;
 pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
-pub use role::{Mapping, Part, Role};
-pub use run::{
-    Chosen, ImportReport, Imported, Layout, ReadEquation, UnusedTensor, UsedTensor, import,
-    import_from_bytes, import_tensors, read_equations,
-};
+pub use role::Mapping;
+pub(crate) use run::{Chosen, import, read_equations};
+pub use run::{ImportReport, Imported, import_from_bytes, import_tensors};
 pub use tensors::Tensor;
 
 /// A fault and its place: the file, a tensor with its use, a character of a text, or an option.

@@ -8,7 +8,7 @@ use super::{ImportError, Read};
 
 /// One of the two maps between robot and latent coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub(crate) enum Part {
     Encoder,
     Decoder,
 }
@@ -22,7 +22,7 @@ impl Part {
         modules.any(|module| module.eq_ignore_ascii_case(self.name()))
     }
 
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Part::Encoder => "encoder",
             Part::Decoder => "decoder",
@@ -32,7 +32,7 @@ impl Part {
 
 /// What a tensor is used as; written `encoder.weight`, `xi.contact` and so on.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Role {
+pub(crate) enum Role {
     /// `W_e` or `W_d`, or the weights of one of several layers by its number.
     Weights(Part, Option<usize>),
     /// `b_e` or `b_d`, or the bias of one of several layers.
@@ -158,7 +158,7 @@ fn layer(modules: &str) -> Option<Option<usize>> {
 impl Role {
     /// The part that a tensor is by its name, alone or behind names of modules (`autoencoder.encoder.0.weight`). A mask
     /// has the phase `always` where its phase is at most a word of its name.
-    pub fn of_name(name: &str) -> Option<Self> {
+    pub(crate) fn of_name(name: &str) -> Option<Self> {
         let name = without_tensorflow_end(name);
         if is_of_optimiser(name) {
             return None;
@@ -219,7 +219,7 @@ pub(super) fn is_of_optimiser(name: &str) -> bool {
 /// `--map ROLE=TENSOR`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mapping {
-    pub role: Role,
+    pub(crate) role: Role,
     pub tensor: String,
 }
 

@@ -32,7 +32,7 @@ pub struct Imported {
 ///
 /// # Errors
 /// [`ImportError`] with the place, what was found and what was expected.
-pub fn import(path: &Path, options: &ImportOptions) -> Read<Imported> {
+pub(crate) fn import(path: &Path, options: &ImportOptions) -> Read<Imported> {
     let (file, bytes) = read_file(path, MAX_FILE_BYTES).map_err(|fault| {
         let foreign = magic::arrays_by_neighbours(path);
         (foreign.and_then(|found| refusal(path, found))).unwrap_or(fault)
@@ -54,7 +54,7 @@ pub(super) fn read_file(path: &Path, max: u64) -> Read<(String, Vec<u8>)> {
 /// Imports a model from a file in memory; `file` names it in errors.
 ///
 /// # Errors
-/// As [`import`]. Never panics, whatever the bytes are.
+/// As `import`. Never panics, whatever the bytes are.
 pub fn import_from_bytes(
     file: &str,
     format: Format,
@@ -82,7 +82,7 @@ pub fn import_from_bytes(
     finish(parts, report, &Sha256::digest(bytes), options)
 }
 
-/// Imports tensors in memory, named as those of a file; `source` names them in errors, which are those of [`import`].
+/// Imports tensors in memory, named as those of a file; `source` names them in errors, which are those of `import`.
 pub fn import_tensors(
     source: &str,
     arrays: &[Tensor<'_>],
@@ -131,7 +131,7 @@ fn sections(
 }
 
 /// Reads the equations of a file in memory; LaTeX has names of variables, and labels that end in `known` phases.
-pub fn read_equations(
+pub(crate) fn read_equations(
     file: &str,
     format: Format,
     bytes: &[u8],
@@ -155,7 +155,7 @@ fn finish(
     report.state_dim = parts.state_dim();
     let model = build(&report.file, parts, provenance(&report, digest), options)?;
     report.latent_dim = model.latent_dim();
-    report.library_dim = model.library().len();
+    report.library_dim = model.library().terms().len();
     Ok(Imported { model, report })
 }
 
@@ -236,14 +236,14 @@ pub struct ImportReport {
     pub library_order: Option<&'static str>,
     /// The candidate terms of a file of tensors in the order of its coefficients.
     pub terms: Vec<String>,
-    pub used: Vec<UsedTensor>,
-    pub unused: Vec<UnusedTensor>,
-    pub equations: Vec<ReadEquation>,
+    pub(crate) used: Vec<UsedTensor>,
+    pub(crate) unused: Vec<UnusedTensor>,
+    pub(crate) equations: Vec<ReadEquation>,
     pub notes: Vec<String>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct UsedTensor {
+pub(crate) struct UsedTensor {
     /// What it is used as, such as `encoder.weight`.
     pub role: String,
     pub tensor: String,
@@ -256,14 +256,14 @@ pub struct UsedTensor {
 /// Who decided what a tensor is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Chosen {
+pub(crate) enum Chosen {
     Mapped,
     Named,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Layout {
+pub(crate) enum Layout {
     Column,
     Row,
     TermsByLatent,
@@ -284,14 +284,14 @@ impl fmt::Display for Layout {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct UnusedTensor {
+pub(crate) struct UnusedTensor {
     pub tensor: String,
     pub shape: Vec<usize>,
 }
 
 /// An equation that became a column of Xi.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct ReadEquation {
+pub(crate) struct ReadEquation {
     pub phase: String,
     /// Its left side, such as `ddz1`.
     pub output: String,

@@ -237,7 +237,7 @@ fn recordings(content: &Content<'_>) -> Result<Table> {
         .column("body.x rms, whole jump", "mm", |(.., rms)| shown(rms[0]))
         .column("body.z rms, whole jump", "mm", |(.., rms)| shown(rms[1]))
         .table();
-    let count = counted(table.len(), "jump");
+    let count = counted(table.rows.len(), "jump");
     Ok(table.captioned(format!("{count} of the recordings")))
 }
 

@@ -39,7 +39,7 @@ impl<'a> Section<'a> {
     }
 
     fn folding(mut self, tables: impl IntoIterator<Item = Table>) -> Self {
-        let tables = tables.into_iter().filter(|table| !table.is_empty());
+        let tables = tables.into_iter().filter(|table| !table.rows.is_empty());
         self.folded.extend(tables);
         self
     }
@@ -162,7 +162,7 @@ fn control(content: &Content<'_>) -> Section<'static> {
         let words = "the solver's work, and what the lift makes of recorded inputs";
         let table = run_table(runs).captioned(format!("{lift}: {words}"));
         // Few runs with many figures each: a column per run, so that the table is no wider than the page.
-        match table.len() <= MOST_RUNS {
+        match table.rows.len() <= MOST_RUNS {
             true => table.transposed(),
             false => table,
         }

@@ -224,14 +224,9 @@ impl Robot {
         &self.joint_limit_rad
     }
 
-    /// Foot position of a leg from its first joint, along the body's axes, in m.
-    pub fn foot_position(&self, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
-        self.geometry(leg).foot_position(q)
-    }
-
-    /// The same from the body's origin.
+    /// Foot position of a leg from the body's origin, along the body's axes, in m.
     pub fn foot_from_body(&self, leg: Leg, q: &[f64; 3]) -> Vector3<f64> {
-        self.hip_position(leg) + self.foot_position(leg, q)
+        self.hip_position(leg) + self.geometry(leg).foot_position(q)
     }
 
     /// The same in the world, at a state `x` of the robot.
@@ -240,11 +235,6 @@ impl Robot {
         let [.., x, y, z, roll, pitch, yaw] = *x;
         let foot = self.foot_from_body(leg, &leg.of_joints(joints));
         Vector3::new(x, y, z) + rotation([roll, pitch, yaw]) * foot
-    }
-
-    /// Jacobian of [`Robot::foot_position`] by the leg's joint angles, in m.
-    pub fn foot_jacobian(&self, leg: Leg, q: &[f64; 3]) -> Matrix3<f64> {
-        self.geometry(leg).foot_jacobian(q)
     }
 
     /// Names of the state: joints `fr.hx` to `rl.kn`, then `body.x` to `body.yaw` (equation 1).

@@ -36,10 +36,14 @@ impl WrenchFrame {
             Self::World => "world",
         }
     }
+}
 
-    /// The frame of a name.
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|frame| frame.name() == name)
+impl std::str::FromStr for WrenchFrame {
+    type Err = ();
+
+    fn from_str(name: &str) -> Result<Self, ()> {
+        let known = Self::ALL.into_iter().find(|frame| frame.name() == name);
+        known.ok_or(())
     }
 }
 

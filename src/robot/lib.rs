@@ -10,7 +10,7 @@
 //!
 //! let go1 = romc::robot_file::by_name("go1")?;
 //! let q = [0.0, 0.7, -1.4];
-//! let foot = go1.foot_position(Leg::FrontRight, &q);
+//! let foot = go1.geometry(Leg::FrontRight).foot_position(&q);
 //! assert!((foot.x).abs() < 1e-12 && foot.y == -0.08 && foot.z < -0.3);
 //!
 //! // A leg that extends its knee (positive torque) pushes the body up.

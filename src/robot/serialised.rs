@@ -75,11 +75,11 @@ impl Serialize for WrenchFrame {
 impl<'de> Deserialize<'de> for WrenchFrame {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let name = String::deserialize(deserializer)?;
-        let unknown = || {
+        let unknown = |()| {
             let found = serde::de::Unexpected::Str(&name);
             D::Error::invalid_value(found, &"\"body\" or \"world\"")
         };
-        WrenchFrame::by_name(&name).ok_or_else(unknown)
+        name.parse().map_err(unknown)
     }
 }
 

@@ -14,7 +14,7 @@ use crate::typeset::rounded;
 
 /// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct BeforeAfter {
+pub(crate) struct BeforeAfter {
     pub before: usize,
     pub after: usize,
 }
@@ -47,7 +47,7 @@ pub(crate) enum ChangeKind {
 
 /// A coefficient before and after a change.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Effect {
+pub(crate) struct Effect {
     #[serde(skip)]
     pub(super) row: usize,
     pub term: String,
@@ -56,7 +56,7 @@ pub struct Effect {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Change {
+pub(crate) struct Change {
     pub(crate) kind: ChangeKind,
     /// Significant digits of a rounding.
     pub digits: Option<usize>,
@@ -74,14 +74,14 @@ pub struct Change {
 
 impl Change {
     /// The coefficients that it changes, its own first.
-    pub fn coefficients(&self) -> impl Iterator<Item = &Effect> {
+    pub(crate) fn coefficients(&self) -> impl Iterator<Item = &Effect> {
         std::iter::once(&self.own).chain(&self.effects)
     }
 }
 
 /// One equation of one phase; all errors in scaled units per second squared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EquationCertificate {
+pub(crate) struct EquationCertificate {
     #[serde(rename = "equation", serialize_with = "equation")]
     pub output: usize,
     /// Root mean square of the model's `ddz` over the recorded samples.
@@ -102,7 +102,7 @@ pub struct EquationCertificate {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PhaseCertificate {
+pub(crate) struct PhaseCertificate {
     pub name: String,
     /// The box: each variable's name and range. `None` without samples of the phase, whose equations were kept.
     #[serde(serialize_with = "ranges")]
@@ -126,11 +126,11 @@ pub struct PhaseCertificate {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
     /// The requested tolerance.
-    pub tolerance: Tolerance,
+    pub(crate) tolerance: Tolerance,
     /// What exact simplification did before: equal as real functions, without any error.
-    pub exact: Vec<ExactStep>,
+    pub(crate) exact: Vec<ExactStep>,
     /// One entry a phase; differences are those to the exactly simplified equations.
-    pub phases: Vec<PhaseCertificate>,
+    pub(crate) phases: Vec<PhaseCertificate>,
 }
 
 impl Certificate {

@@ -89,7 +89,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::Domain`] for another number of boxes or ranges, and for a range that is empty or infinite.
-    pub fn new(
+    pub(crate) fn new(
         model: &ReducedModel,
         boxes: Vec<Option<Vec<Interval>>>,
     ) -> Result<Self, SimplifyError> {
@@ -207,7 +207,7 @@ impl Domain {
         library: &Library,
     ) -> Result<DMatrix<f64>, ModelError> {
         let Some(samples) = samples.map(|samples| &samples.phases[phase]) else {
-            return Ok(DMatrix::zeros(0, library.len()));
+            return Ok(DMatrix::zeros(0, library.terms().len()));
         };
         let inside: Vec<usize> = (0..samples.ncols())
             .filter(|&k| self.contains(phase, samples.column(k).iter().copied()))

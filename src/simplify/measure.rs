@@ -68,7 +68,7 @@ impl Differences {
 
 /// How far a printed equation can be from the model's.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PrintedEquation {
+pub(crate) struct PrintedEquation {
     /// The phase's name.
     pub phase: String,
     /// Index of the latent coordinate.
@@ -126,7 +126,7 @@ pub(crate) struct RolloutErrors {
 
 /// Rollouts of a model and of its simplification beside the recordings.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RolloutEffect {
+pub(crate) struct RolloutEffect {
     /// Names of the robot's body coordinates.
     pub names: Vec<String>,
     /// Their units.

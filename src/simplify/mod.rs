@@ -5,6 +5,9 @@
 //! `equation.rs` (the changes made to one equation) and `ranges.rs` (the intervals).
 
 mod certificate;
+#[cfg(test)]
+#[path = "../../tests/simplification/certificates.rs"]
+mod certificates;
 mod domain;
 mod equation;
 mod measure;
@@ -14,8 +17,9 @@ mod tables;
 
 pub use certificate::{Certificate, Tolerance, ToleranceError, certificate_json};
 pub use domain::{Domain, MARGIN, Samples, SimplifyError};
-pub use measure::{PrintedEquation, RolloutEffect};
-pub(crate) use measure::{RolloutBasis, printed, rollouts_json};
+pub(crate) use measure::{RolloutBasis, RolloutEffect, printed, rollouts_json};
 pub use run::{Simplified, simplify};
-pub use tables::markdown;
-pub(crate) use tables::{bound_words, change_table, equation_table, lost_words, rollout_table};
+pub use tables::certificate_page;
+pub(crate) use tables::{
+    bound_words, change_table, equation_table, lost_words, markdown, rollout_table,
+};

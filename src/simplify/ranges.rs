@@ -31,9 +31,9 @@ pub(super) struct Workspace {
 impl Workspace {
     /// The terms of `equations`, with `1` and the variables of summands that are not affine if a library holds them.
     pub(crate) fn new(equations: &Equations<'_>) -> Result<Self, ModelError> {
-        let own = equations.terms();
-        let mut texts: Vec<String> = own.iter().map(|term| term.text().to_owned()).collect();
-        let known: BTreeSet<ExprId> = own.iter().map(|term| term.expr()).collect();
+        let own = &equations.terms;
+        let mut texts: Vec<String> = own.iter().map(|term| term.text.clone()).collect();
+        let known: BTreeSet<ExprId> = own.iter().map(|term| term.expr).collect();
         let wanted = wanted(equations).into_iter();
         texts.extend(
             wanted
@@ -48,7 +48,7 @@ impl Workspace {
             symbol => symbol.map(Some),
         };
         let terms = library.terms().iter().enumerate();
-        let rows = terms.filter_map(|(row, term)| Some((of(term.expr())?, row)));
+        let rows = terms.filter_map(|(row, term)| Some((of(term.expr)?, row)));
         Ok(Self {
             original: own.len(),
             rows: rows.collect(),
@@ -57,7 +57,7 @@ impl Workspace {
     }
 
     pub(crate) fn text(&self, row: usize) -> &str {
-        self.library.terms()[row].text()
+        &self.library.terms()[row].text
     }
 
     pub(crate) fn constant(&self) -> Option<usize> {
@@ -66,7 +66,7 @@ impl Workspace {
 
     /// The coefficients of a phase with zeros for the appended terms, one row per term.
     pub(crate) fn coefficients(&self, equations: &Equations<'_>, phase: usize) -> DMatrix<f64> {
-        let added = self.library.len() - self.original;
+        let added = self.library.terms().len() - self.original;
         let own = equations.coefficients(phase);
         own.insert_rows(self.original, added, 0.0)
     }
@@ -79,7 +79,7 @@ impl Workspace {
     ) -> Result<ReducedModel, SimplifyError> {
         let used = |row: &usize| xi.iter().any(|xi| xi.row(*row).iter().any(|&c| c != 0.0));
         let rows: Vec<usize> = (0..self.original)
-            .chain((self.original..self.library.len()).filter(used))
+            .chain((self.original..self.library.terms().len()).filter(used))
             .collect();
         let library = if rows.len() == self.original {
             model.library().clone()
@@ -105,9 +105,9 @@ fn wanted(equations: &Equations<'_>) -> Vec<(ExprId, String)> {
     let summands = phases.flat_map(|phase| &phase.ddz).flatten();
     let active: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
     let mut wanted = vec![(ExprId::ONE, "1".to_owned())];
-    for term in active.into_iter().map(|term| &equations.terms()[term]) {
-        if pool.as_symbol(term.expr()).is_none() {
-            let symbols = pool.symbols_of(term.expr()).into_iter();
+    for term in active.into_iter().map(|term| &equations.terms[term]) {
+        if pool.as_symbol(term.expr).is_none() {
+            let symbols = pool.symbols_of(term.expr).into_iter();
             wanted.extend(symbols.map(|s| (pool.symbol_expr(s), pool.symbol_name(s).to_owned())));
         }
     }
@@ -145,13 +145,13 @@ impl<'a> Ranges<'a> {
             workspace,
             pool: library.pool().clone(),
             domain: symbols.zip(domain.iter().copied()).collect(),
-            known: vec![None; library.len()],
-            rewrites: vec![None; library.len()],
+            known: vec![None; library.terms().len()],
+            rewrites: vec![None; library.terms().len()],
         }
     }
 
     pub(crate) fn expr(&self, row: usize) -> ExprId {
-        self.workspace.library.terms()[row].expr()
+        self.workspace.library.terms()[row].expr
     }
 
     pub(crate) fn term(&mut self, row: usize) -> Interval {

@@ -64,7 +64,7 @@ pub fn simplify(
     }
     let mut certificate = Certificate {
         tolerance,
-        exact: equations.steps().to_vec(),
+        exact: equations.steps.clone(),
         phases,
     };
     let mut simplified = equations.to_model()?.into_owned();
@@ -282,7 +282,7 @@ fn digits(xi: &[f64]) -> usize {
 
 fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyError> {
     let program: Program = lower::dynamics(system, phase, Form::StraightLine)?;
-    let counted = program.statements().iter().enumerate();
+    let counted = program.statements.iter().enumerate();
     Ok(counted
         .map(|(index, statement)| match statement {
             Statement::Constant(_) | Statement::Input { .. } => 0,
@@ -294,7 +294,7 @@ fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyErr
 /// The variables that any `ddz` of a phase depends on, in the order of [`LatentVariable::all`].
 fn variables(system: &Equations<'_>, phase: usize) -> Vec<LatentVariable> {
     let summands = system.phases()[phase].ddz.iter().flatten();
-    let exprs = summands.map(|summand| system.terms()[summand.term].expr());
+    let exprs = summands.map(|summand| system.terms[summand.term].expr);
     let symbols: BTreeSet<SymbolId> = exprs.flat_map(|e| system.pool().symbols_of(e)).collect();
     LatentVariable::all(system.latent_dim())
         .filter(|variable| symbols.contains(&system.symbol(*variable)))

@@ -123,8 +123,13 @@ struct Page<'a> {
     printed: &'a [PrintedEquation],
 }
 
+/// The page of a certificate alone, without rollouts and printed equations.
+pub fn certificate_page(models: [&ReducedModel; 2], certificate: &Certificate) -> String {
+    markdown(models, certificate, None, &[])
+}
+
 /// The certificate and its effect on rollouts, with what printing rounds, as a page of Markdown.
-pub fn markdown(
+pub(crate) fn markdown(
     models: [&ReducedModel; 2],
     certificate: &Certificate,
     rollouts: Option<&RolloutEffect>,

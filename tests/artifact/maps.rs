@@ -216,7 +216,7 @@ fn first_phase_whose_rule_matches_the_feet_wins_if_any_does() {
     assert_eq!(model.phase_for(FOUR_FEET), Some(1));
     assert_eq!(model.phase_for([true, false, false, false]), Some(1));
     assert_eq!(model.phase_for(NO_FOOT), Some(2));
-    assert_eq!(model.phase_named("stance"), Some(1));
+    assert_eq!(model.phases()[1].name, "stance");
     assert_eq!(model.phase_identifier(1).as_str(), "stance");
     let without_flight = model.phases()[..2].to_vec();
     let partial = model.into_builder().phases(without_flight).build().unwrap();
@@ -236,7 +236,7 @@ fn active_terms_come_in_library_order_without_zeros() {
     let rows = |output| -> Vec<usize> { phase.active_terms(output).map(|(row, _)| row).collect() };
     assert_eq!((rows(0), rows(1)), (vec![1, 2], vec![0]));
     let terms = model.active_terms(0, 0).unwrap();
-    let texts: Vec<(f64, &str)> = terms.iter().map(|&(c, t)| (c, t.text())).collect();
+    let texts: Vec<(f64, &str)> = terms.iter().map(|&(c, t)| (c, t.text.as_str())).collect();
     assert_eq!(texts, [(-2.0, "u1"), (3.0, "z1*dz2")]);
     assert!(model.active_terms(0, 2).is_err());
 }

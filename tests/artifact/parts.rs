@@ -3,9 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use romc::limits::{Range, table};
 use romc::model::{
-    Activation, AffineMap, CandidateTerm, CoordinateOrder, FeetRule, Identifier, InputGivenState,
-    LatentVariable, Layer, Library, LibraryOrder, MAX_LAYER_WIDTH, MAX_LAYERS, ModelError,
-    StandardLibrary, StateMap,
+    Activation, AffineMap, CoordinateOrder, FeetRule, Identifier, InputGivenState, LatentVariable,
+    Layer, Library, LibraryOrder, MAX_LAYERS, ModelError, StandardLibrary, StateMap,
 };
 use romc::robot::STATE_DIM;
 use romc::symbolic::{ExprId, ParseErrorKind, SymbolId};
@@ -213,9 +212,11 @@ fn layers_that_do_not_fit_are_refused() {
         refusal(Vec::new()),
         format!("`encoder.layers`: found 0 layers, expected 1 to {MAX_LAYERS}")
     );
-    let wide = refusal(vec![layer(MAX_LAYER_WIDTH + 1, 2)]);
+    let wide = refusal(vec![layer(WIDEST + 1, 2)]);
     assert!(wide.contains("units, expected at most"), "{wide}");
 }
+
+const WIDEST: usize = 1024; // units of a layer
 
 fn library_of(texts: &[&str]) -> Result<Library, ModelError> {
     let texts: Vec<String> = texts.iter().map(|&text| text.to_owned()).collect();
@@ -268,7 +269,7 @@ fn values_agree_with_the_pool_for_every_node() {
         let [z, dz, u_lat] = values.map(|value| DVector::from_element(1, value));
         let alone = library.evaluate(&z, &dz, &u_lat).unwrap();
         assert_eq!(alone.transpose(), all.row(point));
-        let exprs: Vec<ExprId> = library.terms().iter().map(CandidateTerm::expr).collect();
+        let exprs: Vec<ExprId> = library.terms().iter().map(|term| term.expr).collect();
         let value_of = |symbol: SymbolId| values[symbol.index()];
         let expected = library.pool().evaluate_all(&exprs, &value_of);
         assert_eq!(all.row(point), DVector::from_vec(expected).transpose());
@@ -427,15 +428,15 @@ proptest::proptest! {
 #[test]
 fn order_by_names_and_groups_sorts_into_that_of_romc() {
     let order: CoordinateOrder = "body, fl,fr,rl.kn,rl.hy,rl.hx,rr".parse().unwrap();
-    assert_eq!(order.places()[..9], [12, 13, 14, 15, 16, 17, 3, 4, 5]);
-    assert_eq!(order.places()[12..15], [11, 10, 9]);
-    let foreign = DVector::from_fn(18, |place, _| order.places()[place] as f64);
+    assert_eq!(order.places[..9], [12, 13, 14, 15, 16, 17, 3, 4, 5]);
+    assert_eq!(order.places[12..15], [11, 10, 9]);
+    let foreign = DVector::from_fn(18, |place, _| order.places[place] as f64);
     let sorted = order.sorted(&foreign);
     assert_eq!(sorted, DVector::from_fn(18, |index, _| index as f64));
     let columns = DMatrix::from_columns(&[foreign.clone(), foreign]);
     assert_eq!(order.sorted(&columns).column(1), sorted);
     let by_kind: CoordinateOrder = "kn,hx,hy,body".parse().unwrap();
-    assert_eq!(by_kind.places()[..5], [2, 5, 8, 11, 0]);
+    assert_eq!(by_kind.places[..5], [2, 5, 8, 11, 0]);
 }
 
 #[test]
@@ -453,10 +454,7 @@ fn order_with_a_coordinate_twice_or_missing_or_unknown_is_refused() {
 
 #[test]
 fn common_orders_are_all_different() {
-    let mut orders: Vec<_> = CoordinateOrder::common()
-        .iter()
-        .map(|o| *o.places())
-        .collect();
+    let mut orders: Vec<_> = CoordinateOrder::common().iter().map(|o| o.places).collect();
     orders.sort_unstable();
     orders.dedup();
     assert_eq!(orders.len(), 96);
@@ -487,13 +485,13 @@ fn variable_names_are_read_and_written_alike() {
 #[test]
 fn ranges_are_those_that_the_rooms_keep_themselves() {
     assert_eq!(table::LATENT_DIM.most as usize, STATE_DIM);
-    assert_eq!(table::LAYER_WIDTH.most as usize, MAX_LAYER_WIDTH);
+    assert_eq!(table::LAYER_WIDTH.most as usize, WIDEST);
 }
 
 #[test]
 fn ends_are_inside_and_what_lies_beyond_is_not() {
-    const COUNT: Range = Range::whole("count", 1, 500);
-    const SHARE: Range = Range::above("share", 0.0, 1.0);
+    const COUNT: Range = table::HORIZON; // 1 to 500
+    const SHARE: Range = table::BPTT_DECAY; // above 0, at most 1
     for (text, expected) in [
         ("1", Ok(1)),
         (" 500", Ok(500)),
@@ -509,7 +507,7 @@ fn ends_are_inside_and_what_lies_beyond_is_not() {
             "{text}"
         );
     }
-    assert!(SHARE.contains(1.0) && SHARE.contains(1e-300));
+    assert!(SHARE.check(1.0).is_ok() && SHARE.check(1e-300).is_ok());
     for outside in [0.0, 1.0 + 1e-9, f64::NAN, f64::INFINITY, -1.0] {
         assert!(SHARE.check(outside).is_err(), "{outside}");
     }
@@ -517,7 +515,7 @@ fn ends_are_inside_and_what_lies_beyond_is_not() {
 
 #[test]
 fn refusal_names_the_setting_the_number_and_the_range() {
-    let refused = Range::real("state-scaling", 1e-6, 1e4).check(1e-200);
+    let refused = table::STATE_SCALING.check(1e-200);
     assert_eq!(
         refused.expect_err("too small").to_string(),
         "state-scaling is 1e-200, expected a number from 1e-6 to 1e4"

@@ -5,7 +5,7 @@ use romc::check::{CheckOptions, Side, Verdict, compare};
 use romc::model::{Library, ModelError};
 use romc::symbolic::ParseErrorKind;
 
-use crate::tools;
+use super::tools;
 
 struct Random(u64);
 

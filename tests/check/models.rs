@@ -119,7 +119,7 @@ fn text_of(model: &ReducedModel) -> String {
         for output in 0..model.latent_dim() {
             let _ = write!(text, "ddz{} = 0", output + 1);
             for (coefficient, term) in model.active_terms(index, output).expect("in range") {
-                let _ = write!(text, " + {coefficient:?}*({})", term.text());
+                let _ = write!(text, " + {coefficient:?}*({})", term.text);
             }
             text.push('\n');
         }
@@ -238,7 +238,7 @@ fn mutated(model: &ReducedModel, seed: u64) -> (ReducedModel, usize, usize) {
     let mut phases = model.phases().to_vec();
     loop {
         let (phase, output) = (random.below(phases.len()), random.below(model.latent_dim()));
-        let term = random.below(model.library().len());
+        let term = random.below(model.library().terms().len());
         let coefficient = &mut phases[phase].xi[(term, output)];
         if *coefficient == 0.0 {
             continue;

@@ -75,7 +75,7 @@ fn papers_are_imported_as_the_shipped_model() {
                         .expect("in range")
                         .into_iter();
                     terms
-                        .map(|(c, term)| (term.text().to_owned(), c.to_bits()))
+                        .map(|(c, term)| (term.text.clone(), c.to_bits()))
                         .collect()
                 };
                 assert_eq!(terms(&imported), terms(&model), "{name}");

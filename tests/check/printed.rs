@@ -3,12 +3,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::PathBuf;
 use std::process::Command;
 
 use romc::import::{Format, SymbolNames, read_equations};
 
-use crate::tools;
+use super::tools;
 
 /// Names of the macros; the body of one may hold those behind it, so that none is endless.
 const MACROS: [&str; 4] = ["ka", "kb", "kc", "kd"];
@@ -360,13 +359,12 @@ fn tex_prints_the_numbers_that_are_read() {
         let _ = writeln!(text, "\\begingroup {}\\endgroup\\newpage", document.text);
     }
     text.push_str("\\end{document}\n");
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("printed");
-    std::fs::create_dir_all(&folder).expect("a folder");
-    std::fs::write(folder.join("made.tex"), text).expect("a file");
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(folder.path().join("made.tex"), text).expect("a file");
     let run = |tool: &str, arguments: &[&str]| {
         let output = Command::new(tool)
             .args(arguments)
-            .current_dir(&folder)
+            .current_dir(folder.path())
             .output();
         let output = output.expect("it was found");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser as _};
 
+use super::Arguments;
 use romc::Error;
-use romc::cli::Arguments;
 use romc::limits::{Range, table};
 
 /// Command lines with a flag that does nothing there, and that flag.
@@ -208,7 +208,7 @@ fn every_flag_that_takes_a_number_refuses_what_lies_outside_its_range() {
             met.insert(range.name);
             let (least, most) = (range.least, range.most);
             assert!(!refuses(name, flag, &most.to_string()), "--{flag}={most}");
-            let outside = match range.is_whole() {
+            let outside = match range.in_words().contains("whole") {
                 true => [least - 1.0, most + 1.0],
                 false => [least - 1e-9 * most, most * (1.0 + 1e-9)],
             };

@@ -104,22 +104,19 @@ pub fn compare(
 
 /// Whether a program has functions that a mathematics library rounds, or the kernel of sines.
 fn is_transcendental(program: &Program) -> bool {
-    let own = program
-        .statements()
-        .iter()
-        .any(|statement| match statement {
-            Statement::SinCos { .. } => true,
-            Statement::Unary(op, _) => {
-                matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
-            }
-            Statement::Binary(op, ..) => *op == Binary::Pow,
-            Statement::Constant(_)
-            | Statement::Input { .. }
-            | Statement::Select(_)
-            | Statement::Accumulate { .. }
-            | Statement::Scaled { .. }
-            | Statement::Lanes { .. }
-            | Statement::Call { .. } => false,
-        });
-    own || program.callees().iter().any(is_transcendental)
+    let own = program.statements.iter().any(|statement| match statement {
+        Statement::SinCos { .. } => true,
+        Statement::Unary(op, _) => {
+            matches!(op, Unary::Tan | Unary::Tanh | Unary::Exp | Unary::Log)
+        }
+        Statement::Binary(op, ..) => *op == Binary::Pow,
+        Statement::Constant(_)
+        | Statement::Input { .. }
+        | Statement::Select(_)
+        | Statement::Accumulate { .. }
+        | Statement::Scaled { .. }
+        | Statement::Lanes { .. }
+        | Statement::Call { .. } => false,
+    });
+    own || program.callees.iter().any(is_transcendental)
 }

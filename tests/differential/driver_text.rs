@@ -78,8 +78,8 @@ fn c_single(k: usize, function: &Function) -> String {
     let (model, name) = (&function.model, &function.name);
     let mut body = String::new();
     let mut arguments = Vec::new();
-    let outputs = offsets(function.program.outputs());
-    for (slot, at, len) in offsets(function.program.inputs()) {
+    let outputs = offsets(&function.program.outputs);
+    for (slot, at, len) in offsets(&function.program.inputs) {
         let in_place = outputs.iter().find(|(name, ..)| *name == slot);
         if let Some((_, to, _)) = in_place {
             body.push_str(&format!(
@@ -178,14 +178,14 @@ fn main() {
 fn rust_single(k: usize, function: &Function) -> String {
     let mut body = String::new();
     let mut arguments = Vec::new();
-    let outputs = offsets(function.program.outputs());
+    let outputs = offsets(&function.program.outputs);
     let mut rest = "out".to_owned();
     for (j, (name, _, len)) in outputs.iter().enumerate() {
         body.push_str(&format!(
             "    let (o{j}, rest{j}) = {rest}.split_at_mut({len});\n"
         ));
         rest = format!("rest{j}");
-        for (input, from, _) in offsets(function.program.inputs()) {
+        for (input, from, _) in offsets(&function.program.inputs) {
             if input == *name {
                 body.push_str(&format!(
                     "    o{j}.copy_from_slice(&input[{from}..{}]);\n",
@@ -195,7 +195,7 @@ fn rust_single(k: usize, function: &Function) -> String {
         }
     }
     body.push_str(&format!("    let _ = {rest};\n"));
-    for (name, at, len) in offsets(function.program.inputs()) {
+    for (name, at, len) in offsets(&function.program.inputs) {
         let in_place = outputs.iter().position(|(output, ..)| *output == name);
         arguments.push(match in_place {
             Some(j) => format!("array_mut(o{j})"),

@@ -45,19 +45,19 @@ impl Function {
 
     /// Numbers that enter, all slots one after the other.
     pub fn input_len(&self) -> usize {
-        self.program.inputs().iter().map(|slot| slot.len).sum()
+        self.program.inputs.iter().map(|slot| slot.len).sum()
     }
 
     /// Numbers that leave, all slots one after the other.
     pub fn output_len(&self) -> usize {
-        self.program.outputs().iter().map(|slot| slot.len).sum()
+        self.program.outputs.iter().map(|slot| slot.len).sum()
     }
 
     /// Random points, one after the other.
     pub fn points(&self, random: &mut Random) -> Vec<f64> {
         let mut points = Vec::with_capacity(self.n_points * self.input_len());
         for _ in 0..self.n_points {
-            for slot in self.program.inputs() {
+            for slot in &self.program.inputs {
                 for k in 0..slot.len {
                     points.push(match (slot.name.as_str(), k % 3) {
                         ("h", _) => random.between(1e-4, 1e-2),
@@ -82,13 +82,13 @@ impl Function {
         for point in points.chunks(self.input_len()) {
             let mut outputs: Vec<Vec<f64>> = self
                 .program
-                .outputs()
+                .outputs
                 .iter()
                 .map(|slot| vec![f64::NAN; slot.len])
                 .collect();
             let mut rest = point;
             let mut inputs = Vec::new();
-            for slot in self.program.inputs() {
+            for slot in &self.program.inputs {
                 let (these, others) = rest.split_at(slot.len);
                 inputs.push(these);
                 rest = others;
@@ -123,7 +123,7 @@ pub fn functions(model: &ReducedModel, n_points: usize, form: Form) -> Vec<Funct
             Map::Encode | Map::EncodeVelocity | Map::ProjectInput | Map::LiftInput => &encoder,
         };
         if let Ok(program) = map.lower(model) {
-            let name = program.name().to_owned();
+            let name = program.name.clone();
             list.push(function(name, program, kind.clone(), n_points.min(100)));
         }
     }
@@ -133,7 +133,7 @@ pub fn functions(model: &ReducedModel, n_points: usize, form: Form) -> Vec<Funct
     ];
     for program in of_robot {
         if let Some(program) = program.expect("lowers") {
-            let name = program.name().to_owned();
+            let name = program.name.clone();
             list.push(function(name, program, Kind::Wrench, n_points.min(100)));
         }
     }

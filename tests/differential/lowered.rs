@@ -74,7 +74,7 @@ fn polynomials_take_fewer_products_than_their_terms_one_by_one() {
     let model = model(2, &terms, &[("phase", FeetRule::Any, &xi)]);
     let program = dynamics(&Equations::of(&model), 0, Form::StraightLine).expect("lowers");
     let is_product = |s: &&Statement| matches!(s, Statement::Binary(Binary::Mul, ..));
-    let products = program.statements().iter().filter(is_product).count();
+    let products = program.statements.iter().filter(is_product).count();
     // One by one: ten with coefficients, fifteen between variables.
     assert!(products + 4 <= 10 + 15, "{products}");
 }

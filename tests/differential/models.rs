@@ -54,7 +54,7 @@ pub fn random(seed: u64) -> ReducedModel {
     };
     let mut density = [0.05, 0.15, 0.5, 1.0][random.below(4)];
     // Compilers take their time for thousands of terms, and learn nothing more from them.
-    density = f64::min(density, 160.0 / (library.len() * d) as f64);
+    density = f64::min(density, 160.0 / (library.terms().len() * d) as f64);
     let rear = FeetRule::Patterns(vec![
         [false, false, true, true],
         [false, false, false, true],
@@ -69,7 +69,7 @@ pub fn random(seed: u64) -> ReducedModel {
     for (name, feet) in all.into_iter().skip(first).take(count) {
         let silent = (random.below(4) == 0).then(|| random.below(d));
         let empty = random.below(12) == 0;
-        let xi = DMatrix::from_fn(library.len(), d, |_, column| {
+        let xi = DMatrix::from_fn(library.terms().len(), d, |_, column| {
             let value = random.between(-2.0, 2.0);
             let is_active = random.unit() < density && !empty && silent != Some(column);
             if is_active { value } else { 0.0 }

@@ -18,7 +18,7 @@ fn points(function: &Function, random: &mut Random) -> Vec<f64> {
     let mut points = Vec::new();
     for point in 0..function.n_points {
         let magnitude = MAGNITUDES[point % 2];
-        for slot in function.program.inputs() {
+        for slot in &function.program.inputs {
             for _ in 0..slot.len {
                 let x = match slot.name.as_str() {
                     "h" => random.between(1e-4, 0.999e-2),
@@ -39,12 +39,12 @@ fn interpret_single(function: &Function, points: &[f64]) -> Vec<f64> {
         let point: Vec<f32> = point.iter().map(|&x| x as f32).collect();
         let mut rest = point.as_slice();
         let mut inputs = Vec::new();
-        for slot in function.program.inputs() {
+        for slot in &function.program.inputs {
             let (these, others) = rest.split_at(slot.len);
             inputs.push(these);
             rest = others;
         }
-        let slots = function.program.outputs().iter();
+        let slots = function.program.outputs.iter();
         let mut outputs: Vec<Vec<f32>> = slots.map(|slot| vec![f32::NAN; slot.len]).collect();
         let mut written: Vec<&mut [f32]> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
         interpreter.run(&inputs, &mut written);

@@ -127,7 +127,7 @@ impl Sums {
         let of_row = |row: usize| -> Vec<(f64, ExprId)> {
             let active = model.phases()[phase].active_terms(row);
             active
-                .map(|(term, xi)| (xi, library.terms()[term].expr()))
+                .map(|(term, xi)| (xi, library.terms()[term].expr))
                 .collect()
         };
         let mut outputs: Vec<Vec<(f64, ExprId)>> = (0..model.latent_dim()).map(of_row).collect();

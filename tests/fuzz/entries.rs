@@ -27,7 +27,8 @@ pub fn model_file(bytes: &[u8]) {
     match artifact::read_from_bytes("fuzz.json", bytes) {
         Ok(model) => {
             written_and_read_back(&model);
-            if model.latent_dim() <= 4 && model.library().len() <= 24 && bytes.len() < 4096 {
+            if model.latent_dim() <= 4 && model.library().terms().len() <= 24 && bytes.len() < 4096
+            {
                 compiled(&model);
             }
         }

@@ -12,7 +12,7 @@ use crate::identify::parameters::{
     THIGH_SECOND, TRUNK_FORWARD, VISCOUS,
 };
 use crate::identify::{Identification, IdentifyError, identify};
-use crate::recording::clock::timed;
+use crate::recording::clock::{elapsed, timed};
 use crate::recording::{Recording, Segment};
 use crate::robot::{BODY_Z, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
@@ -372,6 +372,7 @@ fn timed_lost_samples_are_found_and_a_true_clock_stays() {
     let made = hop(0.0);
     let same = timed(&made).unwrap();
     assert!(same.mended.elapsed_ratio.is_none() && same.segment == made);
+    assert!((elapsed(&made).1 - 1.0).abs() < 0.01);
     // Every eighth sample is lost, and the logger counts on.
     let kept: Vec<usize> = (0..made.len()).filter(|sample| sample % 8 != 3).collect();
     let lost = Segment {

@@ -5,11 +5,12 @@ use std::fmt::Write as _;
 use nalgebra::DVector;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use romc::import::equations::{Equation, Sections};
 use romc::import::*;
 use romc::model::{LibraryChoice, ReducedModel, StandardLibrary};
 use romc::symbolic::{ExprId, ExprPool};
 
-use crate::store::*;
+use super::store::*;
 
 /// A model's equations as a person would write them.
 fn text_of(model: &ReducedModel) -> String {
@@ -21,12 +22,7 @@ fn text_of(model: &ReducedModel) -> String {
             let terms = model.active_terms(index, output).expect("in range");
             for (coefficient, term) in terms {
                 let sign = if coefficient < 0.0 { '-' } else { '+' };
-                let _ = write!(
-                    text,
-                    "\n   {sign} {:?}*({})",
-                    coefficient.abs(),
-                    term.text()
-                );
+                let _ = write!(text, "\n   {sign} {:?}*({})", coefficient.abs(), term.text);
             }
             text.push('\n');
         }
@@ -46,7 +42,7 @@ fn import(text: &str, options: &ImportOptions) -> Result<Imported, ImportError> 
 fn active(model: &ReducedModel, phase: usize, output: usize) -> Vec<(u64, String)> {
     let mut active: Vec<(u64, String)> = (model.active_terms(phase, output).expect("in range"))
         .into_iter()
-        .map(|(coefficient, term)| (coefficient.to_bits(), term.text().to_owned()))
+        .map(|(coefficient, term)| (coefficient.to_bits(), term.text.clone()))
         .collect();
     active.sort();
     active
@@ -75,7 +71,7 @@ fn equations_of_the_paper_give_its_coefficients_and_accelerations() {
         .library()
         .terms()
         .iter()
-        .map(|t| t.text())
+        .map(|t| t.text.as_str())
         .collect();
     assert_eq!(
         terms,

@@ -8,7 +8,7 @@ use romc::import::*;
 use romc::model::{Activation, LibraryChoice, ModelError, Scaling};
 use zip::CompressionMethod;
 
-use crate::store::*;
+use super::store::*;
 
 /// Encoder 2 x 5, decoder 5 x 2, `degree=1,inputs` (7 terms) in contact.
 fn small() -> Vec<Stored> {

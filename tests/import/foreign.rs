@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
+use romc::import::run::Layout;
 use romc::import::*;
 use romc::model::{LibraryChoice, LibraryOrder, Scaling, StandardLibrary};
 use serde_json::Value;

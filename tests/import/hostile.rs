@@ -7,7 +7,7 @@ use romc::import::*;
 use romc::model::{LibraryChoice, Scaling};
 use zip::CompressionMethod;
 
-use crate::store::*;
+use super::store::*;
 
 fn options() -> ImportOptions {
     ImportOptions {

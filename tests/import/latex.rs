@@ -1,7 +1,8 @@
 //! Constructs that are read, with what they mean, and constructs that are refused, with their place.
 
 use romc::files::Place;
-use romc::import::{Format, ImportError, Sections, SymbolNames, read_equations};
+use romc::import::equations::Sections;
+use romc::import::{Format, ImportError, SymbolNames, read_equations};
 use romc::symbolic::ExprPool;
 
 /// Phases with the texts of their right sides.

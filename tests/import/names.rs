@@ -1,11 +1,12 @@
 //! Names that trainers give to tensors: each tensor is used, named as unused, or refused.
 
 use nalgebra::{DMatrix, DVector};
+use romc::import::role::Role;
 use romc::import::*;
 use romc::model::{Activation, LibraryChoice, Scaling};
 use zip::CompressionMethod;
 
-use crate::store::{Stored, list, npz, plain};
+use super::store::{Stored, list, npz, plain};
 
 fn wave(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
     DMatrix::from_fn(rows, columns, |i, j| {

@@ -1,11 +1,13 @@
 //! A model stored in any of the usual ways is the same model after its import.
 
 use nalgebra::DMatrix;
+use romc::import::role::{Part, Role};
+use romc::import::run::{Chosen, Layout};
 use romc::import::*;
 use romc::model::{LibraryChoice, ReducedModel};
 use zip::CompressionMethod;
 
-use crate::store::*;
+use super::store::*;
 
 /// How a test stores a model.
 #[derive(Clone, Copy, Debug)]

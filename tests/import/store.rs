@@ -1,4 +1,5 @@
 //! Stores tensors and models the ways other programs do.
+#![allow(dead_code, reason = "each test binary uses a part")]
 
 use std::io::{Cursor, Write};
 use std::path::Path;

@@ -3,11 +3,12 @@
 use std::fs;
 
 use romc::files::Place;
+use romc::import::role::Role;
 use romc::import::*;
 use romc::model::{FeetRule, LibraryChoice, StandardLibrary};
 use zip::CompressionMethod;
 
-use crate::store::{Number, Order, Stored, npz, zip};
+use super::store::{Number, Order, Stored, npz, zip};
 
 fn options(terms: &[&str]) -> ImportOptions {
     let terms = terms.iter().map(|term| (*term).to_owned()).collect();
@@ -31,7 +32,7 @@ fn separate(text: &str) -> String {
     let terms = model.library().terms().iter().zip(xi.iter());
     let texts: Vec<String> = terms
         .filter(|(_, coefficient)| **coefficient != 0.0)
-        .map(|(term, coefficient)| format!("{coefficient:?} {}", term.text()))
+        .map(|(term, coefficient)| format!("{coefficient:?} {}", term.text))
         .collect();
     texts.join("; ")
 }
@@ -80,7 +81,7 @@ fn listed(terms: &[&str]) -> Result<Vec<String>, ImportError> {
     };
     let model = import_tensors("arrays", &[xi], &options)?.model;
     let terms = model.library().terms().iter();
-    Ok(terms.map(|term| term.text().to_owned()).collect())
+    Ok(terms.map(|term| term.text.clone()).collect())
 }
 
 #[test]

@@ -36,10 +36,10 @@ fn standardised(original: &ReducedModel, order: &CoordinateOrder) -> Vec<Stored>
     let back = DMatrix::from_diagonal(&rescale.map(|v| 1.0 / v));
     let out = &back * decoder.weights();
     let out_bias = &back * (decoder.bias() - s_x.component_mul(&mean));
-    let to_file = |v: &DVector<f64>| DVector::from_fn(18, |k, _| v[order.places()[k]]);
+    let to_file = |v: &DVector<f64>| DVector::from_fn(18, |k, _| v[order.places[k]]);
     let columns = |m: &DMatrix<f64>| {
         let columns: Vec<_> = order
-            .places()
+            .places
             .iter()
             .map(|&k| m.column(k).into_owned())
             .collect();
@@ -187,7 +187,7 @@ fn activations_of_trainers_are_taken() {
             artifact::read_from_bytes("m", text.as_bytes()).unwrap(),
             found
         );
-        let layers = found.encoder_map().unwrap().layers();
+        let layers = &found.encoder_map().unwrap().layers;
         assert_eq!(layers[0].activation, activation);
     }
 }
@@ -259,7 +259,7 @@ fn in_si(mean: &DVector<f64>, order: &CoordinateOrder) -> Vec<Stored> {
     let original = model("tests/fixtures/import/go1-d4.json");
     let (encoder, decoder) = (original.encoder().unwrap(), original.decoder().unwrap());
     let weights = encoder.weights() * 0.1;
-    let places = || order.places().iter();
+    let places = || order.places.iter();
     let columns: Vec<_> = places().map(|&k| weights.column(k).into_owned()).collect();
     let out = decoder.weights() * 10.0;
     let rows: Vec<_> = places().map(|&k| out.row(k).into_owned()).collect();
@@ -286,7 +286,7 @@ pub fn input_factors(order: &CoordinateOrder) -> String {
         .input_factors()
         .unwrap()
         * 0.1;
-    let factors = order.places().map(|k| factors[k].to_string());
+    let factors = order.places.map(|k| factors[k].to_string());
     factors.join(",")
 }
 

@@ -72,7 +72,9 @@ fn one_coordinate() -> ReducedModel {
     let phase = |feet, name: &str, first: f64| Phase {
         name: name.to_owned(),
         feet,
-        xi: DMatrix::from_fn(library.len(), 1, |row, _| first / (1.0 + row as f64)),
+        xi: DMatrix::from_fn(library.terms().len(), 1, |row, _| {
+            first / (1.0 + row as f64)
+        }),
     };
     let phases = vec![
         phase(FeetRule::Any, "contact", -0.75),
@@ -140,7 +142,7 @@ fn sixty() -> ReducedModel {
     };
     let library = Library::standard(d, standard).expect("a library");
     let xi = |shift: usize| {
-        DMatrix::from_fn(library.len(), d, |row, column| {
+        DMatrix::from_fn(library.terms().len(), d, |row, column| {
             let is_active = (7 * row + 11 * column + shift).is_multiple_of(53);
             if is_active {
                 0.5 - 0.01 * (row % 97) as f64

@@ -491,8 +491,13 @@ fn settings_out_of_range_are_refused_by_name() {
         }),
         "horizon"
     );
-    let most = romc::limits::table::HORIZON.most;
-    assert_eq!(most as usize, romc::mpc::MAX_HORIZON);
+    let most = romc::limits::table::HORIZON.most as usize;
+    let with = |horizon| MpcSettings {
+        horizon,
+        ..MpcSettings::default()
+    };
+    assert_eq!(refused(with(most + 1)), "horizon");
+    assert!(romc::mpc::controller(&model, with(most)).is_ok());
     assert_eq!(
         refused(MpcSettings {
             step_s: f64::NAN,

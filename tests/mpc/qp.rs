@@ -1,19 +1,20 @@
 //! Solutions of the conic solver against references that do not share its method.
 
+use clarabel::algebra::CscMatrix;
 use nalgebra::{DMatrix, DVector};
-use romc::mpc::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, SparseColumns, sparse};
+use romc::mpc::{Cone, ConeProgram, Outcome, QpSettings, QpSolver, sparse};
 
 use crate::random::Random;
 
-fn upper(matrix: &DMatrix<f64>) -> SparseColumns {
+fn upper(matrix: &DMatrix<f64>) -> CscMatrix<f64> {
     filled(&matrix.upper_triangle(), |row, col| row <= col)
 }
 
-fn full(matrix: &DMatrix<f64>) -> SparseColumns {
+fn full(matrix: &DMatrix<f64>) -> CscMatrix<f64> {
     filled(matrix, |_, _| true)
 }
 
-fn filled(matrix: &DMatrix<f64>, is_in: fn(usize, usize) -> bool) -> SparseColumns {
+fn filled(matrix: &DMatrix<f64>, is_in: fn(usize, usize) -> bool) -> CscMatrix<f64> {
     let (n_rows, n_cols) = matrix.shape();
     let places = (0..n_cols).flat_map(|col| (0..n_rows).map(move |row| (row, col)));
     let entries: Vec<_> = (places.filter(|&(row, col)| is_in(row, col)))

@@ -63,7 +63,7 @@ fn feet(command: &Command, pitch_rad: f64) -> Vec<Vector3<f64>> {
     let turned = Rotation3::from_euler_angles(0.0, pitch_rad, 0.0);
     let foot = |leg: Leg| {
         let q = leg.of_joints(&command.joint_position_rad);
-        turned * (robot.hip_position(leg) + robot.foot_position(leg, &q))
+        turned * (robot.hip_position(leg) + robot.geometry(leg).foot_position(&q))
     };
     Leg::ALL.into_iter().map(foot).collect()
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::recording::clock::{Timed, timed};
+use crate::recording::clock::{Timed, elapsed, timed};
 use crate::recording::{Segment, read};
 
 fn jump() -> Segment {
@@ -39,6 +39,7 @@ fn slow_clock_is_rebuilt_also_beside_a_bad_joint() {
 #[test]
 fn one_bad_coordinate_or_kind_of_coordinates_changes_no_clock() {
     let is_rebuilt = |timed: Timed| timed.mended.elapsed_ratio.is_some();
+    assert!((elapsed(&jump()).1 - 1.0).abs() < 0.02);
     assert!(!is_rebuilt(spoiled(|_| {})));
     assert!(!is_rebuilt(spoiled(|segment| scale(segment, [2], 57.3))));
     assert!(!is_rebuilt(spoiled(|segment| scale(segment, [11], -1.0))));

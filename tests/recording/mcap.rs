@@ -13,6 +13,9 @@ use romc::robot::JOINT_NAMES;
 use super::foreign::{difference, gyro, jump, quaternion};
 use super::tools::is_thorough;
 
+/// The topic of what joints do, by ROS 2's custom.
+const JOINT_TOPIC: &str = "/joint_states";
+
 /// A message of a topic with its time of recording.
 #[derive(Clone)]
 struct Message {
@@ -219,7 +222,7 @@ fn with_joints(
 ) -> Vec<Message> {
     let (mut out, mut sample) = (Vec::new(), 0);
     for message in &bag.messages {
-        if message.topic != recording::JOINT_TOPIC {
+        if message.topic != JOINT_TOPIC {
             out.push(message.clone());
             continue;
         }
@@ -385,8 +388,7 @@ fn messages_that_are_cut_or_of_unknown_kinds_are_refused() {
         ),
     ] {
         let schema = ("a/B".to_owned(), text.into());
-        bag.schemas
-            .insert(recording::JOINT_TOPIC.to_owned(), schema);
+        bag.schemas.insert(JOINT_TOPIC.to_owned(), schema);
         let error = refused(&bag.file(folder.path(), &bag.messages));
         assert!(error.contains(words), "{error}");
     }
@@ -458,7 +460,7 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
     }
     // Two topics of the same names and rate with other numbers.
     let mut two = Bag::of(&jump);
-    let schema = two.schemas[recording::JOINT_TOPIC].clone();
+    let schema = two.schemas[JOINT_TOPIC].clone();
     two.schemas.insert("/a/joint_states".to_owned(), schema);
     let mut messages = with_joints(&two, &jump, |_, time_ns, joints| {
         let other = joints
@@ -468,7 +470,7 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
         vec![encoded(time_ns, &joints), encoded(time_ns, &other)]
     });
     let states = messages.iter_mut();
-    let states = states.filter(|message| message.topic == recording::JOINT_TOPIC);
+    let states = states.filter(|message| message.topic == JOINT_TOPIC);
     states
         .skip(1)
         .step_by(2)
@@ -484,7 +486,7 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
         ("/joint_commands", None),
     ] {
         let mut bag = Bag::of(&jump);
-        let schema = bag.schemas[recording::JOINT_TOPIC].clone();
+        let schema = bag.schemas[JOINT_TOPIC].clone();
         bag.schemas.insert(topic.to_owned(), schema);
         let messages = with_joints(&bag, &jump, |_, time_ns, joints| {
             let other = match names {
@@ -504,7 +506,7 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
         let messages: Vec<Message> = messages
             .into_iter()
             .map(|mut message| {
-                if message.topic == recording::JOINT_TOPIC {
+                if message.topic == JOINT_TOPIC {
                     count += 1;
                     if count % 3 != 1 {
                         message.topic = topic.to_owned();

@@ -139,7 +139,7 @@ fn case(file: &Path, mut function: Function, given: &[Vec<f64>]) -> Option<Value
     if points.len() < from * N_POINTS.min(given.len().max(1)) {
         return None;
     }
-    let (inputs, outputs) = (function.program.inputs(), function.program.outputs());
+    let (inputs, outputs) = (&function.program.inputs, &function.program.outputs);
     let lens = |slots: &[romc::ir::Slot]| slots.iter().map(|s| s.len).collect::<Vec<_>>();
     Some(json!({
         "file": file,

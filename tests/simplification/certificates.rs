@@ -42,9 +42,7 @@ fn ranges(made: &Simplified, phase: usize) -> Vec<Interval> {
 fn terms_of(model: &ReducedModel, phase: usize, output: usize) -> Vec<(String, f64)> {
     let active = model.active_terms(phase, output).expect("in range");
     let active = active.into_iter();
-    active
-        .map(|(xi, term)| (term.text().to_owned(), xi))
-        .collect()
+    active.map(|(xi, term)| (term.text.clone(), xi)).collect()
 }
 
 struct Random(ChaCha8Rng);

@@ -141,7 +141,7 @@ fn reference(equations: &Equations<'_>, point: &[f64]) -> (Wide, f64) {
     };
     let (mut sum, mut size) = (Wide::of(0.0), 0.0);
     for (coefficient, term) in equations.phases()[0].summands(equations, 0) {
-        let values = pool.fold_up(&[term.expr()], |pool, expr, child| match pool.node(expr) {
+        let values = pool.fold_up(&[term.expr], |pool, expr, child| match pool.node(expr) {
             Node::Number(number) => Wide::of(number.to_f64()),
             Node::Symbol(symbol) => input(*symbol),
             Node::Sum(terms) => (terms.iter()).fold(Wide::of(0.0), |a, b| a.plus(child(*b))),
@@ -227,7 +227,7 @@ fn compared(count: usize, is_single: bool) -> (Vec<Compared>, usize) {
         let model = model_of(&sum);
         let learned = Equations::as_learned(&model);
         let simplified = Equations::of(&model);
-        n_simplified += usize::from(!simplified.steps().is_empty());
+        n_simplified += usize::from(!simplified.steps.is_empty());
         let program = |equations| lower::dynamics(equations, 0, Form::default()).expect("lowers");
         let programs = [program(&learned), program(&simplified)];
         for _ in 0..POINTS {

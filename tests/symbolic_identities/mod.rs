@@ -59,7 +59,7 @@ fn pairs(operator: &str) -> Vec<(&'static str, &'static str)> {
 /// Whether the normal forms of two expressions prove them equal.
 fn is_proven(pool: &ExprPool, a: ExprId, b: ExprId) -> bool {
     let mut forms = CanonicalForms::new(pool, &[a, b]);
-    let difference = forms.of(a).minus(&forms.of(b));
+    let difference = &forms.of(a) - &forms.of(b);
     let cleared = forms.without_fractions(&difference);
     cleared.is_some_and(|form| form.is_zero())
 }

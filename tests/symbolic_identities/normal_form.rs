@@ -19,7 +19,7 @@ fn difference(a: &str, b: &str) -> (CanonicalForm, f64) {
     };
     let (left, right) = (parse(&mut pool, a), parse(&mut pool, b));
     let mut forms = CanonicalForms::new(&pool, &[left, right]);
-    let difference = forms.of(left).minus(&forms.of(right));
+    let difference = &forms.of(left) - &forms.of(right);
     let cleared = forms.without_fractions(&difference).expect("small enough");
     (cleared, forms.rounding)
 }

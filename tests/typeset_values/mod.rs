@@ -247,7 +247,7 @@ proptest! {
         let (z, dz, u) = (point(2, 0.0), point(2, 0.3), point(2, 0.6));
         let expected = library.evaluate(&z, &dz, &u).unwrap()[0];
         prop_assume!(expected.is_finite() && expected.abs() < 1e12);
-        let printed = expression(library.pool(), library.terms()[0].expr(), &SymbolTable::default());
+        let printed = expression(library.pool(), library.terms()[0].expr, &SymbolTable::default());
         let found = value_of(&printed.into_math(), &latent_values(&z, &dz, &u));
         // Cancellation inside the term amplifies rounding.
         let error = (found - expected).abs();

@@ -74,8 +74,8 @@ fn exchanged_coordinates_overlap_fully_and_other_terms_do_not() {
     };
     let library = Library::of(2, LibraryChoice::Standard(standard)).expect("small library");
     let with = |active: [(&str, usize); 3]| {
-        let row = |text| library.terms().iter().position(|term| term.text() == text);
-        let mut xi = DMatrix::zeros(library.len(), 2);
+        let row = |text| library.terms().iter().position(|term| term.text == text);
+        let mut xi = DMatrix::zeros(library.terms().len(), 2);
         for (text, column) in active {
             xi[(row(text).expect(text), column)] = 1.0;
         }

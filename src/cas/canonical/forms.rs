@@ -127,7 +127,7 @@ impl<'p> CanonicalForms<'p> {
                     true => Coefficient::imaginary(-1, 1),
                     false => Coefficient::integer(1),
                 };
-                (plus.minus(&minus).scaled(&unit), plus.plus(&minus))
+                ((&plus - &minus).scaled(&unit), plus.plus(&minus))
             }
             Atom::Call(Function::Abs, base) => {
                 let sign = self.call(Function::Sign, base.clone());
@@ -246,7 +246,7 @@ impl<'p> CanonicalForms<'p> {
                 let [plus, minus] = exponentials(&argument, true);
                 let half = Coefficient::from(ratio(1, 2));
                 Some(match function {
-                    Function::Sin => plus.minus(&minus).scaled(&Coefficient::imaginary(-1, 2)),
+                    Function::Sin => (&plus - &minus).scaled(&Coefficient::imaginary(-1, 2)),
                     _ => plus.plus(&minus).scaled(&half),
                 })
             }
@@ -307,7 +307,7 @@ impl<'p> CanonicalForms<'p> {
             }
             self.n_fraction_tries += 1;
             let known = known.exact();
-            let difference = self.without_fractions(&exact.minus(&known));
+            let difference = self.without_fractions(&(exact - &known));
             if difference.is_some_and(|difference| difference.is_zero()) {
                 return Some(known);
             }
@@ -349,7 +349,7 @@ impl Argument {
         };
         let mut room = self.room.clone();
         let mut largest = 0.0_f64;
-        for (monomial, difference) in &other.minus(&self.form).terms {
+        for (monomial, difference) in &(other - &self.form).terms {
             let (own, its) = (radius(&self.form, monomial), radius(other, monomial));
             let slack = 1e-9 * (own + its);
             let distance = nearest(&difference.re);
@@ -390,6 +390,6 @@ pub(super) fn exponentials(argument: &CanonicalForm, is_angle: bool) -> [Canonic
         true => Coefficient::imaginary(1, 1),
         false => Coefficient::integer(1),
     };
-    let minus_unit = Coefficient::integer(-1).times(&unit);
+    let minus_unit = &Coefficient::integer(-1) * &unit;
     [unit, minus_unit].map(|factor| CanonicalForm::exponential(argument.scaled(&factor)))
 }

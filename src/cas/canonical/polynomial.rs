@@ -1,6 +1,7 @@
 //! Sums of complex rational coefficients, known to a radius, times products of atoms and one exponential.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::{Add, Mul, Sub};
 
 use num_bigint::BigInt;
 use num_traits::{One, Signed, ToPrimitive, Zero};
@@ -119,7 +120,7 @@ impl CanonicalForm {
     /// Adds a term. A coefficient of value zero is kept as long as it has a radius.
     pub(super) fn add(&mut self, coefficient: Coefficient, monomial: Monomial) {
         let sum = match self.terms.remove(&monomial) {
-            Some(before) => before.plus(&coefficient),
+            Some(before) => &before + &coefficient,
             None => coefficient,
         };
         if !sum.is_zero() || sum.radius() > 0.0 {
@@ -167,7 +168,7 @@ impl CanonicalForm {
     pub(super) fn normed(&self) -> Option<(Self, Coefficient, Coefficient)> {
         let leading = self.leading()?;
         let (size, sign) = (Coefficient::from(leading.size()), leading.sign());
-        let factor = size.reciprocal()?.times(&sign);
+        let factor = &size.reciprocal()? * &sign;
         Some((self.scaled(&factor), size, sign))
     }
 
@@ -197,7 +198,7 @@ impl CanonicalForm {
     pub(super) fn scaled(&self, factor: &Coefficient) -> Self {
         let mut scaled = Self::default();
         for (monomial, coefficient) in &self.terms {
-            scaled.add(coefficient.times(factor), monomial.clone());
+            scaled.add(coefficient * factor, monomial.clone());
         }
         scaled
     }
@@ -213,13 +214,16 @@ impl CanonicalForm {
         sum
     }
 
-    /// `self - other`.
-    pub fn minus(&self, other: &Self) -> Self {
-        self.plus(&other.scaled(&Coefficient::integer(-1)))
-    }
-
     pub(super) fn is_small(&self) -> bool {
         self.terms.len() <= MAX_TERMS
+    }
+}
+
+impl Sub for &CanonicalForm {
+    type Output = CanonicalForm;
+
+    fn sub(self, other: Self) -> CanonicalForm {
+        self.plus(&other.scaled(&Coefficient::integer(-1)))
     }
 }
 
@@ -356,46 +360,6 @@ impl Coefficient {
         self.re.abs() + self.im.abs()
     }
 
-    /// `self - other`.
-    pub fn minus(&self, other: &Self) -> Self {
-        self.plus(&other.times(&Self::integer(-1)))
-    }
-
-    /// `self + other`.
-    pub fn plus(&self, other: &Self) -> Self {
-        let radius = match (self.radius(), other.radius()) {
-            (0.0, radius) | (radius, 0.0) => radius,
-            (a, b) => (a + b) * OUTWARD,
-        };
-        Self {
-            re: &self.re + &other.re,
-            im: &self.im + &other.im,
-            radius: radius.to_bits(),
-        }
-    }
-
-    /// `self * other`.
-    pub fn times(&self, other: &Self) -> Self {
-        let radius = match (self.radius(), other.radius()) {
-            (0.0, 0.0) => 0.0,
-            (a, b) => (self.magnitude() * b + other.magnitude() * a + a * b) * OUTWARD,
-        };
-        let (re, im) = match (self.im.is_zero(), other.im.is_zero()) {
-            (true, true) => (&self.re * &other.re, Rational::zero()),
-            (true, false) => (&self.re * &other.re, &self.re * &other.im),
-            (false, true) => (&self.re * &other.re, &self.im * &other.re),
-            (false, false) => (
-                &self.re * &other.re - &self.im * &other.im,
-                &self.re * &other.im + &self.im * &other.re,
-            ),
-        };
-        Self {
-            re,
-            im,
-            radius: radius.to_bits(),
-        }
-    }
-
     /// The reciprocal; `None` for zero, or where zero is within the radius.
     pub(super) fn reciprocal(&self) -> Option<Self> {
         let square = &self.re * &self.re + &self.im * &self.im;
@@ -412,5 +376,54 @@ impl Coefficient {
             im: -(&self.im / &square),
             radius: radius.to_bits(),
         })
+    }
+}
+
+impl Sub for &Coefficient {
+    type Output = Coefficient;
+
+    fn sub(self, other: Self) -> Coefficient {
+        self + &(other * &Coefficient::integer(-1))
+    }
+}
+
+impl Add for &Coefficient {
+    type Output = Coefficient;
+
+    fn add(self, other: Self) -> Coefficient {
+        let radius = match (self.radius(), other.radius()) {
+            (0.0, radius) | (radius, 0.0) => radius,
+            (a, b) => (a + b) * OUTWARD,
+        };
+        Coefficient {
+            re: &self.re + &other.re,
+            im: &self.im + &other.im,
+            radius: radius.to_bits(),
+        }
+    }
+}
+
+impl Mul for &Coefficient {
+    type Output = Coefficient;
+
+    fn mul(self, other: Self) -> Coefficient {
+        let radius = match (self.radius(), other.radius()) {
+            (0.0, 0.0) => 0.0,
+            (a, b) => (self.magnitude() * b + other.magnitude() * a + a * b) * OUTWARD,
+        };
+        let (re, im) = match (self.im.is_zero(), other.im.is_zero()) {
+            (true, true) => (&self.re * &other.re, Rational::zero()),
+            (true, false) => (&self.re * &other.re, &self.re * &other.im),
+            (false, true) => (&self.re * &other.re, &self.im * &other.re),
+            (false, false) => (
+                &self.re * &other.re - &self.im * &other.im,
+                &self.re * &other.im + &self.im * &other.re,
+            ),
+        };
+        Coefficient {
+            re,
+            im,
+            radius: radius.to_bits(),
+        }
     }
 }

@@ -28,7 +28,7 @@ impl CanonicalForms<'_> {
             return None;
         }
         let pairs = (a.terms.iter()).flat_map(|of_a| b.terms.iter().map(move |of_b| (of_a, of_b)));
-        let products = pairs.map(|((m, c), (n, d))| (c.times(d), m.times(n)));
+        let products = pairs.map(|((m, c), (n, d))| (c * d, m.times(n)));
         self.settled(products.collect())
     }
 
@@ -49,7 +49,7 @@ impl CanonicalForms<'_> {
                 continue;
             };
             let factor = factor?.terms.into_iter();
-            let term = |(other, scale)| (coefficient.times(&scale), rest.times(&other));
+            let term = |(other, scale)| (&coefficient * &scale, rest.times(&other));
             pending.extend(factor.map(term));
         }
         Some(form)
@@ -154,7 +154,7 @@ impl CanonicalForms<'_> {
         let (normed, size, sign) = form.normed()?;
         let normed = self.argument(normed);
         let atom = Monomial::atom(self.number(Atom::Sum(normed)), -1);
-        Some(CanonicalForm::term(size.reciprocal()?.times(&sign), atom))
+        Some(CanonicalForm::term(&size.reciprocal()? * &sign, atom))
     }
 
     /// `(scale, q)` with `form = scale * q^2` and a positive scale, if there is such a sum `q`; `form` is real. The
@@ -178,7 +178,7 @@ impl CanonicalForms<'_> {
         let mut last = order.weight(&first);
         for _ in 0..form.terms.len() {
             let square = self.product(&root, &root)?;
-            let rest = monic.minus(&square);
+            let rest = &monic - &square;
             let Some((monomial, coefficient)) = order.largest(&rest) else {
                 let imaginary = Coefficient::imaginary(1, 1);
                 return Some(match leading.is_negative() {
@@ -192,7 +192,7 @@ impl CanonicalForms<'_> {
                 return None;
             }
             last = weight;
-            root.add(coefficient.times(&ratio(1, 2).into()), next);
+            root.add(&coefficient * &ratio(1, 2).into(), next);
         }
         None
     }
@@ -227,8 +227,8 @@ impl CanonicalForms<'_> {
                 return None;
             }
             last = weight;
-            let term = CanonicalForm::term(coefficient.times(&factor), next);
-            rest = rest.minus(&self.product(&term, divisor)?);
+            let term = CanonicalForm::term(&coefficient * &factor, next);
+            rest = &rest - &self.product(&term, divisor)?;
             quotient = quotient.plus(&term);
         }
         None

@@ -57,7 +57,7 @@ impl CanonicalForms<'_> {
                 false => rest = rest.times(&Monomial::atom(atom, power)),
             }
         }
-        let sign = coefficient.times(&inverse);
+        let sign = coefficient * &inverse;
         // What is real has real factors: there is no other reading of its root.
         sign.as_real()?;
         match rest.powers[..] {
@@ -246,7 +246,7 @@ impl CanonicalForms<'_> {
         }
         let (normed, scale, sign) = form.normed()?;
         if let Some(known) = self.known_sign(&normed) {
-            return Some(form.scaled(&sign.times(&known)));
+            return Some(form.scaled(&(&sign * &known)));
         }
         let Some((_, monomial)) = normed.as_term().filter(|(c, _)| c.is_one()) else {
             return Some(self.call(Function::Abs, normed).scaled(&scale));
@@ -275,7 +275,7 @@ impl CanonicalForms<'_> {
         }
         let (normed, _, sign) = form.normed()?;
         if let Some(known) = self.known_sign(&normed) {
-            return Some(CanonicalForm::constant(sign.times(&known)));
+            return Some(CanonicalForm::constant(&sign * &known));
         }
         let powers = (normed.as_term())
             .filter(|(coefficient, _)| coefficient.is_one())

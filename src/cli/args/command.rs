@@ -22,7 +22,7 @@ use crate::simplify::Tolerance;
     propagate_version = true,
     after_help = "Start with `romc demo`. `romc <command> --help` explains a command with an example."
 )]
-pub struct Arguments {
+pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
     /// Print one JSON object to stdout and nothing else there

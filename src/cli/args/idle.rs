@@ -12,7 +12,7 @@ use crate::mpc::Lift;
 
 impl Arguments {
     /// Refuses a flag that has no effect beside the others.
-    pub fn refuse_idle(&self) -> Result<(), Error> {
+    pub(crate) fn refuse_idle(&self) -> Result<(), Error> {
         match &self.command {
             Command::Compile(arguments) => of_compile(arguments),
             Command::Inspect(arguments) => of_inspect(arguments),

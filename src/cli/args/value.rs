@@ -64,7 +64,8 @@ impl TypedValueParser for RobotParser {
 }
 
 pub(crate) fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
-    WrenchFrame::by_name(text).ok_or_else(|| format!("found `{text}`, expected `world` or `body`"))
+    text.parse()
+        .map_err(|()| format!("found `{text}`, expected `world` or `body`"))
 }
 
 #[derive(Debug, Clone, Default, Args)]

@@ -163,10 +163,10 @@ impl Translator<'_> {
     }
 
     pub(super) fn call(&mut self, first: usize, callee: usize, arguments: &[ValueId]) {
-        let program = &self.program.callees()[callee];
+        let program = &self.program.callees[callee];
         let (mut read, mut written) = (Vec::new(), Vec::new());
         let mut rest = arguments;
-        for slot in program.inputs() {
+        for slot in &program.inputs {
             let (these, others) = rest.split_at(slot.len);
             read.push(match self.contiguous(these).filter(Span::is_whole) {
                 Some(span) => span,
@@ -175,7 +175,7 @@ impl Translator<'_> {
             rest = others;
         }
         let mut next = first;
-        for slot in program.outputs() {
+        for slot in &program.outputs {
             let output = self.output_matrix(next, 1, slot.len);
             let output = output.map(|matrix| matrix.home).filter(Span::is_whole);
             let home = output.unwrap_or_else(|| self.declared(slot.len, &slot.name));

@@ -184,7 +184,7 @@ pub(super) fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<Stri
                 (false, true) => " - ",
             };
             right.push_str(sign);
-            right.push_str(&summand_words(coefficient.abs(), term.text()));
+            right.push_str(&summand_words(coefficient.abs(), &term.text));
         }
         let right = match terms.len() {
             0 => "0".to_owned(),
@@ -196,7 +196,7 @@ pub(super) fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<Stri
         if let Some(units) = units.filter(|_| (1..=MOST_TERMS).contains(&terms.len())) {
             let unit = |term| units.acceleration(row) / units.of_term(system.pool(), term);
             let each = terms.iter();
-            let each = each.map(|(_, term)| format!("{} {}", term.text(), unit(term.expr())));
+            let each = each.map(|(_, term)| format!("{} {}", term.text, unit(term.expr)));
             let each = each.collect::<Vec<_>>().join(", ");
             lines.push(format!(
                 "Units of the coefficients of ddz{}: {each}.",

@@ -119,7 +119,7 @@ fn map_entries(
         };
         match program {
             Ok(program) => {
-                let name = program.name().to_owned();
+                let name = program.name.clone();
                 entries.push(entry(&name, program, docs));
             }
             Err(LowerError::Model(ModelError::Missing { .. })) => {}
@@ -178,8 +178,8 @@ fn phase_entries(
 /// Outputs named as an input are updated in place; the documentation ends with the lengths of all arrays.
 fn entry(name: &str, program: Program, mut docs: Vec<String>) -> FunctionSpec {
     let mut parameters: Vec<Parameter<String>> = Vec::new();
-    let inputs = program.inputs().iter().map(|slot| (slot, Role::Input));
-    let outputs = program.outputs().iter().map(|slot| (slot, Role::Output));
+    let inputs = program.inputs.iter().map(|slot| (slot, Role::Input));
+    let outputs = program.outputs.iter().map(|slot| (slot, Role::Output));
     for (slot, role) in inputs.chain(outputs) {
         match parameters.iter_mut().find(|known| known.name == slot.name) {
             Some(known) => known.role = Role::InOut,

@@ -71,12 +71,12 @@ impl Precision {
 }
 
 fn beyond_single(program: &Program) -> Option<f64> {
-    let constants = program.statements().iter().filter_map(|s| match s {
+    let constants = program.statements.iter().filter_map(|s| match s {
         Statement::Constant(value) => Some(*value),
         _ => None,
     });
     let entries = program.tables().iter().flat_map(|table| table.entries());
-    let inner = program.callees().iter().find_map(beyond_single);
+    let inner = program.callees.iter().find_map(beyond_single);
     constants
         .chain(entries.copied())
         .find(|value| (*value as f32).is_infinite())

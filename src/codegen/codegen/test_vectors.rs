@@ -103,8 +103,8 @@ fn vectors(entry: &FunctionSpec, has_batch: bool, precision: Precision) -> Funct
     let accepted: Vec<Vec<f64>> = accepted.collect();
     let place = |slots: &[Slot], name: &str| slots.iter().position(|slot| slot.name == name);
     let parameters = entry.parameters.iter().map(|parameter| {
-        let read = place(entry.program.inputs(), &parameter.name);
-        let written = place(entry.program.outputs(), &parameter.name);
+        let read = place(&entry.program.inputs, &parameter.name);
+        let written = place(&entry.program.outputs, &parameter.name);
         let before = read.map(|slot| points.iter().map(|p| p.inputs[slot].clone()).collect());
         let after = written.map(|slot| points.iter().map(|p| p.outputs[slot].clone()).collect());
         let tolerance =
@@ -175,12 +175,12 @@ impl TestPoint {
     /// The point with some arrays at zero, if the function of the state has kinks and finite results there: a robot at
     /// rest. A NaN slope there with accelerations that are numbers counts as zero: the test fails.
     fn at_rest(self, entry: &FunctionSpec, precision: Precision, zero: &[&str]) -> Self {
-        let is_of_state = entry.program.inputs().iter().any(|slot| slot.name == "dz");
+        let is_of_state = entry.program.inputs.iter().any(|slot| slot.name == "dz");
         if !is_of_state || !entry.program.has(has_kink) {
             return self;
         }
         let mut inputs = self.inputs.clone();
-        for (slot, values) in entry.program.inputs().iter().zip(&mut inputs) {
+        for (slot, values) in entry.program.inputs.iter().zip(&mut inputs) {
             if zero.contains(&slot.name.as_str()) {
                 values.fill(0.0);
             }
@@ -232,7 +232,7 @@ fn has_kink(statement: &Statement) -> bool {
 /// A point between -1 and 1. Where the function is not finite there, points around it are tried: all elements positive,
 /// all drawn again, a few of the best point changed; the best is returned.
 fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> TestPoint {
-    let slots = entry.program.inputs().iter();
+    let slots = entry.program.inputs.iter();
     let drawn = slots.map(|slot| match slot.name.as_str() {
         "h" => vec![precision.nearest(0.002)],
         name => (0..slot.len)
@@ -269,7 +269,7 @@ fn point(entry: &FunctionSpec, precision: Precision, random: &mut Random) -> Tes
 
 /// The elements of inputs that may be any number: slot and position.
 fn free_elements(entry: &FunctionSpec) -> Vec<(usize, usize)> {
-    let slots = entry.program.inputs().iter().enumerate();
+    let slots = entry.program.inputs.iter().enumerate();
     slots
         .filter(|(_, slot)| !matches!(slot.name.as_str(), "h" | "feet"))
         .flat_map(|(position, slot)| (0..slot.len).map(move |k| (position, k)))

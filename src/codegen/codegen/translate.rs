@@ -47,7 +47,7 @@ pub(crate) fn function(
         let position = entry.parameters.iter().position(|p| p.name == slot.name);
         parameters[position.expect("every slot is a parameter")].clone()
     };
-    let slots = [entry.program.inputs(), entry.program.outputs()];
+    let slots = [&entry.program.inputs, &entry.program.outputs];
     let slots = slots.map(|slots| slots.iter().map(of_slot).collect());
     let printer = Printer::new(dialect, 1);
     let mut translator = Translator::new(&entry.program, slots, locals, tables, printer);
@@ -68,7 +68,7 @@ pub(crate) fn function(
 /// if the program runs better point by point: it loops over tables, or calls functions that no compiler vectorises.
 pub(crate) fn lanes(program: &Program, dialect: &Dialect, sines: SineCosine) -> Option<String> {
     let is_by_library = sines == SineCosine::Library && program.has(computes_angles);
-    if is_by_library || !program.statements().iter().all(vectorises) {
+    if is_by_library || !program.statements.iter().all(vectorises) {
         return None;
     }
     let mut locals = Namer::new(dialect.spelling.reserved);
@@ -82,8 +82,8 @@ pub(crate) fn lanes(program: &Program, dialect: &Dialect, sines: SineCosine) -> 
         role,
     };
     let slots = [
-        (program.inputs(), Role::Input),
-        (program.outputs(), Role::Output),
+        (&program.inputs, Role::Input),
+        (&program.outputs, Role::Output),
     ];
     let slots = slots.map(|(slots, role)| slots.iter().map(|s| parameter(s, role)).collect());
     // No statement that vectorises reads a table, so the store of tables stays empty.
@@ -117,7 +117,7 @@ impl<'a> Translator<'a> {
         printer: Printer<'a>,
     ) -> Self {
         let mut n_uses = vec![0; program.n_values()];
-        let live = program.statements().iter().zip(program.live());
+        let live = program.statements.iter().zip(program.live());
         let operands = live
             .filter(|(_, live)| *live)
             .flat_map(|(s, _)| s.operands());
@@ -145,7 +145,7 @@ impl<'a> Translator<'a> {
 
     /// Prints all that an output depends on, ending with the assignments of the outputs.
     fn translate(&mut self) {
-        let statements = self.program.statements().iter().enumerate();
+        let statements = self.program.statements.iter().enumerate();
         for ((position, statement), live) in statements.zip(self.program.live()) {
             if live {
                 self.statement(position, statement);
@@ -233,7 +233,7 @@ impl<'a> Translator<'a> {
 
     pub(super) fn unused(&self) -> impl Iterator<Item = &Ident> {
         let is_read = |wanted: usize| {
-            let mut statements = self.program.statements().iter().enumerate();
+            let mut statements = self.program.statements.iter().enumerate();
             statements.any(|(position, statement)| {
                 matches!(statement, Statement::Input { slot, .. } if *slot == wanted)
                     && self.n_uses[self.program.values_of(position).start] > 0

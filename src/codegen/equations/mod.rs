@@ -20,7 +20,7 @@
 //! let equations = Equations::of(&model);
 //! let ddz1: Vec<_> = equations.phases()[0]
 //!     .summands(&equations, 0)
-//!     .map(|(coefficient, term)| (coefficient, term.text()))
+//!     .map(|(coefficient, term)| (coefficient, term.text.as_str()))
 //!     .collect();
 //! assert_eq!(ddz1, [(-0.3, "dz1"), (-9.81, "sin(z1)")]);
 //! # Ok(())

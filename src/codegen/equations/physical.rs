@@ -110,7 +110,7 @@ impl Equations<'_> {
             let ddz = (phase.ddz.iter().enumerate()).map(|(output, equation)| {
                 let summands = equation.iter().map(|&Summand { coefficient, term }| {
                     let factor = factors[term] / scales[output].position.0;
-                    let (phase, ddz, text) = (&phase.name, output + 1, terms[term].text());
+                    let (phase, ddz, text) = (&phase.name, output + 1, &terms[term].text);
                     let place = || format!("phase {phase}, ddz{ddz}: the coefficient of {text}");
                     let coefficient = finite(coefficient * factor, model, place)?;
                     Ok::<_, PhysicalError>(Summand { coefficient, term })
@@ -147,18 +147,20 @@ impl Equations<'_> {
                 (symbol, pool.mul(number, expr))
             })
             .collect();
-        let exprs: Vec<ExprId> = self.terms().iter().map(|term| term.expr()).collect();
+        let exprs: Vec<ExprId> = self.terms.iter().map(|term| term.expr).collect();
         let scaled = pool.substitute_all(&exprs, &replacements);
         let split = |expr: ExprId| match pool.terms_of(expr).as_slice() {
             [(number, rest)] => (number.to_f64(), *rest),
             _ => (1.0, expr),
         };
         let (factors, exprs): (Vec<f64>, Vec<ExprId>) = scaled.into_iter().map(split).unzip();
-        let terms =
-            (exprs.iter().zip(self.terms())).map(|(&expr, term)| match expr == term.expr() {
-                true => term.clone(),
-                false => CandidateTerm::new(pool.display(expr).to_string(), expr),
-            });
+        let terms = (exprs.iter().zip(&self.terms)).map(|(&expr, term)| match expr == term.expr {
+            true => term.clone(),
+            false => CandidateTerm {
+                text: pool.display(expr).to_string(),
+                expr,
+            },
+        });
         (terms.collect(), factors, pool)
     }
 }

@@ -37,9 +37,11 @@ pub struct PhaseEquations {
 pub struct Equations<'a> {
     pub(super) model: Cow<'a, ReducedModel>,
     pub(super) pool: ExprPool,
-    pub(super) terms: Vec<CandidateTerm>,
+    /// The terms of all phases.
+    pub terms: Vec<CandidateTerm>,
     pub(super) phases: Vec<PhaseEquations>,
-    pub(super) steps: Vec<ExactStep>,
+    /// What exact simplification did, in the order of phases and equations.
+    pub steps: Vec<ExactStep>,
     /// The units of equations in physical units, and what these were made from.
     pub(super) physical: Option<(LatentUnits, Box<Equations<'static>>)>,
 }
@@ -74,11 +76,6 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// What exact simplification did, in the order of phases and equations.
-    pub fn steps(&self) -> &[ExactStep] {
-        &self.steps
-    }
-
     /// A model whose Xi and library are these equations: the one they were made from if nothing was simplified.
     ///
     /// # Errors
@@ -87,9 +84,7 @@ impl<'a> Equations<'a> {
         if self.steps.is_empty() {
             return Ok(Cow::Borrowed(&self.model));
         }
-        let texts: Vec<String> = (self.terms.iter())
-            .map(|term| term.text().to_owned())
-            .collect();
+        let texts: Vec<String> = (self.terms.iter()).map(|term| term.text.clone()).collect();
         let phases = self.model.phases().iter().enumerate();
         let phases = phases.map(|(index, phase)| Phase {
             xi: self.coefficients(index),
@@ -104,10 +99,13 @@ impl<'a> Equations<'a> {
     /// what generated code computes with, its product with a coefficient not.
     #[must_use]
     pub fn with_constants_folded(mut self) -> Self {
-        let exprs: Vec<ExprId> = self.terms.iter().map(CandidateTerm::expr).collect();
+        let exprs: Vec<ExprId> = self.terms.iter().map(|term| term.expr).collect();
         let folded = self.pool.fold_constants(&exprs);
         for (term, expr) in self.terms.iter_mut().zip(folded) {
-            *term = CandidateTerm::new(term.text().to_owned(), expr);
+            *term = CandidateTerm {
+                text: term.text.clone(),
+                expr,
+            };
         }
         self
     }
@@ -151,11 +149,6 @@ impl<'a> Equations<'a> {
         &self.pool
     }
 
-    /// The distinct terms in the order in which they are printed; a term may be unused.
-    pub fn terms(&self) -> &[CandidateTerm] {
-        &self.terms
-    }
-
     /// All phases, in the model's order.
     pub fn phases(&self) -> &[PhaseEquations] {
         &self.phases
@@ -194,7 +187,7 @@ impl PhaseEquations {
         equations: &'e Equations<'_>,
         output: usize,
     ) -> impl Iterator<Item = (f64, &'e CandidateTerm)> + 'e {
-        let terms = equations.terms();
+        let terms = &equations.terms;
         (self.ddz[output].iter()).map(|summand| (summand.coefficient, &terms[summand.term]))
     }
 
@@ -280,7 +273,7 @@ impl Equations<'_> {
         for phase in &mut self.phases {
             for (output, equation) in phase.ddz.iter_mut().enumerate() {
                 let summands = equation.iter();
-                let summands = summands.map(|s| (s.coefficient, self.terms[s.term].expr()));
+                let summands = summands.map(|s| (s.coefficient, self.terms[s.term].expr));
                 let summands: Vec<(f64, ExprId)> = summands.collect();
                 let mut is_kept = vec![true; equation.len()];
                 let mut all: Vec<Summand> = Vec::new();
@@ -292,7 +285,7 @@ impl Equations<'_> {
                     };
                     let before = replaced.iter().map(|&position| {
                         let Summand { coefficient, term } = equation[position];
-                        (coefficient, self.terms[term].text().to_owned())
+                        (coefficient, self.terms[term].text.clone())
                     });
                     let after = placed.iter().map(|summand| summand.coefficient).zip(texts);
                     steps.push(ExactStep {
@@ -361,9 +354,9 @@ impl NewTerms {
         let text = |expr: ExprId| pool.display(expr).to_string();
         if self.known.is_empty() {
             for (index, term) in terms.iter().enumerate() {
-                let known = self.known.entry(term.expr()).or_insert(index);
+                let known = self.known.entry(term.expr).or_insert(index);
                 // Of several spellings the canonical one is printed.
-                if term.text() == text(term.expr()) {
+                if term.text == text(term.expr) {
                     *known = index;
                 }
             }
@@ -376,7 +369,10 @@ impl NewTerms {
             let term = *self.known.entry(expr).or_insert(terms.len());
             if term == terms.len() {
                 self.places.push((first, term));
-                terms.push(CandidateTerm::new(text.clone(), expr));
+                terms.push(CandidateTerm {
+                    text: text.clone(),
+                    expr,
+                });
             }
             Summand { coefficient, term }
         };

@@ -43,7 +43,7 @@ impl<T: Real> Interpreter<T> {
     pub fn new(program: &Program) -> Self {
         let mut values = vec![T::constant(0.0); program.n_values()];
         let (mut loads, mut steps) = (Vec::new(), Vec::new());
-        for (position, statement) in program.statements().iter().enumerate() {
+        for (position, statement) in program.statements.iter().enumerate() {
             let first = program.values_of(position).start;
             match statement {
                 Statement::Constant(constant) => values[first] = T::constant(*constant),
@@ -63,12 +63,12 @@ impl<T: Real> Interpreter<T> {
             Table::new(table.rows, table.cols, entries.collect())
         };
         Self {
-            inputs: lengths(program.inputs()),
-            outputs: lengths(program.outputs()),
+            inputs: lengths(&program.inputs),
+            outputs: lengths(&program.outputs),
             loads,
             steps,
             tables: program.tables().iter().map(table).collect(),
-            callees: program.callees().iter().map(Self::new).collect(),
+            callees: program.callees.iter().map(Self::new).collect(),
             stores: program.results().iter().map(|entry| entry.value).collect(),
             values,
         }

@@ -37,5 +37,5 @@ pub use interpret::{
 };
 pub use operation::{Binary, Unary};
 pub(crate) use operation::{FUNCTIONS, alternating};
-pub(crate) use program::{LANES, Table};
-pub use program::{Program, Slot, Statement, ValueId, Vector};
+pub(crate) use program::{LANES, Table, Vector};
+pub use program::{Program, Slot, Statement, ValueId};

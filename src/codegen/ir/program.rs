@@ -27,7 +27,7 @@ impl ValueId {
 pub(crate) const LANES: usize = 2;
 
 /// A number per lane.
-pub type Vector = [ValueId; LANES];
+pub(crate) type Vector = [ValueId; LANES];
 
 /// A constant matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]
@@ -153,44 +153,24 @@ pub(crate) struct ResultEntry {
 /// A validated, scheduled computation of named output arrays from named input arrays; see `ProgramBuilder`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
-    pub(super) name: String,
-    pub(super) inputs: Vec<Slot>,
-    pub(super) outputs: Vec<Slot>,
-    pub(super) statements: Vec<Statement>,
+    /// Name of the computation.
+    pub name: String,
+    /// Arrays that enter.
+    pub inputs: Vec<Slot>,
+    /// Arrays that leave.
+    pub outputs: Vec<Slot>,
+    /// All statements, in order of evaluation.
+    pub statements: Vec<Statement>,
     pub(super) first: Vec<u32>, // value of each statement, and the number of values at the end
     pub(super) tables: Vec<Table>,
-    pub(super) callees: Vec<Program>,
+    /// Programs that this one evaluates.
+    pub callees: Vec<Program>,
     pub(super) results: Vec<ResultEntry>,
 }
 
 impl Program {
-    /// Name of the computation.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// Arrays that enter.
-    pub fn inputs(&self) -> &[Slot] {
-        &self.inputs
-    }
-
-    /// Arrays that leave.
-    pub fn outputs(&self) -> &[Slot] {
-        &self.outputs
-    }
-
-    /// All statements, in order of evaluation.
-    pub fn statements(&self) -> &[Statement] {
-        &self.statements
-    }
-
     pub(crate) fn tables(&self) -> &[Table] {
         &self.tables
-    }
-
-    /// Programs that this one evaluates.
-    pub fn callees(&self) -> &[Program] {
-        &self.callees
     }
 
     /// What is stored where: each output element once, ordered by slot and index.

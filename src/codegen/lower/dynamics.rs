@@ -164,7 +164,7 @@ fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination
     let phase = system.phase(phase)?;
     let equation = |row| {
         let summands = phase.summands(system, row);
-        let summands = summands.map(|(coefficient, term)| (coefficient, term.expr()));
+        let summands = summands.map(|(coefficient, term)| (coefficient, term.expr));
         finite(phase, row, Combination::collect(system.pool(), summands))
     };
     (0..system.latent_dim()).map(equation).collect()

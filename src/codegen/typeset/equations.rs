@@ -87,7 +87,7 @@ fn table(
     let row = |(row, (_, term)): (usize, &(&str, Signed))| CoefficientRow {
         term: term.clone().into_math(),
         unit: units
-            .map(|units| units.of_term(system.pool(), system.terms()[row].expr()))
+            .map(|units| units.of_term(system.pool(), system.terms[row].expr))
             .filter(|unit| *unit != Unit::default()),
         coefficients: (phases.iter())
             .flat_map(|(_, xi)| xi.row(row).iter().map(cell).collect::<Vec<_>>())

@@ -21,9 +21,9 @@ pub(super) fn terms<'e>(
     symbols: &SymbolTable,
 ) -> Vec<(&'e str, Signed)> {
     let layout = |expr| expression(equations.pool(), expr, symbols);
-    let terms = equations.terms().iter();
+    let terms = equations.terms.iter();
     terms
-        .map(|term| (term.text(), layout(term.expr())))
+        .map(|term| (term.text.as_str(), layout(term.expr)))
         .collect()
 }
 

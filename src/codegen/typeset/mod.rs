@@ -21,9 +21,8 @@ pub(crate) use equations::{CoefficientRow, CoefficientTable};
 pub use equations::{Equation, EquationSystem, Typeset};
 pub use expression::expression;
 pub(crate) use robot::RobotTypeset;
-pub use symbols::{
-    Emitted, Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError,
-};
+pub(crate) use symbols::Emitted;
+pub use symbols::{Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError};
 pub use table::{Cell, Table, rounded, rounded_up, significant};
 pub(crate) use tree::{EQUALS, Glyph, break_lines, symbol_width, width};
 pub use tree::{Math, Signed, Symbol};

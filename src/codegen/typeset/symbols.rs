@@ -189,7 +189,7 @@ pub struct PrintOptions {
     pub form: Form,
 }
 
-pub type Emitted = Result<Vec<EmittedFile>, TypesetError>;
+pub(crate) type Emitted = Result<Vec<EmittedFile>, TypesetError>;
 
 #[derive(Debug, thiserror::Error)]
 pub enum TypesetError {

@@ -72,9 +72,9 @@ impl<T: Into<Cell>> From<Option<T>> for Cell {
 /// A table with named columns; the first column names the rows. `Display` aligns it for a terminal.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Table {
-    caption: String,
+    pub caption: String,
     columns: Vec<(String, String)>,
-    rows: Vec<Vec<String>>,
+    pub rows: Vec<Vec<String>>,
 }
 
 impl Table {
@@ -132,18 +132,6 @@ impl Table {
             caption: caption.into(),
             ..self
         }
-    }
-
-    pub fn caption(&self) -> &str {
-        &self.caption
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
-    pub fn len(&self) -> usize {
-        self.rows.len()
     }
 
     /// The same cells with a row for each column but the first, whose cells become the titles.

@@ -46,10 +46,10 @@ pub use estimate::InputGivenState;
 pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces, torque_deviation};
 pub use linearise::LatentDynamics;
 pub use plan::Plan;
-pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, SparseColumns, sparse};
+pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, sparse};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
-    Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MAX_HORIZON, MissingInput,
-    MpcSettings, RowSelection, Solver,
+    Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MissingInput, MpcSettings,
+    RowSelection, Solver,
 };
 pub use trajectory::NO_PHASE;

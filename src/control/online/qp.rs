@@ -38,7 +38,7 @@ impl Cone {
 }
 
 /// A matrix in compressed sparse columns.
-pub type SparseColumns = CscMatrix<f64>;
+pub(crate) type SparseColumns = CscMatrix<f64>;
 
 /// The matrix of `(row, column, value)` within its size, in any order, also zeros; values of one place are added.
 pub fn sparse(n_rows: usize, n_cols: usize, entries: &[(usize, usize, f64)]) -> SparseColumns {

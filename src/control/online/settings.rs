@@ -101,7 +101,7 @@ pub struct Effectiveness {
 }
 
 /// Longest horizon that is accepted.
-pub const MAX_HORIZON: usize = 500;
+pub(crate) const MAX_HORIZON: usize = 500;
 
 /// Accepted values of a setting.
 #[derive(Debug, Clone, Copy)]

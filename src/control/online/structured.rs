@@ -234,7 +234,7 @@ impl<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool> Sta
 }
 
 /// Whether the processor has vectors of 256 bits.
-pub fn has_avx2() -> bool {
+pub(crate) fn has_avx2() -> bool {
     #[cfg(target_arch = "x86_64")]
     {
         is_x86_feature_detected!("avx2")

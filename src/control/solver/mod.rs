@@ -68,6 +68,7 @@ mod scalar;
 mod solve;
 
 pub use links::Links;
-pub use problem::{Cost, Outcome, Program, ROW_NUMBERS, Report, Residuals, RowMatrices};
-pub use problem::{Settings, Shape, Stage};
+pub use problem::{
+    Cost, Outcome, Program, ROW_NUMBERS, Report, Residuals, RowMatrices, Settings, Shape, Stage,
+};
 pub use scalar::Real;

@@ -19,7 +19,7 @@ impl PerKind {
         Self { hx, hy, kn }
     }
 
-    pub fn to_array(self) -> [f64; LEG_JOINT_DIM] {
+    pub(crate) fn to_array(self) -> [f64; LEG_JOINT_DIM] {
         [self.hx, self.hy, self.kn]
     }
 

@@ -44,8 +44,7 @@ pub struct Mended {
 /// # Errors
 /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
 pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
-    let elapsed = Interval::all(segment, &agreeing_coordinates(segment));
-    let elapsed_ratio = ratio(&elapsed, 0.0).unwrap_or(1.0);
+    let (elapsed, elapsed_ratio) = elapsed(segment);
     let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT && elapsed_ratio > 0.0;
     let chosen = match rebuilt {
         true => by_motion(segment, &elapsed),
@@ -72,6 +71,13 @@ pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
         },
         lost,
     })
+}
+
+/// Intervals by the motion of coordinates that agree, and the time that passed by them over that by the stamps.
+pub(crate) fn elapsed(segment: &Segment) -> (Vec<Interval>, f64) {
+    let elapsed = Interval::all(segment, &agreeing_coordinates(segment));
+    let ratio = ratio(&elapsed, 0.0).unwrap_or(1.0);
+    (elapsed, ratio)
 }
 
 /// The coordinates that agree on how fast time passes; none if a third disagrees, or the joints with the body.
@@ -157,7 +163,7 @@ fn replace_angular_rates(segment: &mut Segment) -> bool {
     disagree
 }
 
-struct Interval {
+pub(crate) struct Interval {
     stamped_s: f64,
     speed: f64, // weighted square of the velocity
     moved: f64, // weighted product of velocity and displacement

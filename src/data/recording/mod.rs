@@ -54,7 +54,6 @@ pub use files::{
 pub use foreign::{
     guess::{Guess, guess},
     map::ColumnMap,
-    mcap_write::JOINT_TOPIC,
 };
 pub use phases::{CHATTER_SAMPLES, PhasePattern, PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Column, Reader, Reading, ReadingNotes, read, read_from_bytes};

@@ -341,7 +341,7 @@ impl SymbolNames {
     ///
     /// # Errors
     /// [`NameError`] for an entry of another form or variable, or one that was given before.
-    pub fn parse<S: AsRef<str>>(entries: &[S]) -> Result<Self, NameError> {
+    pub(crate) fn parse<S: AsRef<str>>(entries: &[S]) -> Result<Self, NameError> {
         let mut names = BTreeMap::new();
         for entry in entries.iter().map(AsRef::as_ref) {
             let refused = || NameError(entry.to_owned());

@@ -115,7 +115,7 @@ fn readings(model: &ReducedModel, given: Option<LibraryOrder>) -> Result<Vec<Rea
     let is_list = matches!(library.choice(), LibraryChoice::Terms(_));
     let as_listed = Reading {
         order: None,
-        rows: (0..library.len()).collect(),
+        rows: (0..library.terms().len()).collect(),
     };
     let mut readings: Vec<Reading> = Vec::from_iter(is_list.then_some(as_listed));
     if let Some((standard, places)) = library.as_standard() {

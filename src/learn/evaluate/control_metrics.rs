@@ -328,7 +328,7 @@ impl Deviation {
         let attitude = rotation([x[15], x[16], x[17]]);
         let joints = segment.joints(sample);
         for leg in Leg::ALL {
-            let jacobian = robot.foot_jacobian(leg, &leg.of_joints(&joints));
+            let jacobian = robot.geometry(leg).foot_jacobian(&leg.of_joints(&joints));
             let inverse = jacobian.try_inverse();
             if let Some(inverse) = inverse.filter(|_| segment.feet[sample][leg.index()]) {
                 let turn = -inverse * attitude.transpose();

@@ -225,7 +225,7 @@ fn mass_kg(
     let joints = std::array::from_fn(|joint| x[joint]);
     let mut newton = [0.0; JOINT_DIM];
     for leg in Leg::ALL {
-        let jacobian = robot.foot_jacobian(leg, &leg.of_joints(&joints));
+        let jacobian = robot.geometry(leg).foot_jacobian(&leg.of_joints(&joints));
         let torque = -jacobian.transpose() * SVector::<f64, 3>::new(0.0, 0.0, 0.25);
         newton[3 * leg.index()..][..3].copy_from_slice(torque.as_slice());
     }

@@ -29,8 +29,8 @@ pub use coordinates::{
     is_plausible,
 };
 pub use invariance::Invariance;
-pub(crate) use prediction::state_matrix;
-pub use prediction::{LinearisedPhase, PredictionError, eigenvalues, linearise_phases};
+pub use prediction::{LinearisedPhase, PredictionError, eigenvalues};
+pub(crate) use prediction::{linearise_phases, state_matrix};
 pub use round_trip::RoundTrip;
 pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
 

@@ -172,7 +172,7 @@ impl LinearisedPhase {
 }
 
 /// Each phase, linearised at the mean of its samples; none without samples, or if its Jacobian is not finite.
-pub fn linearise_phases(
+pub(crate) fn linearise_phases(
     model: &CompiledModel,
     segments: &[&LatentSegment],
 ) -> Vec<Option<LinearisedPhase>> {

@@ -187,7 +187,7 @@ impl<'m> Samples<'m> {
     /// [`RoundTrip::error`] where `y_k = factor_k (x_order(k) - mean_order(k))`.
     fn error(&self, (order, scaling): &Slip) -> Result<f64, ModelError> {
         let same = std::array::from_fn(|k| k);
-        let order = order.as_ref().map_or(same, |order| *order.places());
+        let order = order.as_ref().map_or(same, |order| order.places);
         let none = DVector::zeros(STATE_DIM);
         let factors = match *scaling {
             None | Some(ScalingSlip::Centred) => self.factors.clone(),

@@ -121,7 +121,7 @@ fn foot_place(seed: &Seed<'_>, leg: Leg, z: &DVector<f64>) -> FootPlace {
     let foot = robot.foot_from_body(leg, &q);
     let along = |v: &Vector3<f64>| cos * v.x + sin * v.z;
     let above = |v: &Vector3<f64>| -sin * v.x + cos * v.z;
-    let jacobian = robot.foot_jacobian(leg, &q);
+    let jacobian = robot.geometry(leg).foot_jacobian(&q);
     let mut by_x = DMatrix::zeros(2, STATE_DIM);
     for joint in 0..3 {
         let column = Vector3::from(jacobian.column(joint));

@@ -116,7 +116,7 @@ fn seed_part<'a>(
     model: &ReducedModel,
     prior: &'a JumpPrior,
     part: usize,
-    features: &crate::model::GoalFeatures,
+    features: &[f64; crate::model::FEATURE_DIM],
     dynamics: &mut CompiledModel,
 ) -> SeedPart<'a> {
     let (part, landmark) = (&prior.parts[part], &prior.landmarks.parts[part]);

@@ -59,10 +59,10 @@ impl Features {
         let mut pool = library.pool().clone();
         let (mut occurring, mut affine) = (Vec::new(), Vec::new());
         for term in library.terms() {
-            let own = pool.symbols_of(term.expr());
+            let own = pool.symbols_of(term.expr);
             occurring.push(variables.iter().map(|v| own.contains(v)).collect());
             affine.push(own.into_iter().all(|variable| {
-                let slope = pool.derivative(term.expr(), variable);
+                let slope = pool.derivative(term.expr, variable);
                 pool.is_constant(slope)
             }));
         }

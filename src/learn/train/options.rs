@@ -12,9 +12,7 @@ use super::metrics::Trained;
 use super::progress::Monitor;
 use super::task::{Origin, Recordings};
 use crate::limits::table;
-use crate::model::{
-    Activation, Library, LibraryChoice, MAX_LAYER_WIDTH, MAX_LAYERS, StandardLibrary, check_name,
-};
+use crate::model::{Activation, Library, LibraryChoice, MAX_LAYERS, StandardLibrary, check_name};
 use crate::recording::CHATTER_SAMPLES;
 use crate::recording::PhaseRule;
 use crate::recording::preprocess::BATCH_ROWS;
@@ -309,7 +307,10 @@ impl MapOptions {
         for (option, widths, least) in each {
             let expected = if widths.len() >= MAX_LAYERS {
                 "at most 15 hidden layers"
-            } else if widths.iter().any(|width| *width > MAX_LAYER_WIDTH) {
+            } else if widths
+                .iter()
+                .any(|width| *width as f64 > table::LAYER_WIDTH.most)
+            {
                 "layers of at most 1024 units"
             } else if widths.iter().any(|width| *width < least) {
                 "layers at least as wide as the latent space"

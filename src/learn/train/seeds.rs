@@ -179,7 +179,7 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
     let mut pool = library.pool().clone();
     let terms = library.terms().iter();
     let indexed = terms.clone().enumerate();
-    let known: BTreeMap<_, _> = indexed.map(|(index, term)| (term.expr(), index)).collect();
+    let known: BTreeMap<_, _> = indexed.map(|(index, term)| (term.expr, index)).collect();
     let replacements: Vec<_> = LatentVariable::all(library.latent_dim())
         .filter_map(|variable| {
             let renamed = match variable {
@@ -191,7 +191,7 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
             Some((library.symbol(variable)?, renamed))
         })
         .collect();
-    let renamed = terms.map(|term| pool.substitute(term.expr(), &replacements));
+    let renamed = terms.map(|term| pool.substitute_all(&[term.expr], &replacements)[0]);
     renamed.map(|term| known.get(&term).copied()).collect()
 }
 

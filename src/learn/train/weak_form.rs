@@ -33,7 +33,7 @@ pub(super) fn check_terms(
         };
         return Err(TrainError::TermValue {
             path: jump.path.clone(),
-            term: library.terms()[term].text().to_owned(),
+            term: library.terms()[term].text.clone(),
             phase: pattern.name.clone(),
             sample,
             time_s: jump.time_s[sample],

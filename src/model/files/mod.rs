@@ -19,7 +19,7 @@ pub use folder::{
     Emitted, FolderError, check_folder, earlier_files, hex, write_files, write_files_since,
 };
 pub use located::{Fault, Located, Place};
-pub use text::{is_invisible, shell_path, shell_paths, shell_word};
+pub use text::{is_invisible, shell_path, shell_word};
 pub use whole::{EmittedFile, Overwrite, write_whole};
 
 use std::fs::{File, OpenOptions};

@@ -30,11 +30,6 @@ pub fn shell_path(path: &Path) -> String {
     }
 }
 
-pub fn shell_paths(paths: &[PathBuf]) -> String {
-    let words: Vec<String> = paths.iter().map(|path| shell_path(path)).collect();
-    words.join(" ")
-}
-
 pub fn shell_word(text: &str) -> String {
     let plain = |letter: char| letter.is_alphanumeric() || "-_./,=:+%".contains(letter);
     match !text.is_empty() && text.chars().all(plain) {

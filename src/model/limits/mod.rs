@@ -32,15 +32,15 @@ pub struct OutOfRange {
 }
 
 impl Range {
-    pub const fn whole(name: &'static str, least: u32, most: u32) -> Self {
+    pub(crate) const fn whole(name: &'static str, least: u32, most: u32) -> Self {
         Self::new(name, Kind::Whole, least as f64, most as f64)
     }
 
-    pub const fn real(name: &'static str, least: f64, most: f64) -> Self {
+    pub(crate) const fn real(name: &'static str, least: f64, most: f64) -> Self {
         Self::new(name, Kind::Real, least, most)
     }
 
-    pub const fn above(name: &'static str, least: f64, most: f64) -> Self {
+    pub(crate) const fn above(name: &'static str, least: f64, most: f64) -> Self {
         Self::new(name, Kind::Above, least, most)
     }
 
@@ -53,12 +53,8 @@ impl Range {
         }
     }
 
-    pub fn is_whole(&self) -> bool {
-        self.kind == Kind::Whole
-    }
-
     /// Whether a number is in the range; NaN never is.
-    pub fn contains(&self, value: f64) -> bool {
+    pub(crate) fn contains(&self, value: f64) -> bool {
         let is_kind = match self.kind {
             Kind::Whole => value.fract() == 0.0,
             Kind::Real => true,

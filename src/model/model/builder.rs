@@ -142,7 +142,7 @@ impl ModelBuilder {
     }
 
     fn check_phases(&self) -> Result<()> {
-        let expected = (self.library.len(), self.library.latent_dim());
+        let expected = (self.library.terms().len(), self.library.latent_dim());
         for (index, phase) in self.phases.iter().enumerate() {
             check_tensor(&format!("phases[{index}].xi"), &phase.xi, expected)?;
             if let FeetRule::Patterns(patterns) = &phase.feet {

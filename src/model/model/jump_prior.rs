@@ -9,7 +9,7 @@ pub const GOAL_DIM: usize = 3;
 pub const FEATURE_DIM: usize = 1 + GOAL_DIM;
 const MAX_NODES: usize = 200;
 
-pub type GoalFeatures = [f64; FEATURE_DIM];
+pub(crate) type GoalFeatures = [f64; FEATURE_DIM];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GoalRange {

@@ -69,23 +69,9 @@ impl fmt::Display for LatentVariable {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CandidateTerm {
-    text: String,
-    expr: ExprId,
-}
-
-impl CandidateTerm {
-    /// A term of a pool with its text in the syntax of the model file.
-    pub fn new(text: String, expr: ExprId) -> Self {
-        Self { text, expr }
-    }
-
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-
-    pub fn expr(&self) -> ExprId {
-        self.expr
-    }
+    /// In the syntax of the model file.
+    pub text: String,
+    pub expr: ExprId,
 }
 
 /// The terms of a library as they are given; the model file keeps the form.
@@ -134,7 +120,7 @@ impl Library {
             let expr = parse_term(&mut pool, latent_dim, index, &text)?;
             terms.push(CandidateTerm { text, expr });
         }
-        let exprs: Vec<ExprId> = terms.iter().map(CandidateTerm::expr).collect();
+        let exprs: Vec<ExprId> = terms.iter().map(|term| term.expr).collect();
         let tape = Tape::new(&pool, &exprs, &symbols);
         Ok(Self {
             latent_dim,
@@ -167,14 +153,6 @@ impl Library {
         self.latent_dim
     }
 
-    pub fn len(&self) -> usize {
-        self.terms.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.terms.is_empty()
-    }
-
     pub fn choice(&self) -> LibraryChoice {
         let texts = || self.terms.iter().map(|term| term.text.clone()).collect();
         let standard = self.standard.map(LibraryChoice::Standard);
@@ -184,13 +162,13 @@ impl Library {
     /// The standard library of the same terms, and for each of its terms in romc's order the row of this one.
     pub fn as_standard(&self) -> Option<(StandardLibrary, Vec<usize>)> {
         if let Some(standard) = self.standard {
-            return Some((standard, (0..self.len()).collect()));
+            return Some((standard, (0..self.terms.len()).collect()));
         }
         let mut pool = self.pool.clone();
-        let rows = self.terms.iter().map(CandidateTerm::expr).zip(0..);
+        let rows = self.terms.iter().map(|term| term.expr).zip(0..);
         let rows: HashMap<ExprId, usize> = rows.collect();
         StandardLibrary::small().find_map(|standard| {
-            if standard.term_count(self.latent_dim) != Some(rows.len().max(self.len())) {
+            if standard.term_count(self.latent_dim) != Some(rows.len().max(self.terms.len())) {
                 return None;
             }
             let texts = standard.texts(self.latent_dim).ok()?;
@@ -234,8 +212,8 @@ impl Library {
         let expected = (3 * self.latent_dim, variables.ncols());
         check_shape("z, dz, u_lat", variables.shape(), expected)?;
         let mut values = vec![0.0; self.tape.steps.len()];
-        let mut theta = vec![0.0; self.len()];
-        let mut all = DMatrix::zeros(variables.ncols(), self.len());
+        let mut theta = vec![0.0; self.terms.len()];
+        let mut all = DMatrix::zeros(variables.ncols(), self.terms.len());
         for (point, mut row) in variables.column_iter().zip(all.row_iter_mut()) {
             self.tape.run(point.as_slice(), &mut values, &mut theta);
             row.copy_from_slice(&theta);
@@ -248,8 +226,8 @@ impl PartialEq for Library {
     fn eq(&self, other: &Self) -> bool {
         self.latent_dim == other.latent_dim
             && self.standard == other.standard
-            && (self.terms.iter().map(CandidateTerm::text))
-                .eq(other.terms.iter().map(CandidateTerm::text))
+            && (self.terms.iter().map(|term| &term.text))
+                .eq(other.terms.iter().map(|term| &term.text))
     }
 }
 

@@ -48,9 +48,7 @@ pub use builder::ModelBuilder;
 pub use coordinates::{CoordinateNames, ScaleFactors, Scaling};
 pub use error::ModelError;
 pub use identifier::{Identifier, IdentifierError, check_name};
-pub use jump_prior::{
-    FEATURE_DIM, GOAL_DIM, GoalFeatures, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks,
-};
+pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks};
 pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN, Step, Tape,
 };
@@ -58,7 +56,7 @@ pub use maps::{Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, TAIL, Tangent
 pub use order::CoordinateOrder;
 pub use rom::{Phase, ReducedModel};
 pub use standard_library::{LibraryOrder, StandardLibrary};
-pub use state_map::{AffineMap, Layer, MAX_LAYER_WIDTH, MAX_LAYERS, StateMap};
+pub use state_map::{AffineMap, Layer, MAX_LAYERS, StateMap};
 pub use statistics::{InputGivenState, InputStatistics};
 
 use std::collections::HashMap;

@@ -17,15 +17,10 @@ const KINDS: [&str; LEG_JOINT_DIM] = ["hx", "hy", "kn"];
 pub struct CoordinateOrder {
     text: String,
     /// For each place the coordinate that is there, as an index into romc's order.
-    places: [usize; STATE_DIM],
+    pub places: [usize; STATE_DIM],
 }
 
 impl CoordinateOrder {
-    /// For each place the coordinate that is there, as an index into romc's order.
-    pub fn places(&self) -> &[usize; STATE_DIM] {
-        &self.places
-    }
-
     pub fn sorted<C: Dim>(&self, rows: &OMatrix<f64, Dyn, C>) -> OMatrix<f64, Dyn, C>
     where
         DefaultAllocator: Allocator<Dyn, C>,

@@ -107,10 +107,6 @@ impl ReducedModel {
         selected(&self.parts.phases, feet)
     }
 
-    pub fn phase_named(&self, name: &str) -> Option<usize> {
-        self.phases().iter().position(|phase| phase.name == name)
-    }
-
     pub fn state(&self) -> Option<&CoordinateNames> {
         self.parts.state.as_ref()
     }

@@ -6,7 +6,7 @@
 use super::*;
 
 pub const MAX_LAYERS: usize = 16;
-pub const MAX_LAYER_WIDTH: usize = 1024;
+pub(crate) const MAX_LAYER_WIDTH: usize = 1024;
 
 /// `x -> W x + b` in scaled units; velocities and accelerations do not take the bias.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +68,7 @@ pub struct Layer {
 #[serde(try_from = "MapKeys", into = "MapKeys")]
 pub struct StateMap {
     /// Those of a map from a file are checked with its model ([`StateMap::check_chain`]).
-    layers: Vec<Layer>,
+    pub layers: Vec<Layer>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -186,10 +186,6 @@ impl StateMap {
             columns = rows;
         }
         Ok(())
-    }
-
-    pub fn layers(&self) -> &[Layer] {
-        &self.layers
     }
 
     pub fn as_affine(&self) -> Option<&AffineMap> {

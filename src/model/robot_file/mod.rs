@@ -14,7 +14,7 @@
 //! let lighter = robot_file::from_text("lighter.toml", &text, &Default::default())?.robot;
 //! assert_eq!((lighter.name, lighter.mass_kg()), ("lighter", 9.5));
 //! let q = [0.1, 0.7, -1.4];
-//! assert_eq!(lighter.foot_position(Leg::RearLeft, &q), own.foot_position(Leg::RearLeft, &q));
+//! assert_eq!(lighter.geometry(Leg::RearLeft).foot_position(&q), own.geometry(Leg::RearLeft).foot_position(&q));
 //! # Ok::<(), romc::robot_file::RobotFileError>(())
 //! ```
 

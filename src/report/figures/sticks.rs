@@ -39,7 +39,7 @@ impl Sticks {
         let leg = |leg: Leg| {
             let (hip, q) = (robot.hip_position(leg), leg.of_joints(&joints));
             let knee = robot.geometry(leg).knee_position(&q);
-            let foot = robot.foot_position(leg, &q);
+            let foot = robot.geometry(leg).foot_position(&q);
             vec![seen(hip), seen(hip + knee), seen(hip + foot)]
         };
         let legs = Leg::ALL.into_iter().map(leg);

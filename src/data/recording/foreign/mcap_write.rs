@@ -36,7 +36,7 @@ fn definition(own: &str, parts: &[&str]) -> String {
 }
 
 /// Topic of joint angles, velocities and torques.
-pub const JOINT_TOPIC: &str = "/joint_states";
+pub(crate) const JOINT_TOPIC: &str = "/joint_states";
 const BODY_TOPIC: &str = "/odom"; // pose of the trunk in the world, its velocities in its own axes
 const FEET_TOPIC: &str = "/foot_contacts"; // contact, 1 or 0 for each foot
 const INPUT_TOPIC: &str = "/inputs"; // inputs of a model

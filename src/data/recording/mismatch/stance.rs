@@ -331,7 +331,11 @@ pub(crate) fn hip_torque(robot: &Robot, leg: Leg, q: &[f64; 3], force: &Vector3<
     let axis = Unit::new_normalize(links.abduction);
     let normal = Rotation3::from_axis_angle(&axis, q[0]) * links.flexion;
     let in_plane = force - normal * normal.dot(force);
-    -robot.foot_jacobian(leg, q).column(0).dot(&in_plane)
+    -robot
+        .geometry(leg)
+        .foot_jacobian(q)
+        .column(0)
+        .dot(&in_plane)
 }
 
 /// Vertical acceleration of each flight by a parabola through its heights.
