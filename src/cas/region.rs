@@ -143,7 +143,7 @@ impl ExprPool {
         self.substitute_all(&[expr], replacements)[0]
     }
 
-    /// As [`substitute`](ExprPool::substitute) for several expressions with common parts.
+    /// As `substitute` for several expressions with common parts.
     pub fn substitute_all(
         &mut self,
         exprs: &[ExprId],

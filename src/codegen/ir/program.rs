@@ -104,7 +104,7 @@ pub enum Statement {
         /// Positions of at least one table, all of one shape, each with a weight per column or added as it is.
         groups: Vec<(usize, Option<Vec<ValueId>>)>,
     },
-    /// A sum per lane, `y_l = v_0l + sum_t v_tl w_t`, added [alternately](super::alternating). Terms whose numbers are
+    /// A sum per lane, `y_l = v_0l + sum_t v_tl w_t`, added alternately. Terms whose numbers are
     /// the constant zero may be left out.
     Lanes {
         /// What the sums begin with.

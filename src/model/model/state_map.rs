@@ -67,7 +67,7 @@ pub struct Layer {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "MapKeys", into = "MapKeys")]
 pub struct StateMap {
-    /// Those of a map from a file are checked with its model ([`StateMap::check_chain`]).
+    /// Those of a map from a file are checked with its model.
     pub layers: Vec<Layer>,
 }
 
