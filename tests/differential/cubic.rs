@@ -24,7 +24,7 @@ pub fn cubic() -> ReducedModel {
         }
     }
     let xi = DMatrix::from_fn(terms.len(), 5, |term, row| match (7 * term + 3 * row) % 5 {
-        0 | 2 => 0.25 * (term as f64 - 61.5) - row as f64,
+        0 | 2 => 0.02 * (term as f64 - 61.5) - 0.1 * row as f64,
         _ => 0.0,
     });
     let library = Library::from_terms(5, &terms).expect("terms parse");
