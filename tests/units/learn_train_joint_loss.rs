@@ -74,7 +74,7 @@ fn gradient_agrees_with_finite_differences_for_all_maps() {
             _ => (&[7, 5, 4, 3], &[3, 4, 7]),
         };
         let (features, parameters) = setup(widths, phi);
-        let blocks = std::array::from_fn(|_| random.matrix(30, 7, 0.8));
+        let blocks = std::array::from_fn(|_| random.matrix(10, 7, 0.8));
         let batch = Batch::new(1, blocks, 0.002, &frame);
         let weights = DVector::from_fn(7, |i, _| 1.0 + i as f64);
         let unroll = Unroll {
