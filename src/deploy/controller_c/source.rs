@@ -226,7 +226,7 @@ const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
 
 /// Whether a word is the type of a part of the controller's own state.
 fn is_state(word: &str) -> bool {
-    STATE.contains(&format!("}} {word};"))
+    word.starts_with("online_") && STATE.contains(&format!("}} {word};"))
 }
 
 /// A stage of the horizon's solver and the controller's own state, for the header of a controller.
