@@ -1,4 +1,4 @@
-//! `romc check`: the command; what it compares is in `check/units.rs`.
+//! Runs `romc check` on files. `check/units.rs` lists the tests of how it compares, which are mounted in the library.
 
 #[path = "check/command.rs"]
 mod command;

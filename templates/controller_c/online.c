@@ -1041,7 +1041,7 @@ static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, 
     return online_smaller(online_greater(position, lower), upper);
 }
 
-/* Keeps a posture, within the limits, for the command and for a hold. */
+/* Stores joint positions (rad), clamped to the joint limits, for the command and for a hold. */
 static inline MAYBE_UNUSED void online_memory_keep_posture(online_memory *restrict self, const real *joints,
         const real *lower, const real *upper)
 {
@@ -1086,8 +1086,8 @@ static inline MAYBE_UNUSED double online_plan_time_passed(online_plan_time *self
     return self->is_made ? passed : -1.0;
 }
 
-/* Whether a measured state is more than most of its deviations from what the states of a plan predict for its
- * time; not beyond their end. */
+/* Whether a measured state differs from the planned one, interpolated to its time, by more than most standard
+ * deviations in any coordinate. False outside the plan. */
 static inline MAYBE_UNUSED bool online_plan_time_is_jump(online_plan_time *self, double time_s, const real *states,
         int horizon, const real *measured, const real *deviation, int d, real most)
 {
@@ -1136,9 +1136,9 @@ static inline MAYBE_UNUSED online_share online_share_unknown(void)
     return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
 }
 
-/* Takes what the velocities of a measurement say after a part of the plan's first stage, or a little later,
- * with the states at the stage's beginning and end, its input, and the latent input of the drives at the
- * command and now. */
+/* Updates the estimate from a measurement at passed stages into the plan, up to 1.1. states are those at the
+ * beginning and end of the first stage, input is its input; at_command and drives are the latent inputs that
+ * the drives had at the command and have now. */
 static inline MAYBE_UNUSED void online_share_update(online_share *restrict self, double passed, real step_s,
         real time_constant_s, const real *by_input, const real *input, const real *states, const real *measured,
         const real *deviation, const real *at_command, const real *drives, int d)

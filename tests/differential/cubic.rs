@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// Five equations with two fifths of all monomials up to degree 3 in seven variables, a product of four, sines alone
-/// and in products, an input, and an equation less than pairs of equations.
+/// Five equations, an odd number, with two fifths of all monomials up to degree 3 in seven variables, a product of four,
+/// sines alone and in products, and an input.
 pub fn cubic() -> ReducedModel {
     let variables = ["z1", "z3", "z4", "dz1", "dz2", "dz5", "u1"];
     let others = [
@@ -13,7 +13,7 @@ pub fn cubic() -> ReducedModel {
         "z2",
         "z1*z3*dz2*dz2",
         "z1*cos(z4)",
-        "abs(z5)*z1",
+        "sin(z5)*z1",
     ];
     let mut terms = others.map(str::to_owned).to_vec();
     for (i, a) in variables.iter().enumerate() {

@@ -187,7 +187,7 @@ fn activations_of_trainers_are_taken() {
             artifact::read_from_bytes("m", text.as_bytes()).unwrap(),
             found
         );
-        let layers = &found.encoder_map().unwrap().layers;
+        let layers = found.encoder_map().unwrap().layers();
         assert_eq!(layers[0].activation, activation);
     }
 }

@@ -262,7 +262,7 @@ fn coordinates_that_rest_without_torque_do_not_enter_the_encoder() {
     options.encoder.coordinates = Coordinates::Free;
     let linear = train_with(&training, &[], &options).expect("trains");
     for Trained { model, report } in [networks, linear] {
-        let first = model.encoder_map().expect("trained").layers[0]
+        let first = model.encoder_map().expect("trained").layers()[0]
             .map
             .weights();
         for (name, column) in Robot::state_names().iter().zip(first.column_iter()) {

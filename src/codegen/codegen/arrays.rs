@@ -127,27 +127,25 @@ impl Translator<'_> {
         terms: &[(Vector, ValueId)],
     ) {
         let dialect = self.printer.dialect;
-        let zero = dialect.constant(0.0);
         let weights = terms.iter().map(|&(_, weight)| self.named(weight));
         let weights: Vec<Text> = weights.collect();
-        let sum = |numbers: Vec<Text>| {
-            let mut numbers = numbers.into_iter();
-            let first = start.and_then(|_| numbers.next());
-            let products = numbers.zip(&weights).map(|(number, weight)| {
-                let is_zero = number.text == zero.text;
-                (!is_zero).then(|| dialect.binary(Binary::Mul, &number, weight, true))
-            });
+        let sum = |start: Option<Text>, numbers: Vec<Option<Text>>| {
+            let product = |(number, weight): (&Option<Text>, &Text)| {
+                Some(dialect.binary(Binary::Mul, number.as_ref()?, weight, true))
+            };
             let add = |a: Text, b: Text| dialect.binary(Binary::Add, &a, &b, true);
-            alternating(first, products, add).unwrap_or_else(|| zero.clone())
+            let sum = alternating(start, numbers.iter().zip(&weights).map(product), add);
+            sum.unwrap_or_else(|| dialect.constant(0.0))
         };
-        let vectors = || start.iter().chain(terms.iter().map(|(vector, _)| vector));
         if dialect.spelling.loops_over_lanes {
             let i = self.locals.mint("i");
-            let number = |vector: &Vector| {
+            let mut number = |vector: &Vector| {
                 let span = self.span(vector);
                 dialect.element(&span.array, &Index::variable(&i).shifted(span.offset))
             };
-            let sum = sum(vectors().map(number).collect());
+            let start = start.as_ref().map(&mut number);
+            let numbers = terms.iter().map(|(vector, _)| Some(number(vector)));
+            let sum = sum(start, numbers.collect());
             let home = self.declared(LANES, "y");
             let target = dialect.element(&home.array, &Index::variable(&i));
             let printer = &mut self.printer;
@@ -156,8 +154,17 @@ impl Translator<'_> {
             return;
         }
         for lane in 0..LANES {
-            let numbers = vectors().map(|vector| self.read(vector[lane]));
-            let sum = sum(numbers.collect());
+            let read = |vector: &Vector| self.read(vector[lane]);
+            let is_zero = |vector: &Vector| self.zeros.contains(&vector[lane].index());
+            let numbers = terms.iter().map(|(v, _)| (!is_zero(v)).then(|| read(v)));
+            let sum = sum(start.as_ref().map(read), numbers.collect());
+            if start
+                .iter()
+                .chain(terms.iter().map(|(v, _)| v))
+                .all(is_zero)
+            {
+                self.zeros.insert(first + lane);
+            }
             self.define(first + lane, sum);
         }
     }

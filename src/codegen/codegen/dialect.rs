@@ -24,7 +24,7 @@ pub(crate) struct Spelling {
     /// Head of a loop of `$name` from 0 to below `$n`, or to `$last`; and what closes its body.
     pub loop_head: &'static str,
     pub loop_end: Option<&'static str>,
-    /// Whether sums side by side become a loop: not where compilers unroll it before they look for vectors.
+    /// Whether a `Lanes` statement is a loop. Rust's compiler unrolls it before it looks for vectors.
     pub loops_over_lanes: bool,
     /// What ends a line that goes on in the next.
     pub continuation: &'static str,

@@ -22,7 +22,7 @@ impl fmt::Display for Ident {
 }
 
 pub(crate) struct Namer {
-    used: HashMap<String, usize>, // with the last number behind the name, or 1
+    used: HashMap<String, usize>, // names, with the last number appended to each, 1 before any
 }
 
 impl Namer {

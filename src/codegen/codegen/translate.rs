@@ -1,6 +1,6 @@
 //! Programs to the text of a function's body: names and nested expressions; the tree of operations stays.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::dialect::{Dialect, Function, Index, Parameter, Role, Span};
 use super::ident::{Ident, Namer, Tables};
@@ -27,6 +27,7 @@ pub(super) struct Translator<'a> {
     pub arrays: HashMap<Ident, Span>,
     pub copies: HashMap<Vec<ValueId>, Span>,
     pub lane: Option<Ident>,
+    pub zeros: HashSet<usize>, // values that are the constant 0, or sums of nothing else
 }
 
 pub(crate) fn function(
@@ -125,6 +126,8 @@ impl<'a> Translator<'a> {
         for value in operands.chain(results) {
             n_uses[value.index()] += 1;
         }
+        let is_zero = |s: &Statement| matches!(s, Statement::Constant(c) if c.to_bits() == 0);
+        let zero = program.statements.iter().position(is_zero);
         let arrays = inputs.iter().chain(&outputs);
         let whole = |p: &Parameter| (p.name.clone(), Span::whole(&p.name, p.len, true));
         Self {
@@ -140,6 +143,7 @@ impl<'a> Translator<'a> {
             printer,
             copies: HashMap::new(),
             lane: None,
+            zeros: HashSet::from_iter(zero.map(|zero| program.values_of(zero).start)),
         }
     }
 

@@ -65,8 +65,8 @@ pub enum Binary {
     Pow,
 }
 
-/// Adds the first, third and so on of the terms to `start`, the others to one another, and both sums; what is missing is
-/// left out.
+/// Adds the first, third and so on of the terms to `start`, the second, fourth and so on to one another, and both sums.
+/// `None` is skipped but keeps its turn.
 pub(crate) fn alternating<S>(
     start: Option<S>,
     terms: impl Iterator<Item = Option<S>>,

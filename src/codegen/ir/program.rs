@@ -23,7 +23,7 @@ impl ValueId {
     }
 }
 
-/// Sums of one statement side by side.
+/// How many sums one `Lanes` statement computes.
 pub(crate) const LANES: usize = 2;
 
 /// A number per lane.
@@ -104,8 +104,8 @@ pub enum Statement {
         /// Positions of at least one table, all of one shape, each with a weight per column or added as it is.
         groups: Vec<(usize, Option<Vec<ValueId>>)>,
     },
-    /// A sum per lane, `y_l = v_0l + sum_t v_tl w_t`, added alternately. Terms whose numbers are
-    /// the constant zero may be left out.
+    /// A sum per lane, `y_l = v_0l + sum_t v_tl w_t`, the odd terms to the start and the even ones
+    /// apart. Code may leave out products with the constant zero, which changes sums of infinite weights alone.
     Lanes {
         /// What the sums begin with.
         start: Option<Vector>,

@@ -190,7 +190,8 @@ fn coefficients(
 /// Form of the code that adds coefficients times candidate terms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
-    /// The form that is expected to run faster, see [`Form::Tables`].
+    /// The form that is expected to run fastest; for Jacobians of large cubic polynomials sums of vectors, one lane for
+    /// each of two equations.
     #[default]
     Automatic,
     /// One operation after the other: best for small and for sparse models.

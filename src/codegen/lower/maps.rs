@@ -192,7 +192,7 @@ impl<'b> Network<'b> {
     fn forward(&self, input: &[Number<'b>]) -> (Layer<'b>, Vec<Layer<'b>>) {
         let mut y = input.to_vec();
         let mut slopes = Vec::new();
-        for (index, layer) in self.map.layers.iter().enumerate() {
+        for (index, layer) in self.map.layers().iter().enumerate() {
             let a = self.product(index, &y, true).into_iter();
             let (values, of_layer) = a.map(|a| activation(layer.activation, a)).unzip();
             y = values;
@@ -220,14 +220,14 @@ impl<'b> Network<'b> {
 
     fn jacobian_row(&self, row: usize, slopes: &[Layer<'b>]) -> Layer<'b> {
         let last = slopes.len() - 1;
-        let weights = self.map.layers[last].map.weights().row(row);
+        let weights = self.map.layers()[last].map.weights().row(row);
         let g = weights.iter().map(|&weight| weight * slopes[last][row]);
         self.backward(g.collect(), &slopes[..last])
     }
 
     /// `W y` of a layer, of the first `W (factors * y)`; plus its bias if asked.
     fn product(&self, index: usize, y: &[Number<'b>], is_biased: bool) -> Layer<'b> {
-        let map = &self.map.layers[index].map;
+        let map = &self.map.layers()[index].map;
         let (rows, cols) = map.weights().shape();
         let mut entries = match is_biased {
             true => map.bias().as_slice().to_vec(),
@@ -242,7 +242,7 @@ impl<'b> Network<'b> {
 
     /// `W^T g` of a layer.
     fn transposed_product(&self, index: usize, g: &[Number<'b>]) -> Layer<'b> {
-        let weights = self.map.layers[index].map.weights();
+        let weights = self.map.layers()[index].map.weights();
         let (rows, cols) = weights.shape();
         let mut entries = vec![0.0; cols];
         for row in weights.row_iter() {

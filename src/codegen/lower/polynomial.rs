@@ -9,24 +9,25 @@ use std::collections::{BTreeMap, HashMap};
 use super::combination::Combination;
 use super::expression::ExpressionLowering;
 use crate::ir::{LANES, ProgramBuilder, ValueId, Vector};
-use crate::symbolic::{ExprId, ExprPool, SymbolId};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
 
 /// Fewest coefficients of products of three factors for which vectors are worth their zeros.
-const FEWEST_COEFFICIENTS: usize = 120;
+const FEWEST_CUBIC: usize = 120;
 
 /// A coefficient per lane, by the positions of factors, each as often as its exponent says.
 type Paths = BTreeMap<Vec<usize>, [f64; LANES]>;
 
 pub(super) struct Polynomials {
-    /// The columns, then what is no variable, sines for instance.
+    /// The variables of the columns, then all other factors, sines and cosines.
     factors: Vec<ExprId>,
-    /// Derivatives of the latter: factor, column, slope.
+    /// Derivatives of those others that are not zero: factor, column, slope.
     slopes: Vec<(usize, usize, ExprId)>,
     blocks: Vec<Paths>,
 }
 
 impl Polynomials {
-    /// Nothing if another form is expected to run faster, or if infinite slopes could cancel.
+    /// Nothing if straight-line code is expected to run faster, or if a factor may be infinite: times the zero of the
+    /// equation beside it, it would be NaN there.
     pub(crate) fn new(
         pool: &mut ExprPool,
         equations: &[Combination],
@@ -49,15 +50,20 @@ impl Polynomials {
             }
             blocks.push(rows);
         }
-        if n_cubic < FEWEST_COEFFICIENTS {
+        let may_be_infinite = pool.reachable(&factors).into_iter().any(|part| {
+            let finite = [Function::Sin, Function::Cos];
+            match pool.node(part) {
+                Node::Power(_, exponent) => pool.as_integer(*exponent).is_none_or(|n| n < 0),
+                Node::Apply(function, _) => !finite.contains(function),
+                _ => false,
+            }
+        });
+        if n_cubic < FEWEST_CUBIC || may_be_infinite {
             return None;
         }
         let mut slopes = Vec::new();
         for (position, &factor) in factors.iter().enumerate().skip(columns.len()) {
             for (column, &by) in columns.iter().enumerate() {
-                if pool.may_be_steep(factor, by) {
-                    return None;
-                }
                 slopes.push((position, column, pool.slope(factor, by)));
             }
         }

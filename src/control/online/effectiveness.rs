@@ -52,9 +52,9 @@ impl Share {
         }
     }
 
-    /// Takes what the velocities of a measurement say after a part of the plan's first stage, or a little later,
-    /// with the `states` at the stage's beginning and end, its `input`, and the latent input of the drives at the
-    /// command and now.
+    /// Updates the estimate from a measurement at `passed` stages into the plan, up to 1.1. `states` are those at the
+    /// beginning and end of the first stage, `input` is its input; `at_command` and `drives` are the latent inputs that
+    /// the drives had at the command and have now.
     fn update(
         &mut self,
         passed: f64,

@@ -50,8 +50,8 @@ impl PlanTime {
         self.start_s + (stage as f64 + POSTURE_SHARE) * self.step_s
     }
 
-    /// Whether a measured state is more than `most` of its deviations from what the states of a plan predict for its
-    /// time; not beyond their end.
+    /// Whether a measured state differs from the planned one, interpolated to its time, by more than `most` standard
+    /// deviations in any coordinate. False outside the plan.
     pub(super) fn is_jump(
         &self,
         time_s: f64,

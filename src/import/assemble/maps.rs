@@ -20,7 +20,7 @@ type Tensors<'a> = (&'a Assigned<'a>, Option<&'a Assigned<'a>>);
 impl<'a> Assembly<'a, '_> {
     pub(super) fn maps(&mut self) -> Read<(Option<StateMap>, Option<StateMap>)> {
         let maps = (self.map(Part::Encoder)?, self.map(Part::Decoder)?);
-        let is_deep = |map: &StateMap| map.layers.len() > 1;
+        let is_deep = |map: &StateMap| map.layers().len() > 1;
         if let Some(activation) = self.options.activation
             && !maps.0.iter().chain(&maps.1).any(is_deep)
         {
@@ -339,17 +339,17 @@ impl<'a> Assembly<'a, '_> {
         of_decoder: impl Fn(&AffineMap) -> (DMatrix<f64>, DVector<f64>),
     ) -> Read<()> {
         let changed = |map: &StateMap, end: usize, (weights, bias)| {
-            let mut layers = map.layers.to_vec();
+            let mut layers = map.layers().to_vec();
             layers[end].map = AffineMap::new("layer", weights, bias)?;
             StateMap::new("map", layers)
         };
         if let Some(map) = &mut parts.encoder {
-            let first = of_encoder(&map.layers[0].map);
+            let first = of_encoder(&map.layers()[0].map);
             *map = changed(map, 0, first).map_err(|source| self.unusable(source))?;
         }
         if let Some(map) = &mut parts.decoder {
-            let end = map.layers.len() - 1;
-            let last = of_decoder(&map.layers[end].map);
+            let end = map.layers().len() - 1;
+            let last = of_decoder(&map.layers()[end].map);
             *map = changed(map, end, last).map_err(|source| self.unusable(source))?;
         }
         Ok(())

@@ -191,7 +191,8 @@ fn renamed_terms(library: &Library, partner: &[usize]) -> Vec<Option<usize>> {
             Some((library.symbol(variable)?, renamed))
         })
         .collect();
-    let renamed = terms.map(|term| pool.substitute_all(&[term.expr], &replacements)[0]);
+    let exprs: Vec<_> = terms.map(|term| term.expr).collect();
+    let renamed = pool.substitute_all(&exprs, &replacements).into_iter();
     renamed.map(|term| known.get(&term).copied()).collect()
 }
 

@@ -4,9 +4,10 @@
 //! ... D_1 W_1` with `D_k = diag(phi_k'(a_k))`. An affine map is the chain of one linear layer.
 
 use super::*;
+use crate::limits::table;
 
 pub const MAX_LAYERS: usize = 16;
-pub(crate) const MAX_LAYER_WIDTH: usize = 1024;
+const MAX_LAYER_WIDTH: usize = table::LAYER_WIDTH.most as usize;
 
 /// `x -> W x + b` in scaled units; velocities and accelerations do not take the bias.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +69,7 @@ pub struct Layer {
 #[serde(try_from = "MapKeys", into = "MapKeys")]
 pub struct StateMap {
     /// Those of a map from a file are checked with its model.
-    pub layers: Vec<Layer>,
+    layers: Vec<Layer>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -186,6 +187,10 @@ impl StateMap {
             columns = rows;
         }
         Ok(())
+    }
+
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
     }
 
     pub fn as_affine(&self) -> Option<&AffineMap> {

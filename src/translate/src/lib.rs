@@ -1,6 +1,6 @@
-//! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in. In: sources, a
-//! prefix for names, the C that calls functions of them. Out: these, what they call, the types and constants that they
-//! need, with comments. `cargo run -p romc-translate` writes `templates/controller_c/`; `tests/controller_c.rs`
+//! C99 from the small subset of Rust that romc's solver and the steps of its controller are written in. In: Rust sources,
+//! a prefix for names, the C templates that use them. Out: C of the functions that the templates call, and of the
+//! functions, types and constants that these need, with comments. `cargo run -p romc-translate` writes `templates/controller_c/`; `tests/controller_c.rs`
 //! compares it byte for byte. Read `function` first.
 //!
 //! | Rust | C |
@@ -78,7 +78,7 @@ impl std::error::Error for Fault {}
 pub struct Unit<'a> {
     /// Before every name: `solver` for `solver_solve` and `SOLVER_WIDE`.
     pub prefix: &'a str,
-    /// C that includes it: what it calls or names with the prefix is what is needed.
+    /// C templates: every function that they call with the prefix is translated, with all that it needs.
     pub users: &'a [Source],
     /// Structs that nothing changes, which are `const` wherever they are pointed to.
     pub fixed: &'a [&'a str],

@@ -329,7 +329,7 @@ fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String 
 
 /// A nonlinear encoder by the widths of its layers; its weights stay in the model file.
 fn layers(encoder: &StateMap) -> String {
-    let widths = encoder.layers.iter().map(|layer| {
+    let widths = encoder.layers().iter().map(|layer| {
         let width = layer.map.output_dim();
         match layer.activation {
             Activation::Linear => width.to_string(),

@@ -249,7 +249,7 @@ impl Trainer<'_> {
         }
         let basis = self.basis(&learned);
         let (encoder, decoder) = folded(parameters, self.frame, &basis)?;
-        let mut layers = decoder.layers.to_vec();
+        let mut layers = decoder.layers().to_vec();
         let last = layers.pop().expect("invariant: a map has a layer");
         let hidden = match layers.is_empty() {
             true => None,
