@@ -1127,8 +1127,8 @@ static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self,
 {
     /* A time that is a stage's beginning but for rounding belongs to that stage. */
     const double passed = online_plan_time_passed(self, time_s) + 1e-6;
-    const bool is_within = online_plan_time_reaches(self, time_s) && passed < (double)otherwise;
-    return is_within ? (int)passed : otherwise;
+    return !online_plan_time_reaches(self, time_s)
+            || passed >= (double)otherwise ? otherwise : passed > 0.0 ? (int)passed : 0;
 }
 
 static inline MAYBE_UNUSED online_share online_share_unknown(void)

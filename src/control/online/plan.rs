@@ -37,11 +37,13 @@ impl PlanTime {
     pub(super) fn stage_at(&self, time_s: f64, otherwise: usize) -> usize {
         // A time that is a stage's beginning but for rounding belongs to that stage.
         let passed = self.passed(time_s) + 1e-6;
-        let is_within = self.reaches(time_s) && passed < otherwise as f64;
-        if is_within {
+        if !self.reaches(time_s) || passed >= otherwise as f64 {
+            otherwise
+        } else if passed > 0.0 {
             passed as usize
         } else {
-            otherwise
+            // Up to half a step before the plan.
+            0
         }
     }
 
