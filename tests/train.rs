@@ -5,6 +5,8 @@ mod definitions;
 #[path = "train/known_system.rs"]
 mod known_system;
 mod outside;
+#[path = "train/whole_body.rs"]
+mod whole_body;
 
 use std::cell::{Cell, RefCell};
 use std::path::Path;
@@ -284,7 +286,7 @@ fn model_with_quadratic_drag_is_controlled_at_rest() {
         .into_iter()
         .chain(drag);
     let options = TrainOptions {
-        library: LibraryChoice::Terms(terms.map(str::to_owned).collect()),
+        library: Some(LibraryChoice::Terms(terms.map(str::to_owned).collect())),
         ..TrainOptions::new("drag", 2)
     };
     let trained =
@@ -460,7 +462,7 @@ fn training_with_terms_that_are_not_finite_is_refused_with_their_place() {
     for (refused, undefined) in [("exp(10000*dz1)", false), ("log(z1)", true)] {
         let terms = ["1", "z1", "dz1", "u1", refused];
         let mut options = TrainOptions::new("m", 1);
-        options.library = LibraryChoice::Terms(terms.map(str::to_owned).to_vec());
+        options.library = Some(LibraryChoice::Terms(terms.map(str::to_owned).to_vec()));
         let mut networks = options.clone();
         (networks.joint.schedule, networks.joint.maps) = {
             let few = few_epochs(Activation::Tanh).joint;
@@ -553,11 +555,11 @@ fn joint_training_cancelled_during_descent_gives_a_model() {
 #[test]
 fn joint_training_cancelled_during_descent_of_a_curved_library_gives_a_model() {
     let mut options = TrainOptions::new("m", 2);
-    options.library = LibraryChoice::Standard(StandardLibrary {
+    options.library = Some(LibraryChoice::Standard(StandardLibrary {
         degree: 3,
         trigonometric: false,
         inputs: true,
-    });
+    }));
     let ended = cancelled_at(train::joint, &options, |news| tells(news, "epoch 4:"));
     let report = ended.expect("the best so far").report;
     assert!(report.choice.is_some_and(|choice| choice.score.is_finite()));

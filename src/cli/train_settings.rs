@@ -11,7 +11,7 @@ use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
 use crate::robot::Robot;
 use crate::robot_file::read_actuators;
 use crate::train::{
-    Coordinates, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
+    AFFINE, Coordinates, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
 };
 
 /// The word for actuators that stands for no file.
@@ -185,18 +185,23 @@ impl TrainSettings {
         names.split(' ').find(|name| given.contains_key(*name))
     }
 
-    fn library(&self, default: LibraryChoice) -> LibraryChoice {
-        match (&self.terms, default) {
-            (Some(terms), _) => {
-                LibraryChoice::Terms(terms.split(';').map(|t| t.trim().to_owned()).collect())
-            }
-            (None, LibraryChoice::Standard(standard)) => LibraryChoice::Standard(StandardLibrary {
-                degree: self.degree.unwrap_or(standard.degree),
-                trigonometric: self.trigonometric || standard.trigonometric,
-                inputs: standard.inputs,
-            }),
-            (None, terms @ LibraryChoice::Terms(_)) => terms,
+    fn library(&self, default: Option<LibraryChoice>) -> Option<LibraryChoice> {
+        if let Some(terms) = &self.terms {
+            let terms = terms.split(';').map(|term| term.trim().to_owned());
+            return Some(LibraryChoice::Terms(terms.collect()));
         }
+        if self.degree.is_none() && !self.trigonometric {
+            return default;
+        }
+        let standard = match default {
+            Some(LibraryChoice::Standard(standard)) => standard,
+            Some(LibraryChoice::Terms(_)) | None => AFFINE,
+        };
+        Some(LibraryChoice::Standard(StandardLibrary {
+            degree: self.degree.unwrap_or(standard.degree),
+            trigonometric: self.trigonometric || standard.trigonometric,
+            inputs: standard.inputs,
+        }))
     }
 
     fn given(&self) -> Map<String, Value> {

@@ -164,7 +164,7 @@ fn score_of_a_published_training_is_the_combined_loss_by_its_definition() {
     let (training, validation) = (jumps("train", 2), jumps("validation", 1));
     for activation in Activation::ALL {
         let mut options = few_epochs(activation);
-        options.library = LibraryChoice::Terms(terms.map(str::to_owned).to_vec());
+        options.library = Some(LibraryChoice::Terms(terms.map(str::to_owned).to_vec()));
         if activation == Activation::Linear {
             options.joint.maps.encoder_layers.clear();
             options.joint.maps.decoder_layers.clear();

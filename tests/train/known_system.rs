@@ -137,7 +137,7 @@ fn term_that_is_not_affine_is_found_among_those_that_are() {
     truth[CONTACT][(7, 0)] = -4.0;
     let terms = ["1", "z1", "z2", "dz1", "dz2", "u1", "u2", "dz1^2"];
     let mut options = options();
-    options.library = LibraryChoice::Terms(terms.map(str::to_owned).to_vec());
+    options.library = Some(LibraryChoice::Terms(terms.map(str::to_owned).to_vec()));
     assert_found(&learned(&truth, &options), &truth);
 }
 

@@ -207,8 +207,8 @@ pub(crate) struct TrainSettings {
     /// Coordinates with a larger share of the input's energy count as actuated
     #[arg(long, value_name = "SHARE", value_parser = finite(&table::MASK_INPUT_SHARE))]
     pub mask_input_share: Option<Finite>,
-    /// Rows of a linear encoder: named (the centre of mass, then joints and pitch, left and right alike; the dynamics
-    /// obey Newton's second law and the invariances) or free [default: named; free with --paper or hidden layers]
+    /// Rows of a linear encoder: named (the centre of mass, then joints and pitch, left and right alike, from 7 on
+    /// also the turn and the feet; the dynamics obey Newton's second law and the invariances) or free [default: named; free with --paper or hidden layers]
     #[arg(long, value_name = "KIND")]
     pub coordinates: Option<Coordinates>,
     /// Keep the latent basis as trained, without varimax rotation

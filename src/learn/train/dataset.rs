@@ -14,7 +14,7 @@ use crate::evaluate::is_plausible;
 use crate::model::InputStatistics;
 use crate::recording::preprocess::moving_average;
 use crate::recording::{PhaseRule, Recording, Segment};
-use crate::robot::{FeetRule, InputRule, JOINT_DIM, STATE_DIM, WrenchFrame};
+use crate::robot::{ContactFlags, FeetRule, InputRule, JOINT_DIM, STATE_DIM, WrenchFrame};
 
 /// Fewest samples of a segment, and of a phase over all segments.
 pub const MIN_SAMPLES: usize = 50;
@@ -82,6 +82,7 @@ pub(super) struct Jump {
     pub u: DMatrix<f64>,   // [tau; F; M]
     /// Joint friction and rotor inertia, which recorded torques have on top of `u`; none without actuators.
     pub losses: Option<DMatrix<f64>>,
+    pub feet: Vec<ContactFlags>,
     pub phase: Vec<usize>,
     pub spans: Vec<(usize, Range<usize>)>, // maximal runs of one phase
     /// Samples whose recorded torques are no torques of the robot, see [`is_plausible`].
@@ -242,6 +243,7 @@ impl Dataset {
             u: scaled(segment.input(rule)?, &self.scaling.input),
             losses: (rule.actuators().is_some())
                 .then(|| scaled(segment.losses(rule), &self.scaling.input)),
+            feet: segment.feet.clone(),
             phase,
             spans,
             implausible: (0..n)

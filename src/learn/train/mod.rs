@@ -6,15 +6,16 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
-mod features;
-
 mod closed_form;
 mod dataset;
 mod error;
+mod features;
+mod frame;
 mod growth;
 mod joint;
 mod judge;
 mod jumps;
+mod knowledge;
 mod latent;
 mod metrics;
 mod options;
@@ -38,8 +39,8 @@ pub use joint::{
 };
 pub use metrics::{PartScore, PhaseTerms, SeedReport, SetMetrics, TrainReport, Trained, assess};
 pub use options::{
-    Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions,
-    Transfer,
+    AFFINE, Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions,
+    TrainOptions, Transfer,
 };
 pub use progress::{Monitor, Progress};
 pub use task::{Origin, Recordings, SourceFile, sha256};

@@ -1,5 +1,7 @@
 //! What to train and how.
 
+use std::iter;
+
 use clap::ValueEnum;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -7,17 +9,27 @@ use serde::{Deserialize, Serialize};
 use super::closed_form::closed_form;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
+use super::frame::WHOLE_BODY_DIM;
 use super::joint::{LossWeights, Schedule, run::joint, unroll::Integrator, unroll::Unroll};
 use super::metrics::Trained;
 use super::progress::Monitor;
 use super::task::{Origin, Recordings};
 use crate::limits::table;
-use crate::model::{Activation, Library, LibraryChoice, MAX_LAYERS, StandardLibrary, check_name};
+use crate::model::{
+    Activation, LatentVariable, Library, LibraryChoice, MAX_LAYERS, StandardLibrary, check_name,
+};
 use crate::recording::CHATTER_SAMPLES;
 use crate::recording::PhaseRule;
 use crate::recording::preprocess::BATCH_ROWS;
 use crate::robot::{
     Actuators, BODY_X, BODY_Z, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame,
+};
+
+/// 1, `z`, `dz` and `u`.
+pub const AFFINE: StandardLibrary = StandardLibrary {
+    degree: 1,
+    trigonometric: false,
+    inputs: true,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
@@ -52,7 +64,9 @@ impl Method {
 pub struct TrainOptions {
     pub name: String,
     pub latent_dim: usize,
-    pub library: LibraryChoice,
+    /// Candidate terms. Unless given 1, `z`, `dz` and `u`, and with the coordinates of the whole body its height times force and
+    /// moment.
+    pub library: Option<LibraryChoice>,
     pub phases: PhaseRule,
     pub seed: u64,
     /// How many seeds are tried, counting up from `seed`; the best is kept.
@@ -113,8 +127,9 @@ pub struct EncoderOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
-    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right; the
-    /// dynamics obey what is known of them.
+    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right; from
+    /// seven coordinates on also the turn about the centre of mass and the places of the feet from there. The dynamics
+    /// obey what is known of them.
     Named,
     /// Any rows over all coordinates that move or are actuated.
     Free,
@@ -136,11 +151,7 @@ impl TrainOptions {
         Self {
             name: name.into(),
             latent_dim,
-            library: LibraryChoice::Standard(StandardLibrary {
-                degree: 1,
-                trigonometric: false,
-                inputs: true,
-            }),
+            library: None,
             phases: PhaseRule::two_phase().with_min_samples(CHATTER_SAMPLES),
             seed: 1,
             n_seeds: 1,
@@ -174,7 +185,7 @@ impl TrainOptions {
     /// ones, the published library and transfer steps, accelerations as recorded.
     pub fn paper(name: impl Into<String>, latent_dim: usize) -> Self {
         let mut options = Self::new(name, latent_dim);
-        options.library = LibraryChoice::Standard(StandardLibrary::default());
+        options.library = Some(LibraryChoice::Standard(StandardLibrary::default()));
         options.scaling = ScaleOptions::uniform(0.1);
         options.wrench_frame = WrenchFrame::Body;
         let encoder = &mut options.encoder;
@@ -201,8 +212,23 @@ impl TrainOptions {
         (0..count).map(|i| self.seed.wrapping_add(i)).collect()
     }
 
+    /// Of the given terms or those that suit the coordinates: the arm of the feet's force about the centre of mass grows with its
+    /// height.
     pub(crate) fn library(&self) -> Result<Library, TrainError> {
-        let library = Library::of(self.latent_dim, self.library.clone())?;
+        let is_whole =
+            self.coordinates() == Coordinates::Named && self.latent_dim >= WHOLE_BODY_DIM;
+        let choice = match &self.library {
+            Some(given) => given.clone(),
+            None if is_whole => {
+                let affine =
+                    LatentVariable::all(self.latent_dim).map(|variable| variable.to_string());
+                let loads = ["z2*u1", "z2*u2", "z2*u3"].map(str::to_owned);
+                let terms = iter::once("1".to_owned()).chain(affine).chain(loads);
+                LibraryChoice::Terms(terms.collect())
+            }
+            None => LibraryChoice::Standard(AFFINE),
+        };
+        let library = Library::of(self.latent_dim, choice)?;
         library.check_distinct()?;
         Ok(library)
     }

@@ -7,9 +7,10 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::growth::Growth;
 use super::judge::Judge;
+use super::knowledge::{Knowledge, brake};
 use super::progress::Monitor;
 use super::rollout::{Change, CoefficientIndex, Xi};
-use super::sparse::{Knowledge, active_terms, brake};
+use super::sparse::active_terms;
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
 const PRIOR: f64 = 1e-3;

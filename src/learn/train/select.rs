@@ -8,12 +8,13 @@ use serde::Serialize;
 use super::error::TrainError;
 use super::growth::Growth;
 use super::judge::Judge;
+use super::knowledge::Knowledge;
 use super::latent::EncodedSet;
 use super::options::RegressionOptions;
 use super::progress::Monitor;
 use super::refine::{Coefficients, Refiner};
 use super::rollout::Xi;
-use super::sparse::{Knowledge, Pruning, Regression};
+use super::sparse::{Pruning, Regression};
 use super::weak_form::windowed_samples;
 
 /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
@@ -289,7 +290,7 @@ impl Refiner<'_> {
         let xi = &mut trial.now.xi;
         let mut support = xi[phase].map(|value| value != 0.0);
         support[(row, column)] = active;
-        let tried = trial.regressions[phase].fit_column(column, &support, trial.ridge);
+        let tried = trial.regressions[phase].fit_column(column, &support, trial.ridge, &xi[phase]);
         let before = xi[phase].column(column).into_owned();
         xi[phase].set_column(column, &tried);
         let score = self.score_within(xi, limit);

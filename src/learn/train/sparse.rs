@@ -1,16 +1,12 @@
-//! Sparse regression of the latent accelerations, and what is known of them before it.
-
-use std::ops::Range;
+//! Sparse regression of the latent accelerations.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::Serialize;
 
-use super::dataset::Dataset;
-use super::features::Features;
-use super::subspace::Frame;
-use crate::robot::{BODY_Z, FeetRule, GRAVITY_M_S2};
+use super::knowledge::Knowledge;
 
 const LEAST_RIDGE: f64 = 1e-10; // on the normalised columns: far above rounding
+const STANDING_RIDGE: f64 = 1e-2; // of changes from feet that stand still
 const RECOMPUTED: usize = 64; // up to this size, supports are solved anew after an elimination, larger ones updated
 
 type Support = DMatrix<bool>; // active terms, library_dim x latent_dim
@@ -59,7 +55,7 @@ impl Regression {
         }
     }
 
-    /// Xi of the terms that are `allowed`, by ridge regression with each of the `prunings`. Contributions, not bare
+    /// Xi of the terms that are `allowed` or kept, by ridge regression with each of the `prunings`. Contributions, not bare
     /// coefficients, decide (STLSQ of Brunton et al. 2016 otherwise). Eliminations share one walk.
     pub(super) fn fit_each(
         &self,
@@ -70,8 +66,16 @@ impl Regression {
         let mut fits = vec![self.knowledge.known.clone(); prunings.len()];
         for column in (0..self.target_rms.len()).filter(|&column| self.target_rms[column] > 0.0) {
             let informative: Vec<usize> = (self.free_terms(column))
-                .filter(|&i| self.theta_rms[i] > 0.0 && allowed[i])
+                .filter(|&i| self.theta_rms[i] > 0.0)
+                .filter(|&i| allowed[i] || self.knowledge.kept[(i, column)])
                 .collect();
+            if self.knowledge.standing(column).is_some() {
+                for xi in &mut fits {
+                    let fitted = self.solve_near(column, &informative, ridge, xi);
+                    self.store(xi, column, &informative, &fitted);
+                }
+                continue;
+            }
             let losses = prunings.iter().filter_map(|pruning| match pruning {
                 Pruning::Elimination(loss) => Some(*loss),
                 Pruning::Threshold(_) => None,
@@ -176,9 +180,16 @@ impl Regression {
             .collect()
     }
 
-    pub(super) fn fit_column(&self, column: usize, support: &Support, ridge: f64) -> DVector<f64> {
+    /// A column of `xi` anew, of the terms in `support`.
+    pub(super) fn fit_column(
+        &self,
+        column: usize,
+        support: &Support,
+        ridge: f64,
+        xi: &DMatrix<f64>,
+    ) -> DVector<f64> {
         let rows = self.active_terms(column, support);
-        let solution = self.solve(column, &rows, ridge);
+        let solution = self.solve_near(column, &rows, ridge, xi);
         let mut xi = self.knowledge.known.clone();
         self.store(&mut xi, column, &rows, &solution);
         xi.column(column).into_owned()
@@ -236,6 +247,26 @@ impl Regression {
         self.ridged_gram(support, ridge).solve(&right)
     }
 
+    /// [`Self::solve`], of a leg that stands in this phase the least change from feet that stand still.
+    fn solve_near(
+        &self,
+        column: usize,
+        support: &[usize],
+        ridge: f64,
+        xi: &DMatrix<f64>,
+    ) -> DVector<f64> {
+        let Some(standing) = self.knowledge.standing(column) else {
+            return self.solve(column, support, ridge);
+        };
+        let still = standing.still(xi);
+        let still = support.iter().map(|&i| still[i] * self.theta_rms[i]);
+        let still = DVector::from_iterator(support.len(), still);
+        let right = support.iter().map(|&i| self.correlation[(i, column)]);
+        let right = DVector::from_iterator(support.len(), right)
+            - self.gram.select_rows(support).select_columns(support) * &still;
+        still + self.ridged_gram(support, STANDING_RIDGE).solve(&right)
+    }
+
     fn ridged_gram(&self, support: &[usize], ridge: f64) -> Cholesky<f64, Dyn> {
         let n = support.len();
         let gram = self.gram.select_rows(support).select_columns(support);
@@ -285,17 +316,6 @@ impl SupportFit {
     }
 }
 
-/// Coefficients that would drive where they may only brake, set to 0.
-pub(super) fn brake(knowledge: &[Knowledge], xi: &mut [DMatrix<f64>]) {
-    for (knowledge, xi) in knowledge.iter().zip(xi) {
-        for (coefficient, braking) in xi.iter_mut().zip(&knowledge.braking) {
-            if *braking && *coefficient > 0.0 {
-                *coefficient = 0.0;
-            }
-        }
-    }
-}
-
 pub(super) fn active_terms(xi: &DMatrix<f64>) -> usize {
     xi.iter().filter(|value| **value != 0.0).count()
 }
@@ -305,82 +325,6 @@ fn column_rms(matrix: &DMatrix<f64>) -> DVector<f64> {
     let columns = matrix.column_iter();
     let rms = columns.map(|column| (column.norm_squared() / n).sqrt());
     DVector::from_iterator(matrix.ncols(), rms)
-}
-
-const HELD: usize = 2; // rows that a frame holds: the centre of mass forwards and upwards
-
-/// Known coefficients of one phase, and those left to a regression; all `library_dim x latent_dim`.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Knowledge {
-    pub known: DMatrix<f64>,    // zero where nothing is known
-    pub free: DMatrix<bool>,    // to be chosen by a regression
-    pub kept: DMatrix<bool>,    // free, and stay whatever they explain
-    pub braking: DMatrix<bool>, // free, and at most 0 once refined
-}
-
-impl Knowledge {
-    pub(super) fn nothing(library_dim: usize, latent_dim: usize) -> Self {
-        Self {
-            known: DMatrix::zeros(library_dim, latent_dim),
-            free: DMatrix::from_element(library_dim, latent_dim, true),
-            kept: DMatrix::from_element(library_dim, latent_dim, false),
-            braking: DMatrix::from_element(library_dim, latent_dim, false),
-        }
-    }
-
-    /// What is known of each phase in a frame that holds the centre of mass as `z1` (forwards) and `z2` (upwards). The
-    /// floor is the same everywhere: no term depends on `z1`. Forces move a centre of mass and losses brake it,
-    /// wherever it and the legs are: no term of `ddz1` and `ddz2` depends on a position, and each keeps its own
-    /// velocity, braking. With feet on the ground `ddz2` depends on its own force and velocity alone, and keeps its
-    /// constant (gravity, less what the ground carries of the legs' weight). In flight `ddz1 = 0`, `ddz2 = -g`, and no
-    /// term depends on forces.
-    pub(super) fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
-        let (p, d) = (features.library_dim(), features.latent_dim);
-        let each = training.phases.patterns.iter();
-        if frame.held.ncols() < HELD {
-            return each.map(|_| Self::nothing(p, d)).collect();
-        }
-        let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
-        let (upwards, force_upwards) = (d + 1, 2 * d + 1);
-        each.map(|phase| {
-            let mut knowledge = Self::nothing(p, d);
-            // In these columns, terms that depend on one of the variables are not free.
-            let mut fix = |columns: Range<usize>, variables: &mut dyn Iterator<Item = usize>| {
-                for variable in variables {
-                    for term in (0..p).filter(|&term| features.occurring[term][variable]) {
-                        let mut row = knowledge.free.row_mut(term);
-                        row.columns_range_mut(columns.clone()).fill(false);
-                    }
-                }
-            };
-            fix(0..d, &mut (0..1));
-            fix(0..HELD, &mut (0..d));
-            let one = features.constant_term();
-            if phase.feet == FeetRule::None {
-                fix(0..d, &mut (2 * d..2 * d + HELD));
-                knowledge.free.column_mut(0).fill(false);
-                if let Some(one) = one {
-                    knowledge.known[(one, 1)] = gravity;
-                    knowledge.free.column_mut(1).fill(false);
-                }
-            } else {
-                let own = [upwards, force_upwards];
-                fix(1..2, &mut (0..3 * d).filter(|i| !own.contains(i)));
-                one.into_iter()
-                    .for_each(|one| knowledge.kept[(one, 1)] = true);
-            }
-            let inputs = (0..d).map(|k| (2 * d + k, k));
-            for (variable, k) in inputs.chain((0..HELD).map(|k| (d + k, k))) {
-                if let Some(term) = features.variable_term(variable) {
-                    let free = knowledge.free[(term, k)];
-                    knowledge.kept[(term, k)] = free;
-                    knowledge.braking[(term, k)] = free && variable < 2 * d;
-                }
-            }
-            knowledge
-        })
-        .collect()
-    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,347 @@
+//! Rows of an encoder that physics gives: the robot's momentum, and feet that stand still.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::dataset::{Dataset, Jump, centred, mean};
+use super::options::Coordinates;
+use crate::model::complement;
+use crate::robot::{
+    BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot, STATE_DIM,
+};
+
+const PITCH: usize = JOINT_DIM + 4;
+/// What the momentum rows stand for, in their order: the centre of mass forwards and upwards, and the turn about it.
+const MOMENTUM: [usize; 3] = [BODY_X, BODY_Z, PITCH];
+pub(super) const TURN: usize = 2;
+/// Latent coordinates from which on the rows are those of the whole body in its plane: three of momentum, four of legs.
+pub(super) const WHOLE_BODY_DIM: usize = 7;
+const WINDOW_S: f64 = 0.05; // over which accelerations in flight are averaged
+const TRIM: usize = 4; // samples left out at both ends of a flight, where feet still slip or already touch
+const LEAST_WINDOWS: usize = 50; // averaged accelerations in flight that identify the centre of mass
+const RIDGE: f64 = 1e-2; // relative to the mean square of all joints' accelerations
+
+const SETTLING_S: f64 = 0.05; // after a touchdown, in which feet still slip
+const LEAST_STANDING: usize = 100; // samples on standing feet that identify their rows
+const STANDING_RIDGE: f64 = 1e-3; // of standardised columns
+const PAIRS: [[Leg; 2]; 2] = [
+    [Leg::FrontRight, Leg::FrontLeft],
+    [Leg::RearRight, Leg::RearLeft],
+];
+
+/// Rows of an encoder `W_e` before they are chosen, in scaled units.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    pub held: DMatrix<f64>, // rows of every encoder, as columns, 18 x h: momentum, then legs
+    pub momentum: usize,    // how many of them are of the momentum, in the order of `MOMENTUM`
+    pub legs: Vec<LegRow>,  // of the others
+    pub free: DMatrix<f64>, // orthonormal directions that the other rows combine, 18 x k
+}
+
+/// A row `rho` of a pair of legs. With the momentum rows `b` (forwards or upwards) and `t` (turn) the sum
+/// `rho + b + arm t` is where the pair's feet are: it rests while they stand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LegRow {
+    pub body: usize, // the momentum row that it belongs to
+    pub arm: f64,
+    pub rest: f64, // mean of the feet's place while they stand, less the mean of all samples
+}
+
+impl Frame {
+    pub(super) fn plain(active: &[usize]) -> Self {
+        Self {
+            held: DMatrix::zeros(STATE_DIM, 0),
+            momentum: 0,
+            legs: Vec::new(),
+            free: DMatrix::identity(STATE_DIM, STATE_DIM).select_columns(active),
+        }
+    }
+
+    /// With [`Coordinates::Named`] and two or more latent coordinates, the first two rows are the centre of mass. With
+    /// seven or more the third is the turn about it, and the next four are the places of the feet from there. The others combine sums of `active` coordinates that a mirror leaves alone: neither `y`, roll and
+    /// yaw, nor left and right; nor pitch where a row has it.
+    pub(super) fn new(
+        training: &Dataset,
+        active: &[usize],
+        latent_dim: usize,
+        coordinates: Coordinates,
+        robot: &Robot,
+    ) -> Self {
+        if coordinates == Coordinates::Free {
+            return Self::plain(active);
+        }
+        let (body, count): (&[usize], usize) = match latent_dim {
+            0 | 1 => (&[BODY_X, BODY_Z, PITCH], 0),
+            2..WHOLE_BODY_DIM => (&[PITCH], 2),
+            _ => (&[], MOMENTUM.len()),
+        };
+        let momentum = momentum_rows(training, count, robot);
+        let joints = mirrored_joints(active, robot);
+        let mut held: Vec<DVector<f64>> =
+            momentum.column_iter().map(|row| row.into_owned()).collect();
+        let mut legs = Vec::new();
+        if count == MOMENTUM.len() {
+            for (row, leg) in leg_rows(training, &momentum, robot) {
+                held.push(row);
+                legs.push(leg);
+            }
+        }
+        let single = body.iter().filter(|i| active.contains(i)).map(|&i| unit(i));
+        let free: Vec<_> = single.chain(joints).collect();
+        let free = DMatrix::from_fn(STATE_DIM, free.len(), |row, k| free[k][row]);
+        Self {
+            free: without(free, &held[count..]),
+            held: DMatrix::from_fn(STATE_DIM, held.len(), |row, k| held[k][row]),
+            momentum: count,
+            legs,
+        }
+    }
+
+    pub(super) fn dim(&self) -> usize {
+        self.held.ncols() + self.free.ncols()
+    }
+
+    /// The `latent_dim - h` free directions nearest to the space that the columns of `basis` span.
+    pub(super) fn nearest(&self, basis: &DMatrix<f64>, latent_dim: usize) -> DMatrix<f64> {
+        let inside = self.free.tr_mul(basis).svd(true, false);
+        let left = inside.u.expect("invariant: asked for");
+        let count = latent_dim - self.held.ncols();
+        let mut order: Vec<usize> = (0..left.ncols()).collect();
+        order.sort_by(|&a, &b| inside.singular_values[b].total_cmp(&inside.singular_values[a]));
+        &self.free * left.select_columns(&order[..count])
+    }
+}
+
+/// An orthonormal basis of what the columns of `free` span beside the parts of `rows` in it.
+fn without(free: DMatrix<f64>, rows: &[DVector<f64>]) -> DMatrix<f64> {
+    if rows.is_empty() || free.ncols() == 0 {
+        return free;
+    }
+    let inside = rows.iter().map(|row| free.tr_mul(row));
+    let inside = DMatrix::from_columns(&inside.collect::<Vec<_>>());
+    let eigen = complement(&inside).symmetric_eigen();
+    let outside = (0..free.ncols()).filter(|&i| eigen.eigenvalues[i] > 0.5);
+    free * eigen
+        .eigenvectors
+        .select_columns(&outside.collect::<Vec<_>>())
+}
+
+/// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`.
+fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
+    let joints = PAIRS
+        .into_iter()
+        .flat_map(|legs| (0..LEG_JOINT_DIM).map(move |joint| (legs, joint)));
+    let is_active = |&(legs, joint): &([Leg; 2], usize)| {
+        legs.iter()
+            .any(|&leg| active.contains(&joint_of(leg, joint)))
+    };
+    let direction = |(legs, joint)| mirrored(legs, joint, robot) * std::f64::consts::SQRT_2;
+    joints.filter(is_active).map(direction).collect()
+}
+
+/// The mean of a joint of two legs that mirror each other.
+fn mirrored([right, left]: [Leg; 2], joint: usize, robot: &Robot) -> DVector<f64> {
+    let [right, left] = [joint_of(right, joint), joint_of(left, joint)];
+    (unit(right) + unit(left) * robot.mirror_sign(left)) * 0.5
+}
+
+fn joint_of(leg: Leg, joint: usize) -> usize {
+    LEG_JOINT_DIM * leg.index() + joint
+}
+
+/// The first `count` momentum rows, as columns, `18 x count`: `x + c_x^T q`, `z + c_z^T q` and `pitch + c_t^T q` over
+/// the joints `q`, of the body alone where the recordings have no flight. In flight the centre of mass falls freely and
+/// the angular momentum about it stays: `ddx + c_x^T ddq = 0`, `ddz + c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The
+/// regression of the body's accelerations on those of the joints (mirrored, ridge) gives `c`, to first order in `q`.
+fn momentum_rows(training: &Dataset, count: usize, robot: &Robot) -> DMatrix<f64> {
+    let all: Vec<usize> = (0..JOINT_DIM).collect();
+    let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));
+    let mut body = DMatrix::from_fn(STATE_DIM, count, |row, k| {
+        f64::from(u8::from(row == MOMENTUM[k]))
+    });
+    let mut accelerations = Vec::new();
+    for jump in &training.jumps {
+        flight_accelerations(training, jump, &mut accelerations);
+    }
+    if accelerations.len() < LEAST_WINDOWS {
+        return body;
+    }
+    let samples = DMatrix::from_columns(&accelerations);
+    let (of_joints, n) = (joints.tr_mul(&samples), samples.ncols() as f64);
+    let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
+    if mean_square <= 0.0 {
+        return body;
+    }
+    let gram = &of_joints * of_joints.transpose() / n
+        + DMatrix::identity(joints.ncols(), joints.ncols()) * (RIDGE * mean_square);
+    let factor = gram
+        .cholesky()
+        .expect("invariant: a Gram matrix plus a ridge");
+    for (mut column, row) in body.column_iter_mut().zip(MOMENTUM) {
+        let fall = if row == BODY_Z {
+            GRAVITY_M_S2 * training.scaling.state[BODY_Z]
+        } else {
+            0.0
+        };
+        let target = samples.row(row).transpose().add_scalar(fall);
+        let part = factor.solve(&(&of_joints * target / n));
+        column -= &joints * part;
+    }
+    body
+}
+
+/// Appends the accelerations over every window in the flights of a jump, scaled units.
+fn flight_accelerations(training: &Dataset, jump: &Jump, all: &mut Vec<DVector<f64>>) {
+    for (phase, range) in &jump.spans {
+        if training.phases.patterns[*phase].feet != FeetRule::None || range.len() <= 2 * TRIM {
+            continue;
+        }
+        let inside = range.start + TRIM..range.end - TRIM;
+        let mut last = inside.start;
+        for first in inside.clone() {
+            while last < inside.end && jump.time_s[last] - jump.time_s[first] < WINDOW_S {
+                last += 1;
+            }
+            if last == inside.end {
+                break;
+            }
+            let duration = jump.time_s[last] - jump.time_s[first];
+            all.push((jump.dx.column(last) - jump.dx.column(first)) / duration);
+        }
+    }
+}
+
+/// Rows of the legs as columns, forwards and upwards of the front pair and of the rear pair; none where too few samples
+/// stand. While a pair stands, `x + arm pitch + w^T q` over its flexions and knees `q` rests, and so does the same with
+/// `z`: the regression of the body's deviations from their means in a stance (ridge) gives `arm` and `w`. The row of a
+/// leg is what is left of that without the momentum rows. Abductions enter as the training's torques there follow those
+/// at flexions and knees: the lift returns them.
+fn leg_rows(
+    training: &Dataset,
+    momentum: &DMatrix<f64>,
+    robot: &Robot,
+) -> Vec<(DVector<f64>, LegRow)> {
+    let mut rows = Vec::new();
+    for legs in PAIRS {
+        let [abduction, flexion, knee] = std::array::from_fn(|joint| mirrored(legs, joint, robot));
+        let stances = stances(training, legs);
+        if stances.iter().map(|(_, range)| range.len()).sum::<usize>() < LEAST_STANDING {
+            return Vec::new();
+        }
+        let moving = DMatrix::from_columns(&[unit(PITCH), flexion.clone(), knee.clone()]);
+        let deviations = deviations(training, &stances);
+        let follows = abduction_torques(training, [&abduction, &flexion, &knee]);
+        for (body, &row) in MOMENTUM[..2].iter().enumerate() {
+            let weights = standardised_fit(
+                &moving.tr_mul(&deviations),
+                &deviations.row(row).transpose(),
+            );
+            let (arm, of_flexion, of_knee) = (-weights[0], -weights[1], -weights[2]);
+            let turned = of_flexion * follows[0] + of_knee * follows[1];
+            let feet = unit(row)
+                + unit(PITCH) * arm
+                + &flexion * of_flexion
+                + &knee * of_knee
+                + &abduction * turned;
+            let place = mean_over(training, &stances, &feet);
+            rows.push((
+                feet - momentum.column(body) - momentum.column(2) * arm,
+                LegRow {
+                    body,
+                    arm,
+                    rest: place,
+                },
+            ));
+        }
+    }
+    rows
+}
+
+/// Spans in which both legs of a pair stand, without the first part of each that begins with a touchdown.
+fn stances(training: &Dataset, legs: [Leg; 2]) -> Vec<(usize, Range<usize>)> {
+    let mut all = Vec::new();
+    for (index, jump) in training.jumps.iter().enumerate() {
+        let stands = |sample: usize| legs.iter().all(|leg| jump.feet[sample][leg.index()]);
+        let mut first = 0;
+        while first < jump.samples() {
+            let last = (first..jump.samples())
+                .find(|&sample| !stands(sample))
+                .unwrap_or(jump.samples());
+            let settled = match first {
+                0 => 0,
+                _ => (first..last)
+                    .find(|&sample| jump.time_s[sample] - jump.time_s[first] >= SETTLING_S)
+                    .unwrap_or(last),
+            };
+            if settled < last {
+                all.push((index, settled..last));
+            }
+            first = last + 1;
+        }
+    }
+    all
+}
+
+/// States less their means in each stance, side by side.
+fn deviations(training: &Dataset, stances: &[(usize, Range<usize>)]) -> DMatrix<f64> {
+    let count = stances.iter().map(|(_, range)| range.len()).sum();
+    let mut all = DMatrix::zeros(STATE_DIM, count);
+    let mut at = 0;
+    for (jump, range) in stances {
+        let states = training.jumps[*jump]
+            .x
+            .columns_range(range.clone())
+            .into_owned();
+        let own = centred(&states, &mean(&states));
+        all.columns_mut(at, own.ncols()).copy_from(&own);
+        at += own.ncols();
+    }
+    all
+}
+
+/// Mean of a row over the stances, less that over all samples.
+fn mean_over(training: &Dataset, stances: &[(usize, Range<usize>)], row: &DVector<f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (jump, range) in stances {
+        let states = training.jumps[*jump].x.columns_range(range.clone());
+        sum += row.tr_mul(&states).sum();
+        count += range.len() as f64;
+    }
+    sum / count - row.dot(&mean(&training.states(None)))
+}
+
+/// How a pair's torques at its abductions follow those at its flexions and knees over the training's inputs.
+fn abduction_torques(
+    training: &Dataset,
+    [abduction, flexion, knee]: [&DVector<f64>; 3],
+) -> [f64; 2] {
+    let inputs = training.inputs(None);
+    let others = DMatrix::from_columns(&[flexion.clone(), knee.clone()]).tr_mul(&inputs);
+    let fitted = standardised_fit(&others, &inputs.tr_mul(abduction));
+    [fitted[0], fitted[1]]
+}
+
+/// Weights `w` of the rows of `regressors` (`k x n`) with `w^T regressors` nearest to `target`, ridge on standardised rows.
+fn standardised_fit(regressors: &DMatrix<f64>, target: &DVector<f64>) -> DVector<f64> {
+    let scales = DVector::from_iterator(
+        regressors.nrows(),
+        regressors
+            .row_iter()
+            .map(|row| row.norm().max(f64::MIN_POSITIVE)),
+    );
+    let mut rows = regressors.clone();
+    rows.row_iter_mut()
+        .zip(&scales)
+        .for_each(|(mut row, scale)| row /= *scale);
+    let gram =
+        &rows * rows.transpose() + DMatrix::identity(rows.nrows(), rows.nrows()) * STANDING_RIDGE;
+    let factor = gram
+        .cholesky()
+        .expect("invariant: a Gram matrix plus a ridge");
+    factor.solve(&(rows * target)).component_div(&scales)
+}
+
+fn unit(index: usize) -> DVector<f64> {
+    DVector::from_fn(STATE_DIM, |i, _| if i == index { 1.0 } else { 0.0 })
+}

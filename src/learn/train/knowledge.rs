@@ -1,0 +1,210 @@
+//! What is known of the latent dynamics before a regression, in the coordinates of a [`Frame`].
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::dataset::Dataset;
+use super::features::Features;
+use super::frame::{Frame, LegRow, TURN};
+use crate::robot::{BODY_Z, FeetRule, GRAVITY_M_S2};
+
+const STANDING_DAMPING_PER_S: f64 = 40.0; // of feet that slip
+const STANDING_STIFFNESS_PER_S2: f64 = 500.0; // of the ground
+
+/// Known coefficients of one phase, and those left to a regression; all `library_dim x latent_dim`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Knowledge {
+    pub known: DMatrix<f64>,    // zero where nothing is known
+    pub free: DMatrix<bool>,    // to be chosen by a regression
+    pub kept: DMatrix<bool>,    // free, and stay whatever they explain
+    pub braking: DMatrix<bool>, // free, and at most 0 once refined
+    standing: Vec<Standing>,    // equations of the legs, if they stand in this phase
+}
+
+/// The place `f = rho + b + arm t` of a pair's feet, with the row `rho` of the pair and the momentum rows `b` and `t`:
+/// while they stand, `ddf = -damping df - stiffness (f - rest)`, stiff upwards alone.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Standing {
+    column: usize,
+    row: LegRow,
+    velocities: [usize; 3], // terms of rho, b and t
+    positions: [usize; 3],
+    one: usize,
+}
+
+impl Standing {
+    /// None if the library lacks one of the terms.
+    fn of(row: LegRow, column: usize, features: &Features) -> Option<Self> {
+        let d = features.latent_dim;
+        let [rho, b, t] = [column, row.body, TURN].map(|k| {
+            let (position, velocity) = (features.variable_term(k), features.variable_term(d + k));
+            position.zip(velocity)
+        });
+        let terms = [rho?, b?, t?];
+        Some(Self {
+            column,
+            row,
+            velocities: terms.map(|(_, velocity)| velocity),
+            positions: terms.map(|(position, _)| position),
+            one: features.constant_term()?,
+        })
+    }
+
+    /// The column for feet that stand still, given those of the momentum in `xi`.
+    pub(super) fn still(&self, xi: &DMatrix<f64>) -> DVector<f64> {
+        let LegRow { body, arm, rest } = self.row;
+        let mut still = -xi.column(body) - xi.column(TURN) * arm;
+        let stiffness = if body == 0 {
+            0.0
+        } else {
+            STANDING_STIFFNESS_PER_S2
+        };
+        for (i, share) in [1.0, 1.0, arm].into_iter().enumerate() {
+            still[self.velocities[i]] -= STANDING_DAMPING_PER_S * share;
+            still[self.positions[i]] -= stiffness * share;
+        }
+        still[self.one] += stiffness * rest;
+        still
+    }
+}
+
+impl Knowledge {
+    pub(super) fn nothing(library_dim: usize, latent_dim: usize) -> Self {
+        Self {
+            known: DMatrix::zeros(library_dim, latent_dim),
+            free: DMatrix::from_element(library_dim, latent_dim, true),
+            kept: DMatrix::from_element(library_dim, latent_dim, false),
+            braking: DMatrix::from_element(library_dim, latent_dim, false),
+            standing: Vec::new(),
+        }
+    }
+
+    pub(super) fn standing(&self, column: usize) -> Option<&Standing> {
+        self.standing.iter().find(|of| of.column == column)
+    }
+
+    /// What is known of each phase in a frame that holds momentum: the centre of mass as `z1` (forwards) and `z2`
+    /// (upwards), the turn about it as `z3`, then the feet's places. The floor is the same everywhere: no term depends
+    /// on `z1`. Forces move a centre of mass and losses brake it, wherever it and the legs are: no term of `ddz1` and
+    /// `ddz2` depends on a position, and each keeps its own velocity, braking.
+    ///
+    /// With feet on the ground `ddz2` depends on its own force and velocity alone, and keeps its constant (gravity, less
+    /// what the ground carries of the legs' weight). The turn depends on velocities, on force and moment, and on these
+    /// times the height. Feet stand still but for what the data say: the legs' equations are affine, and all their terms
+    /// stay. In flight `ddz1 = 0`, `ddz2 = -g`, `ddz3 = 0`, no term depends on force or moment, and the legs depend on
+    /// their own inputs alone.
+    pub(super) fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
+        let (p, d) = (features.library_dim(), features.latent_dim);
+        let each = training.phases.patterns.iter();
+        if frame.momentum == 0 {
+            return each.map(|_| Self::nothing(p, d)).collect();
+        }
+        let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
+        let legs = frame.momentum..frame.momentum + frame.legs.len();
+        each.map(|phase| {
+            let mut knowledge = Self::nothing(p, d);
+            knowledge.forbid(0..d, features, |variables| variables.contains(&0));
+            knowledge.forbid(0..2, features, |variables| variables.iter().any(|v| *v < d));
+            let one = features.constant_term();
+            if phase.feet == FeetRule::None {
+                knowledge.fly(features, frame, gravity);
+            } else {
+                let own = [d + 1, 2 * d + 1];
+                let others = |variables: &[usize]| variables.iter().any(|v| !own.contains(v));
+                knowledge.forbid(1..2, features, others);
+                one.into_iter()
+                    .for_each(|one| knowledge.kept[(one, 1)] = true);
+                knowledge.stand(features, frame);
+            }
+            let inputs = (0..d).map(|k| (2 * d + k, k));
+            for (variable, k) in inputs.chain((0..2).map(|k| (d + k, k))) {
+                if let Some(term) = features.variable_term(variable) {
+                    let free = knowledge.free[(term, k)];
+                    knowledge.kept[(term, k)] = free;
+                    knowledge.braking[(term, k)] = free && variable < 2 * d;
+                }
+            }
+            for k in (TURN..frame.momentum).chain(legs.clone()) {
+                let free = knowledge.free.column(k).into_owned();
+                knowledge.kept.set_column(k, &free);
+            }
+            knowledge
+        })
+        .collect()
+    }
+
+    /// Terms that depend on certain variables (counted over `z`, `dz`, `u_lat`) are not free in these columns.
+    fn forbid(
+        &mut self,
+        columns: Range<usize>,
+        features: &Features,
+        depends: impl Fn(&[usize]) -> bool,
+    ) {
+        for (term, occurring) in features.occurring.iter().enumerate() {
+            let variables: Vec<usize> = (0..occurring.len()).filter(|&v| occurring[v]).collect();
+            if depends(&variables) {
+                let mut row = self.free.row_mut(term);
+                row.columns_range_mut(columns.clone()).fill(false);
+            }
+        }
+    }
+
+    /// Of a phase with feet on the ground: the turn and the legs.
+    fn stand(&mut self, features: &Features, frame: &Frame) {
+        let (d, momentum) = (features.latent_dim, frame.momentum);
+        let is_load = |v: &usize| (2 * d..2 * d + momentum).contains(v);
+        self.forbid(TURN..momentum, features, |variables| {
+            let is_known = |v: &usize| *v == 1 || (d..2 * d).contains(v) || is_load(v);
+            let has_arm = !variables.contains(&1) || variables.iter().any(is_load);
+            !(variables.iter().all(is_known) && has_arm)
+        });
+        let columns = frame.legs.iter().zip(momentum..);
+        let standing = columns
+            .clone()
+            .map(|(&row, k)| Standing::of(row, k, features));
+        self.standing = standing.collect::<Option<_>>().unwrap_or_default();
+        for (_, k) in columns {
+            for (term, is_affine) in features.affine.iter().enumerate() {
+                self.free[(term, k)] &= is_affine;
+            }
+        }
+    }
+
+    fn fly(&mut self, features: &Features, frame: &Frame, gravity: f64) {
+        let (d, momentum) = (features.latent_dim, frame.momentum);
+        let (loads, legs) = (
+            2 * d..2 * d + momentum,
+            momentum..momentum + frame.legs.len(),
+        );
+        self.forbid(0..d, features, |variables| {
+            variables.iter().any(|v| loads.contains(v))
+        });
+        self.forbid(legs, features, |variables| {
+            variables.iter().any(|v| *v < 2 * d)
+        });
+        self.free.column_mut(0).fill(false);
+        if let Some(one) = features.constant_term() {
+            self.known[(one, 1)] = gravity;
+            self.free.column_mut(1).fill(false);
+        }
+        for k in TURN..momentum {
+            self.free.column_mut(k).fill(false);
+        }
+    }
+}
+
+/// Coefficients that would drive where they may only brake, set to 0.
+pub(super) fn brake(knowledge: &[Knowledge], xi: &mut [DMatrix<f64>]) {
+    for (knowledge, xi) in knowledge.iter().zip(xi) {
+        for (coefficient, braking) in xi.iter_mut().zip(&knowledge.braking) {
+            if *braking && *coefficient > 0.0 {
+                *coefficient = 0.0;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "../../../tests/units/learn_train_knowledge.rs"]
+mod tests;

@@ -1,0 +1,195 @@
+//! Models whose coordinates are those of the whole body in its plane.
+
+use std::sync::LazyLock;
+
+use nalgebra::DVector;
+use romc::artifact;
+use romc::evaluate::{CoordinateSums, Fit};
+use romc::lower::CompiledModel;
+use romc::model::ReducedModel;
+use romc::recording::Recording;
+use romc::robot::{JOINT_DIM, STATE_DIM};
+use romc::sim::{LatentSegment, Restart, rollout};
+use romc::train::TrainOptions;
+
+use super::{jumps, jumps_of, losses_of_the_simulated_go1, train_with};
+
+const PITCH: usize = JOINT_DIM + 4;
+const FLEXIONS_AND_KNEES: [usize; 8] = [1, 2, 4, 5, 7, 8, 10, 11];
+
+static WHOLE_BODY: LazyLock<ReducedModel> = LazyLock::new(|| {
+    let mut options = TrainOptions::new("go1-d7", 7);
+    options.actuators = Some(losses_of_the_simulated_go1());
+    let trained = train_with(&jumps("train", 14), &jumps("validation", 3), &options);
+    trained.expect("trains").model
+});
+
+/// Predictions over 0.1 s, a fit a coordinate.
+fn fits(model: &ReducedModel, recordings: &[Recording]) -> Vec<Fit> {
+    let compiled = CompiledModel::new(model).expect("compiles");
+    let mut sums = CoordinateSums::new(model).expect("has a decoder");
+    for segment in recordings.iter().flat_map(|recording| &recording.segments) {
+        let latent = LatentSegment::encode(model, segment).expect("encodes");
+        let predicted = rollout(&compiled, &latent, Restart::Every(0.1));
+        sums.add_rollout(model, segment, &latent, &predicted)
+            .expect("decodes");
+    }
+    sums.fits()
+        .into_iter()
+        .map(|fit| fit.expect("samples"))
+        .collect()
+}
+
+fn r2(fits: &[Fit], coordinate: usize) -> f64 {
+    fits[coordinate].r2.expect("moves")
+}
+
+/// The model with a coefficient of its first phase negated.
+fn negated(model: &ReducedModel, term: &str, latent: usize) -> ReducedModel {
+    let mut file: serde_json::Value =
+        serde_json::from_str(&artifact::to_text(model)).expect("a model file");
+    let terms = model.library().terms();
+    let row = terms
+        .iter()
+        .position(|each| each.text == term)
+        .expect("a term");
+    let entry = &mut file["phases"][0]["xi"][row][latent];
+    let before = entry.as_f64().expect("a number");
+    assert_ne!(before, 0.0);
+    *entry = (-before).into();
+    artifact::read_from_bytes("changed.json", file.to_string().as_bytes()).expect("still a model")
+}
+
+#[test]
+fn whole_body_predicts_pitch_and_legs_of_other_recorders() {
+    let model = &*WHOLE_BODY;
+    let other = jumps_of("go1-other", "jump", 8);
+    for recordings in [jumps("test", 3), other.clone()] {
+        let fits = fits(model, &recordings);
+        assert!(r2(&fits, PITCH) > 0.94, "{fits:?}");
+        for joint in FLEXIONS_AND_KNEES {
+            assert!(r2(&fits, joint) > 0.95, "{joint} {fits:?}");
+        }
+        assert!(fits[12].rms < 1.2e-3 && fits[14].rms < 1.5e-3, "{fits:?}");
+    }
+    // Every part carries its share: the moment turns the body, legs stand by their own equations.
+    let against_moment = negated(model, "u3", 2);
+    let found = r2(&fits(&against_moment, &other), PITCH);
+    assert!(found < 0.8, "{found}");
+    let against_legs = negated(model, "dz4", 3);
+    let found = r2(&fits(&against_legs, &other), 1);
+    assert!(found < 0.9, "{found}");
+}
+
+/// Rows of the encoder: the turn is near that of the rigid-body mechanics of the simulated robot, and feet stand still in
+/// jumps that training never saw.
+#[test]
+fn rows_of_the_whole_body_are_those_of_mechanics() {
+    let model = &*WHOLE_BODY;
+    let weights = model
+        .encoder_map()
+        .expect("trained")
+        .as_affine()
+        .expect("linear")
+        .weights()
+        .clone();
+    let row = |k: usize| weights.row(k).transpose();
+    let turn = row(2);
+    // Angular momentum per locked inertia at the mean posture, by its mass matrix; over the sums of a left and a right joint.
+    let mechanics = [(1, 0.060), (2, 0.045), (7, 0.116), (8, 0.003)];
+    for (joint, expected) in mechanics {
+        let found = turn[joint] + turn[joint + 3];
+        assert!(
+            (found - expected).abs() < 0.03,
+            "{joint}: {found} {expected}"
+        );
+    }
+    assert!((turn[PITCH] - 1.0).abs() < 1e-12);
+    // The arm of each pair makes its feet rest: regressed here on the unseen jumps themselves.
+    let feet = [(0, 3), (1, 4), (0, 5), (1, 6)];
+    for (body, leg) in feet {
+        let (mut resting, mut moving) = (0.0, 0.0);
+        for segment in jumps("test", 3)
+            .iter()
+            .flat_map(|recording| &recording.segments)
+        {
+            let crouch = (0..segment.len()).take_while(|&sample| segment.feet[sample] == [true; 4]);
+            let samples: Vec<DVector<f64>> = crouch
+                .map(|sample| segment.x.column(sample).into_owned())
+                .collect();
+            let values = |of: &DVector<f64>| -> Vec<f64> {
+                let all: Vec<f64> = samples.iter().map(|x| of.dot(x)).collect();
+                let mean = all.iter().sum::<f64>() / all.len() as f64;
+                all.iter().map(|value| value - mean).collect()
+            };
+            let (place, turned) = (values(&(row(leg) + row(body))), values(&turn));
+            let product: f64 = place.iter().zip(&turned).map(|(a, b)| a * b).sum();
+            let arm = -product / turned.iter().map(|b| b * b).sum::<f64>();
+            let left = place
+                .iter()
+                .zip(&turned)
+                .map(|(a, b)| (a + arm * b).powi(2));
+            resting += left.sum::<f64>();
+            moving += values(&row(body))
+                .iter()
+                .map(|value| value * value)
+                .sum::<f64>();
+        }
+        assert!(resting < 0.1 * moving, "{leg}: {resting} {moving}");
+    }
+}
+
+#[test]
+fn equations_of_the_whole_body_obey_what_is_known() {
+    let model = &*WHOLE_BODY;
+    let texts: Vec<&str> = model
+        .library()
+        .terms()
+        .iter()
+        .map(|term| &term.text[..])
+        .collect();
+    assert!(texts.ends_with(&["z2*u1", "z2*u2", "z2*u3"]), "{texts:?}");
+    let term = |name: &str| texts.iter().position(|text| *text == name).expect("a term");
+    let [contact, flight] = [0, 1].map(|phase| &model.phases()[phase].xi);
+    // Nothing turns the body in flight; its legs go by their own inputs.
+    assert_eq!(flight.column(2).amax(), 0.0);
+    for (index, text) in texts.iter().enumerate() {
+        let own = *text == "1" || ["u4", "u5", "u6", "u7"].contains(text);
+        for leg in 3..7 {
+            assert_eq!(flight[(index, leg)] != 0.0, own, "{text} of z{leg}");
+            assert!(
+                !text.contains('*') || contact[(index, leg)] == 0.0,
+                "{text} of z{leg}"
+            );
+        }
+        // On the ground it turns by velocities, force and moment, wherever it is.
+        let moves = text.starts_with("dz")
+            || text.contains("u1")
+            || text.contains("u2")
+            || text.contains("u3");
+        assert_eq!(contact[(index, 2)] != 0.0, *text == "1" || moves, "{text}");
+    }
+    assert!(
+        contact[(term("u3"), 2)] > 0.0,
+        "a moment turns the body its way"
+    );
+    // Asked for, the terms are those asked for.
+    let mut options = TrainOptions::new("affine", 7);
+    options.library = Some(romc::model::LibraryChoice::Standard(romc::train::AFFINE));
+    let affine = train_with(&jumps("train", 4), &jumps("validation", 1), &options).expect("trains");
+    assert_eq!(affine.model.library().terms().len(), 1 + 3 * 7);
+    assert_eq!(weights_beyond(&affine.model), 0.0);
+}
+
+/// Largest weight of a coordinate out of the plane in the momentum rows.
+fn weights_beyond(model: &ReducedModel) -> f64 {
+    let weights = model
+        .encoder_map()
+        .expect("trained")
+        .as_affine()
+        .expect("linear")
+        .weights()
+        .clone();
+    let beyond = [JOINT_DIM + 1, JOINT_DIM + 3, STATE_DIM - 1];
+    weights.select_columns(&beyond).amax()
+}
