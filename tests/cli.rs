@@ -1036,6 +1036,25 @@ fn simulate_writes_one_row_a_sample_without_nan() {
     let value = json(&["simulate", MODEL, JUMP, "--output", &table]);
     assert_eq!(value["rollouts"]["segments"], 1);
     assert_eq!(value["rollouts"]["full"]["diverged"], 0);
+    let flights = &value["rollouts"]["horizons"][3];
+    assert_eq!(
+        (&flights["rollouts"], &flights["diverged"]),
+        (&1.into(), &0.into())
+    );
+    let pitch = &flights["coordinates"]["body.pitch"];
+    assert!(
+        pitch["rms"].as_f64() > pitch["constant_velocity"].as_f64(),
+        "{pitch}"
+    );
+    let long = romc(&["simulate", MODEL, JUMP, "--verbose"]);
+    let long = text(&long.stdout);
+    let row = long
+        .lines()
+        .find(|line| line.contains("touchdown  body.pitch"));
+    assert!(
+        row.is_some_and(|row| row.ends_with("constant velocity, at rest")),
+        "{long}"
+    );
     let rows = fs::read_to_string(&table).expect("a table");
     let recording = romc::recording::read(Path::new(JUMP)).expect("a recording");
     assert_eq!(rows.lines().count(), 1 + recording.sample_count());

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::DVector;
-use romc::evaluate::{CoordinateSums, PointwiseSums};
+use romc::evaluate::{Assessment, CoordinateSums, PointwiseSums};
 use romc::lower::CompiledModel;
 use romc::sim::{LatentSegment, Restart, rollout};
 use romc::{artifact, recording};
@@ -88,4 +88,58 @@ fn whole_rollouts_of_shipped_models_stay_finite_on_every_test_jump() {
             }
         }
     }
+}
+
+/// Errors of the robots that need no model, over 0.2 s and at the touchdown, computed here from the recording alone; and a
+/// model without gravity in flight, whose error at the touchdown is that of its fall.
+#[test]
+fn horizons_are_those_of_the_recording() {
+    let model = artifact::read(Path::new(MODEL)).expect("shipped");
+    let recordings = [recording::read(Path::new(JUMP)).expect("shipped")];
+    let segment = &recordings[0].segments[0];
+    let assessment = Assessment::over(&model, &recordings, 0.1).expect("of its robot");
+    let names: Vec<&str> = assessment.horizons.iter().map(|of| &of.name[..]).collect();
+    assert_eq!(names, ["0.1 s", "0.2 s", "0.3 s", "take-off to touchdown"]);
+    assert_eq!(
+        assessment.horizons[0].names(),
+        ["model", "constant velocity", "at rest"]
+    );
+    let rms = |horizon: usize, predictor: usize, coordinate: usize| {
+        let fit = assessment.horizons[horizon].fit(predictor, &[coordinate]);
+        fit.expect("samples").rms
+    };
+    let [mut constant, mut rest] = [0.0; 2];
+    for sample in 0..segment.len() {
+        let start = sample - sample % 100; // 0.2 s at 500 Hz
+        let (from, to) = (segment.x.column(start), segment.x.column(sample));
+        let moved = to[14] - from[14];
+        let elapsed_s = segment.time_s[sample] - segment.time_s[start];
+        rest += moved * moved;
+        constant += (moved - elapsed_s * segment.dx[(14, start)]).powi(2);
+    }
+    let count = segment.len() as f64;
+    assert!((rms(1, 1, 14) - (constant / count).sqrt()).abs() < 1e-12);
+    assert!((rms(1, 2, 14) - (rest / count).sqrt()).abs() < 1e-12);
+
+    let in_air = |sample: &usize| !segment.feet[*sample].contains(&true);
+    // Feet that lose the ground for a few samples do not fly.
+    let flies = |sample: &usize| (*sample..*sample + 50).all(|later| in_air(&later));
+    let take_off = (0..segment.len() - 50).find(flies).expect("a flight");
+    let touchdown = (take_off..segment.len())
+        .find(|sample| !in_air(sample))
+        .expect("a landing");
+    let moved = segment.x[(16, touchdown)] - segment.x[(16, take_off)];
+    assert!((rms(3, 2, 16) - moved.abs()).abs() < 1e-12);
+    // The shipped model falls as the robot does; without gravity it misses the ground by its fall.
+    assert!(rms(3, 0, 14) < 5e-3, "{}", rms(3, 0, 14));
+    let mut file: serde_json::Value =
+        serde_json::from_str(&artifact::to_text(&model)).expect("a model file");
+    file["phases"][1]["xi"][0][1] = 0.0.into();
+    let text = file.to_string();
+    let afloat = artifact::read_from_bytes("afloat.json", text.as_bytes()).expect("a model");
+    let afloat = Assessment::over(&afloat, &recordings, 0.1).expect("of its robot");
+    let missed = afloat.horizons[3].fit(0, &[14]).expect("a flight").rms;
+    let elapsed_s = segment.time_s[touchdown] - segment.time_s[take_off];
+    let fall = 0.5 * 9.81 * elapsed_s * elapsed_s;
+    assert!((missed - fall).abs() < 0.02 * fall, "{missed} {fall}");
 }

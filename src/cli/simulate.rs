@@ -5,7 +5,8 @@ use nalgebra::DVector;
 use super::*;
 use crate::evaluate::{Assessment, verdict_by_default};
 use crate::report::{
-    assessment_json, baseline_table, coordinate_table, dynamics_table, phase_table, verdict_lines,
+    assessment_json, baseline_table, coordinate_table, dynamics_table, horizon_table, phase_table,
+    verdict_lines,
 };
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
@@ -28,7 +29,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         arguments.model.display(),
         counted(assessment.runs.len(), "segment"),
         counted(recordings.len(), "recording"),
-        metrics_text(&model, &assessment),
+        metrics_text(&model, &assessment, arguments.verbose),
         verdict_lines(&verdict)
     );
     text += &lines("note: ", &unmeasured);
@@ -47,7 +48,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     Ok(Answer::new(text, json).failed_if(verdict.fails_predictions()))
 }
 
-fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
+fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>, is_verbose: bool) -> String {
     let mut text = format!("{}\n", coordinate_table(model, assessment));
     let sums = [&assessment.full, &assessment.restarted].into_iter();
     let kinds = ["full", "restarted"].into_iter().zip(sums);
@@ -55,6 +56,12 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
         let (diverged, all) = (sums.diverged, sums.windows);
         let words = "rollouts diverged; the table covers them up to there";
         text += &format!("{diverged} of {all} {kind} {words}\n\n");
+    }
+    if is_verbose {
+        text += &format!(
+            "root mean square errors by horizon, at the touchdown of flights\n\n{}\n",
+            horizon_table(assessment)
+        );
     }
     text += &format!(
         "root mean square by phase, restarted every {} s\n\n{}\n{}\n",

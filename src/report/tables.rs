@@ -4,7 +4,7 @@ use super::introduction::headline;
 use super::jump::modelled;
 use super::*;
 use crate::evaluate::{
-    AslipSums, Baseline, ByContact, ControlMetrics, FitSums, Invariance, LinearisedPhase,
+    AslipSums, Baseline, ByContact, ControlMetrics, FitSums, Horizon, Invariance, LinearisedPhase,
     PredictionError, Run,
 };
 use crate::plan::{self, Plan};
@@ -89,6 +89,74 @@ pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
         column(baseline.name, sums.map(template_rms));
     }
     table
+}
+
+/// Rows of a robot's body and of its joints by kind; every coordinate for itself of other states.
+fn groups(names: &[String]) -> Vec<(String, Vec<usize>)> {
+    let of = |is_one: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        (0..names.len()).filter(|&i| is_one(&names[i])).collect()
+    };
+    if names != Robot::state_names() {
+        return names.iter().cloned().zip((0..).map(|i| vec![i])).collect();
+    }
+    let body = ["body.x", "body.z", "body.pitch"].map(|name| (name, of(&|other| other == name)));
+    let joints = [("abductions", ".hx"), ("flexions", ".hy"), ("knees", ".kn")];
+    let joints = joints.map(|(name, kind)| (name, of(&|other| other.ends_with(kind))));
+    let all = body.into_iter().chain(joints);
+    all.map(|(name, rows)| (name.to_owned(), rows)).collect()
+}
+
+pub(crate) fn horizon_table(assessment: &Assessment<'_>) -> Table {
+    let groups = groups(&assessment.names);
+    let met = assessment.horizons.iter();
+    let met = met.filter(|horizon| horizon.predictors[0].1.windows > 0);
+    let rows = met.flat_map(|horizon| {
+        let rows = groups.iter();
+        rows.map(move |(name, rows)| (horizon, name, rows))
+    });
+    let rms = |horizon: &Horizon, predictor, rows: &[usize]| rms(horizon.fit(predictor, rows));
+    let mut table = Table::of(rows)
+        .column("horizon", "", |(horizon, ..)| &horizon.name)
+        .column("coordinate", "", |(_, name, _)| *name)
+        .column("unit", "", |(.., rows)| &assessment.units[rows[0]])
+        .column("R^2", "", |(horizon, _, rows)| r2(horizon.fit(0, rows)));
+    for (predictor, name) in assessment.horizons[0].names().into_iter().enumerate() {
+        table = table.column(name, "", |(horizon, _, rows)| rms(horizon, predictor, rows));
+    }
+    table
+        .column("worse than", "", |(horizon, _, rows)| {
+            let [own, others @ ..] = [0, 1, 2].map(|predictor| rms(horizon, predictor, rows));
+            let names = horizon.names();
+            let better = names[1..]
+                .iter()
+                .zip(others)
+                .filter(|(_, other)| *other < own);
+            let better: Vec<&str> = better.map(|(name, _)| *name).collect();
+            (!better.is_empty()).then(|| better.join(", "))
+        })
+        .table()
+}
+
+fn horizon_json(of: &Assessment<'_>, horizon: &Horizon) -> Value {
+    let coordinates = of.names.iter().zip(&of.units).enumerate();
+    let coordinates = coordinates.map(|(i, (name, unit))| {
+        let [own, constant, rest] = [0, 1, 2].map(|predictor| horizon.fit(predictor, &[i]));
+        let value = json!({
+            "unit": unit,
+            "rms": rms(own),
+            "r2": own.and_then(|fit| fit.r2),
+            "constant_velocity": rms(constant),
+            "at_rest": rms(rest),
+        });
+        (name.clone(), value)
+    });
+    let own = &horizon.predictors[0].1;
+    json!({
+        "name": horizon.name,
+        "rollouts": own.windows,
+        "diverged": own.diverged,
+        "coordinates": coordinates.collect::<Map<_, _>>(),
+    })
 }
 
 pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
@@ -258,6 +326,9 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
         "restart_every_s": assessment.restart_every_s,
         "full": rollouts_json(model, assessment, &assessment.full),
         "restarted": rollouts_json(model, assessment, &assessment.restarted),
+        "horizons": (assessment.horizons.iter())
+            .map(|horizon| horizon_json(assessment, horizon))
+            .collect::<Vec<_>>(),
         "acceleration_r2": by_phase(model, |index| {
             let fit = assessment.pointwise.acceleration[index].fit();
             json!(fit.and_then(|fit| fit.r2))

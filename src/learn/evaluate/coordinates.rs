@@ -127,13 +127,17 @@ impl CoordinateSums {
         self.windows += rollout.windows.len();
     }
 
-    fn add(&mut self, segment: &Segment, sample: usize, phase: usize, x: &DVector<f64>) {
+    pub(super) fn add(&mut self, segment: &Segment, sample: usize, phase: usize, x: &DVector<f64>) {
         let sums = self.sums.iter_mut().zip(&mut self.by_phase[phase]);
         let recorded = segment.x.column(sample);
         for (((sums, of_phase), &y), &y_hat) in sums.zip(recorded.iter()).zip(x) {
             sums.add(y, y_hat);
             of_phase.add(y, y_hat);
         }
+    }
+
+    pub(super) fn of(&self, coordinate: usize) -> FitSums {
+        self.sums[coordinate]
     }
 
     pub fn fits(&self) -> Vec<Option<Fit>> {

@@ -15,6 +15,7 @@ mod coordinates;
 #[cfg(test)]
 #[path = "../../../tests/evaluate/figures.rs"]
 mod figures;
+mod horizons;
 mod invariance;
 mod prediction;
 mod round_trip;
@@ -28,6 +29,7 @@ pub use coordinates::{
     ByContact, Comparison, CoordinateSums, Fit, FitSums, LAMBDA, PointwiseSums, combined_loss,
     is_plausible,
 };
+pub use horizons::Horizon;
 pub use invariance::Invariance;
 pub use prediction::{LinearisedPhase, PredictionError, eigenvalues};
 pub(crate) use prediction::{linearise_phases, state_matrix};

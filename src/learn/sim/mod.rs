@@ -15,4 +15,4 @@ mod rollout_tests;
 pub use rollout::{
     LatentSegment, Restart, Rollout, SimError, Window, rollout, with_input_statistics,
 };
-pub(crate) use rollout::{integrate_stretches, phase_rule, restart_windows};
+pub(crate) use rollout::{integrate_stretches, phase_rule, restart_windows, rollout_over};

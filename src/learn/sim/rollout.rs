@@ -60,6 +60,15 @@ impl Rollout {
 
 /// Rolls the model out over a segment, from its recorded latent state at each start.
 pub fn rollout(model: &CompiledModel, recorded: &LatentSegment, restart: Restart) -> Rollout {
+    rollout_over(model, recorded, restart_windows(&recorded.time_s, restart))
+}
+
+/// The same over certain ranges of samples.
+pub(crate) fn rollout_over(
+    model: &CompiledModel,
+    recorded: &LatentSegment,
+    windows: Vec<Range<usize>>,
+) -> Rollout {
     let d = model.latent_dim();
     let mut dynamics = PhaseDynamics {
         model: model.clone(),
@@ -70,8 +79,9 @@ pub fn rollout(model: &CompiledModel, recorded: &LatentSegment, restart: Restart
         partials: DMatrix::zeros(d, 3 * d),
     };
     let options = at_scale(recorded);
-    let windows = restart_windows(&recorded.time_s, restart).into_iter();
-    let windows = windows.map(|samples| roll_window(&mut dynamics, samples, &options));
+    let windows = windows
+        .into_iter()
+        .map(|samples| roll_window(&mut dynamics, samples, &options));
     Rollout {
         windows: windows.collect(),
     }

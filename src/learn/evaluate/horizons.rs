@@ -1,0 +1,96 @@
+//! Predictions of all coordinates over several horizons, beside robots that need no model: one that keeps its velocity
+//! and one that stays where it is.
+
+use std::ops::Range;
+
+use super::*;
+use crate::recording::stretches;
+use crate::sim::{restart_windows, rollout_over};
+
+/// Times between restarts, s.
+const RESTARTS_S: [f64; 3] = [0.1, 0.2, 0.3];
+
+/// Sums of one horizon.
+#[derive(Debug, Clone)]
+pub struct Horizon {
+    pub name: String,
+    /// Of the model, of a constant velocity and of a robot that stays.
+    pub predictors: [(&'static str, CoordinateSums); 3],
+    restart: Restart,
+}
+
+impl Horizon {
+    pub fn names(&self) -> [&'static str; 3] {
+        [0, 1, 2].map(|predictor| self.predictors[predictor].0)
+    }
+
+    /// The error of a predictor over some coordinates together; none without a sample.
+    pub fn fit(&self, predictor: usize, coordinates: &[usize]) -> Option<Fit> {
+        let sums = &self.predictors[predictor].1;
+        let of = coordinates.iter().map(|&coordinate| sums.of(coordinate));
+        FitSums::jointly(&of.collect::<Vec<_>>()).fit()
+    }
+
+    /// Predictions over 0.1, 0.2 and 0.3 s, of all samples between restarts; and over whole flights from the take-off,
+    /// of the sample of the touchdown.
+    pub(super) fn all(model: &ReducedModel) -> Result<Vec<Self>> {
+        let names = ["model", "constant velocity", "at rest"];
+        let sums = CoordinateSums::new(model)?;
+        let horizon = |name, restart| Self {
+            name,
+            predictors: names.map(|name| (name, sums.clone())),
+            restart,
+        };
+        let restarts = RESTARTS_S.into_iter();
+        let mut all: Vec<_> = restarts
+            .map(|time_s| horizon(format!("{time_s} s"), Restart::Every(time_s)))
+            .collect();
+        all.push(horizon("take-off to touchdown".to_owned(), Restart::Never));
+        Ok(all)
+    }
+
+    pub(super) fn add(
+        &mut self,
+        model: &ReducedModel,
+        compiled: &CompiledModel,
+        segment: &Segment,
+        latent: &LatentSegment,
+    ) -> Result<()> {
+        let is_flight = self.restart == Restart::Never;
+        let windows = match is_flight {
+            true => flights(segment),
+            false => restart_windows(&latent.time_s, self.restart),
+        };
+        let rollout = rollout_over(compiled, latent, windows);
+        let [(_, own), (_, constant), (_, rest)] = &mut self.predictors;
+        for (sample, window, column) in rollout.predictions() {
+            let Range { start, end } = window.samples;
+            if is_flight && sample + 1 < end {
+                continue;
+            }
+            let phase = latent.phase[sample];
+            let x = model.decode(&window.z.column(column).into_owned())?;
+            own.add(segment, sample, phase, &x);
+            let before = segment.x.column(start).into_owned();
+            rest.add(segment, sample, phase, &before);
+            let elapsed_s = segment.time_s[sample] - segment.time_s[start];
+            let moved = before + segment.dx.column(start) * elapsed_s;
+            constant.add(segment, sample, phase, &moved);
+        }
+        let diverged = rollout.windows.iter();
+        own.diverged += diverged.filter(|w| w.diverged_at_s.is_some()).count();
+        own.windows += rollout.windows.len();
+        Ok(())
+    }
+}
+
+/// Samples from each take-off to the touchdown after it, both counted.
+fn flights(segment: &Segment) -> Vec<Range<usize>> {
+    let in_flight = |sample: usize| !segment.feet[sample].contains(&true);
+    let all = stretches(0..segment.len(), |a, b| in_flight(a) == in_flight(b)).into_iter();
+    all.filter(|stretch| in_flight(stretch.start))
+        .filter(|stretch| stretch.start > 0 && stretch.end < segment.len())
+        .filter(|stretch| stretch.len() >= crate::recording::CHATTER_SAMPLES)
+        .map(|stretch| stretch.start..stretch.end + 1)
+        .collect()
+}
