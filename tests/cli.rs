@@ -1036,7 +1036,9 @@ fn simulate_writes_one_row_a_sample_without_nan() {
     let value = json(&["simulate", MODEL, JUMP, "--output", &table]);
     assert_eq!(value["rollouts"]["segments"], 1);
     assert_eq!(value["rollouts"]["full"]["diverged"], 0);
-    let flights = &value["rollouts"]["horizons"][3];
+    assert!(value["horizons"].is_null());
+    let value = json(&["simulate", MODEL, JUMP, "--verbose"]);
+    let flights = &value["horizons"][3];
     assert_eq!(
         (&flights["rollouts"], &flights["diverged"]),
         (&1.into(), &0.into())

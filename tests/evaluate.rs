@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::DVector;
-use romc::evaluate::{Assessment, CoordinateSums, PointwiseSums};
+use romc::evaluate::{Assessment, CoordinateSums, Horizon, PointwiseSums};
 use romc::lower::CompiledModel;
 use romc::sim::{LatentSegment, Restart, rollout};
 use romc::{artifact, recording};
@@ -97,15 +97,19 @@ fn horizons_are_those_of_the_recording() {
     let model = artifact::read(Path::new(MODEL)).expect("shipped");
     let recordings = [recording::read(Path::new(JUMP)).expect("shipped")];
     let segment = &recordings[0].segments[0];
-    let assessment = Assessment::over(&model, &recordings, 0.1).expect("of its robot");
-    let names: Vec<&str> = assessment.horizons.iter().map(|of| &of.name[..]).collect();
+    let horizons = |model| {
+        let assessment = Assessment::over(model, &recordings, 0.1).expect("of its robot");
+        Horizon::all(model, &assessment).expect("the same")
+    };
+    let own = horizons(&model);
+    let names: Vec<&str> = own.iter().map(|of| &of.name[..]).collect();
     assert_eq!(names, ["0.1 s", "0.2 s", "0.3 s", "take-off to touchdown"]);
     assert_eq!(
-        assessment.horizons[0].names(),
+        own[0].predictors.each_ref().map(|(name, _)| *name),
         ["model", "constant velocity", "at rest"]
     );
     let rms = |horizon: usize, predictor: usize, coordinate: usize| {
-        let fit = assessment.horizons[horizon].fit(predictor, &[coordinate]);
+        let fit = own[horizon].fit(predictor, &[coordinate]);
         fit.expect("samples").rms
     };
     let [mut constant, mut rest] = [0.0; 2];
@@ -137,8 +141,7 @@ fn horizons_are_those_of_the_recording() {
     file["phases"][1]["xi"][0][1] = 0.0.into();
     let text = file.to_string();
     let afloat = artifact::read_from_bytes("afloat.json", text.as_bytes()).expect("a model");
-    let afloat = Assessment::over(&afloat, &recordings, 0.1).expect("of its robot");
-    let missed = afloat.horizons[3].fit(0, &[14]).expect("a flight").rms;
+    let missed = horizons(&afloat)[3].fit(0, &[14]).expect("a flight").rms;
     let elapsed_s = segment.time_s[touchdown] - segment.time_s[take_off];
     let fall = 0.5 * 9.81 * elapsed_s * elapsed_s;
     assert!((missed - fall).abs() < 0.02 * fall, "{missed} {fall}");

@@ -3,10 +3,10 @@
 use nalgebra::DVector;
 
 use super::*;
-use crate::evaluate::{Assessment, verdict_by_default};
+use crate::evaluate::{Assessment, Horizon, verdict_by_default};
 use crate::report::{
-    assessment_json, baseline_table, coordinate_table, dynamics_table, horizon_table, phase_table,
-    verdict_lines,
+    assessment_json, baseline_table, coordinate_table, dynamics_table, horizon_json, horizon_table,
+    phase_table, verdict_lines,
 };
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
@@ -19,6 +19,10 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     note_late_restarts(&recordings, arguments.restart_every);
     let progress = spinner("simulating");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
+    let horizons = match arguments.verbose {
+        true => Horizon::all(&model, &assessment)?,
+        false => Vec::new(),
+    };
     progress.set_message("judging");
     let (verdict, unmeasured) = verdict_by_default(&model, &recordings, &assessment);
     progress.finish_and_clear();
@@ -29,7 +33,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         arguments.model.display(),
         counted(assessment.runs.len(), "segment"),
         counted(recordings.len(), "recording"),
-        metrics_text(&model, &assessment, arguments.verbose),
+        metrics_text(&model, &assessment, &horizons),
         verdict_lines(&verdict)
     );
     text += &lines("note: ", &unmeasured);
@@ -38,17 +42,21 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
         write_file(path, table.csv().as_bytes(), arguments.force)?;
         let _ = writeln!(text, "trajectories: {}", path.display());
     }
-    let json = json!({
+    let mut json = json!({
         "model": arguments.model.display().to_string(),
         "rollouts": assessment_json(&model, &assessment),
         "verdict": verdict,
         "unmeasured": unmeasured,
         "output": shown(&arguments.output),
     });
+    if arguments.verbose {
+        let horizons = horizons.iter();
+        json["horizons"] = horizons.map(|of| horizon_json(&assessment, of)).collect();
+    }
     Ok(Answer::new(text, json).failed_if(verdict.fails_predictions()))
 }
 
-fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>, is_verbose: bool) -> String {
+fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>, horizons: &[Horizon]) -> String {
     let mut text = format!("{}\n", coordinate_table(model, assessment));
     let sums = [&assessment.full, &assessment.restarted].into_iter();
     let kinds = ["full", "restarted"].into_iter().zip(sums);
@@ -57,11 +65,18 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>, is_verbose: b
         let words = "rollouts diverged; the table covers them up to there";
         text += &format!("{diverged} of {all} {kind} {words}\n\n");
     }
-    if is_verbose {
+    if !horizons.is_empty() {
         text += &format!(
-            "root mean square errors by horizon, at the touchdown of flights\n\n{}\n",
-            horizon_table(assessment)
+            "root mean square errors by horizon, of flights at the touchdown\n\n{}\n",
+            horizon_table(assessment, horizons)
         );
+        for horizon in horizons {
+            let own = &horizon.predictors[0].1;
+            if own.diverged > 0 {
+                let (diverged, all, name) = (own.diverged, own.windows, &horizon.name);
+                text += &format!("{diverged} of {all} rollouts diverged: {name}\n\n");
+            }
+        }
     }
     text += &format!(
         "root mean square by phase, restarted every {} s\n\n{}\n{}\n",

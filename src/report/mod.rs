@@ -23,7 +23,8 @@ pub(crate) use page::{PageOptions, page};
 pub(crate) use plan::{plan_figures, reach_figure};
 pub(crate) use tables::{
     NamedRun, baseline_table, body_rms, control_table, coordinate_table, dynamics_table,
-    failed_runs, failures, horizon_table, invariance_table, phase_table, run_table, verdict_lines,
+    failed_runs, failures, horizon_json, horizon_table, invariance_table, phase_table, run_table,
+    verdict_lines,
 };
 pub use tables::{assessment_json, plan_json};
 

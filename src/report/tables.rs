@@ -99,17 +99,19 @@ fn groups(names: &[String]) -> Vec<(String, Vec<usize>)> {
     if names != Robot::state_names() {
         return names.iter().cloned().zip((0..).map(|i| vec![i])).collect();
     }
-    let body = ["body.x", "body.z", "body.pitch"].map(|name| (name, of(&|other| other == name)));
+    let body = names[JOINT_DIM..].iter();
+    let body = body.map(|name| (&name[..], of(&|other| other == name)));
     let joints = [("abductions", ".hx"), ("flexions", ".hy"), ("knees", ".kn")];
     let joints = joints.map(|(name, kind)| (name, of(&|other| other.ends_with(kind))));
-    let all = body.into_iter().chain(joints);
+    let all = body.chain(joints);
     all.map(|(name, rows)| (name.to_owned(), rows)).collect()
 }
 
-pub(crate) fn horizon_table(assessment: &Assessment<'_>) -> Table {
+pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -> Table {
     let groups = groups(&assessment.names);
-    let met = assessment.horizons.iter();
-    let met = met.filter(|horizon| horizon.predictors[0].1.windows > 0);
+    let met = horizons
+        .iter()
+        .filter(|horizon| horizon.predictors[0].1.windows > 0);
     let rows = met.flat_map(|horizon| {
         let rows = groups.iter();
         rows.map(move |(name, rows)| (horizon, name, rows))
@@ -120,24 +122,20 @@ pub(crate) fn horizon_table(assessment: &Assessment<'_>) -> Table {
         .column("coordinate", "", |(_, name, _)| *name)
         .column("unit", "", |(.., rows)| &assessment.units[rows[0]])
         .column("R^2", "", |(horizon, _, rows)| r2(horizon.fit(0, rows)));
-    for (predictor, name) in assessment.horizons[0].names().into_iter().enumerate() {
+    for (predictor, (name, _)) in horizons[0].predictors.iter().enumerate() {
         table = table.column(name, "", |(horizon, _, rows)| rms(horizon, predictor, rows));
     }
     table
         .column("worse than", "", |(horizon, _, rows)| {
-            let [own, others @ ..] = [0, 1, 2].map(|predictor| rms(horizon, predictor, rows));
-            let names = horizon.names();
-            let better = names[1..]
-                .iter()
-                .zip(others)
-                .filter(|(_, other)| *other < own);
-            let better: Vec<&str> = better.map(|(name, _)| *name).collect();
+            let others = horizon.predictors.iter().enumerate().skip(1);
+            let better = others.filter(|(i, _)| rms(horizon, *i, rows) < rms(horizon, 0, rows));
+            let better: Vec<&str> = better.map(|(_, (name, _))| *name).collect();
             (!better.is_empty()).then(|| better.join(", "))
         })
         .table()
 }
 
-fn horizon_json(of: &Assessment<'_>, horizon: &Horizon) -> Value {
+pub(crate) fn horizon_json(of: &Assessment<'_>, horizon: &Horizon) -> Value {
     let coordinates = of.names.iter().zip(&of.units).enumerate();
     let coordinates = coordinates.map(|(i, (name, unit))| {
         let [own, constant, rest] = [0, 1, 2].map(|predictor| horizon.fit(predictor, &[i]));
@@ -326,9 +324,6 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
         "restart_every_s": assessment.restart_every_s,
         "full": rollouts_json(model, assessment, &assessment.full),
         "restarted": rollouts_json(model, assessment, &assessment.restarted),
-        "horizons": (assessment.horizons.iter())
-            .map(|horizon| horizon_json(assessment, horizon))
-            .collect::<Vec<_>>(),
         "acceleration_r2": by_phase(model, |index| {
             let fit = assessment.pointwise.acceleration[index].fit();
             json!(fit.and_then(|fit| fit.r2))

@@ -156,10 +156,11 @@ fn equations_of_the_whole_body_obey_what_is_known() {
     for (index, text) in texts.iter().enumerate() {
         let own = *text == "1" || ["u4", "u5", "u6", "u7"].contains(text);
         for leg in 3..7 {
-            assert_eq!(flight[(index, leg)] != 0.0, own, "{text} of z{leg}");
+            assert_eq!(flight[(index, leg)] != 0.0, own, "{text} of z{}", leg + 1);
             assert!(
                 !text.contains('*') || contact[(index, leg)] == 0.0,
-                "{text} of z{leg}"
+                "{text} of z{}",
+                leg + 1
             );
         }
         // On the ground it turns by velocities, force and moment, wherever it is.
@@ -181,7 +182,7 @@ fn equations_of_the_whole_body_obey_what_is_known() {
     assert_eq!(weights_beyond(&affine.model), 0.0);
 }
 
-/// Largest weight of a coordinate out of the plane in the momentum rows.
+/// Largest weight of a coordinate out of the plane.
 fn weights_beyond(model: &ReducedModel) -> f64 {
     let weights = model
         .encoder_map()

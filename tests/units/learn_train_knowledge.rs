@@ -58,4 +58,8 @@ fn equations_of_a_stance_need_their_terms() {
     assert_eq!(Standing::of(row, 4, &features(&terms)), None);
     let all = [&terms[..], &["z3".to_owned()]].concat();
     assert!(Standing::of(row, 4, &features(&all)).is_some());
+    // Forwards the floor is the same everywhere, and no position counts.
+    let speeds: Vec<String> = ["dz1", "dz3", "dz5"].map(str::to_owned).to_vec();
+    let row = LegRow { body: 0, ..row };
+    assert!(Standing::of(row, 4, &features(&speeds)).is_some());
 }

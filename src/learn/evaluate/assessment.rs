@@ -25,7 +25,6 @@ pub struct Assessment<'a> {
     pub restarted: CoordinateSums,
     /// Residuals of a robot that keeps the velocity it has at the start, over whole segments and restarted.
     pub constant_velocity: [CoordinateSums; 2],
-    pub horizons: Vec<Horizon>,
     pub pointwise: PointwiseSums,
     pub baselines: Vec<Baseline>,
     pub linearised: Vec<Option<LinearisedPhase>>,
@@ -59,7 +58,6 @@ impl<'a> Assessment<'a> {
             restarted: full.clone(),
             constant_velocity: [full.clone(), full.clone()],
             full,
-            horizons: Horizon::all(model)?,
             pointwise: PointwiseSums::new(model),
             baselines: Baseline::all(&rule, &segments)?,
             linearised: Vec::new(),
@@ -77,9 +75,6 @@ impl<'a> Assessment<'a> {
             let constant = assessment.constant_velocity.iter_mut();
             for (sums, rollout) in constant.zip([&full, &restarted]) {
                 sums.add_constant_velocity(segment, &latent, rollout);
-            }
-            for horizon in &mut assessment.horizons {
-                horizon.add(model, &compiled, segment, &latent)?;
             }
             assessment.pointwise.add(model, segment, &latent)?;
             assessment.lift.add(model, segment)?;

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::*;
-use crate::recording::stretches;
+use crate::recording::{CHATTER_SAMPLES, PhaseRule, Stance};
 use crate::sim::{restart_windows, rollout_over};
 
 /// Times between restarts, s.
@@ -16,14 +16,9 @@ pub struct Horizon {
     pub name: String,
     /// Of the model, of a constant velocity and of a robot that stays.
     pub predictors: [(&'static str, CoordinateSums); 3],
-    restart: Restart,
 }
 
 impl Horizon {
-    pub fn names(&self) -> [&'static str; 3] {
-        [0, 1, 2].map(|predictor| self.predictors[predictor].0)
-    }
-
     /// The error of a predictor over some coordinates together; none without a sample.
     pub fn fit(&self, predictor: usize, coordinates: &[usize]) -> Option<Fit> {
         let sums = &self.predictors[predictor].1;
@@ -33,33 +28,40 @@ impl Horizon {
 
     /// Predictions over 0.1, 0.2 and 0.3 s, of all samples between restarts; and over whole flights from the take-off,
     /// of the sample of the touchdown.
-    pub(super) fn all(model: &ReducedModel) -> Result<Vec<Self>> {
+    pub fn all(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Vec<Self>> {
         let names = ["model", "constant velocity", "at rest"];
+        let compiled = CompiledModel::new(model)?;
         let sums = CoordinateSums::new(model)?;
-        let horizon = |name, restart| Self {
-            name,
-            predictors: names.map(|name| (name, sums.clone())),
-            restart,
-        };
-        let restarts = RESTARTS_S.into_iter();
-        let mut all: Vec<_> = restarts
-            .map(|time_s| horizon(format!("{time_s} s"), Restart::Every(time_s)))
-            .collect();
-        all.push(horizon("take-off to touchdown".to_owned(), Restart::Never));
-        Ok(all)
+        let restarts = RESTARTS_S.map(|time_s| (format!("{time_s} s"), Restart::Every(time_s)));
+        let flights = ("take-off to touchdown".to_owned(), Restart::Never);
+        let all = restarts.into_iter().chain([flights]);
+        all.map(|(name, restart)| {
+            let mut horizon = Self {
+                name,
+                predictors: names.map(|name| (name, sums.clone())),
+            };
+            for SegmentRun {
+                segment, latent, ..
+            } in &assessment.runs
+            {
+                horizon.add(model, &compiled, (segment, latent), restart)?;
+            }
+            Ok(horizon)
+        })
+        .collect()
     }
 
-    pub(super) fn add(
+    fn add(
         &mut self,
         model: &ReducedModel,
         compiled: &CompiledModel,
-        segment: &Segment,
-        latent: &LatentSegment,
+        (segment, latent): (&Segment, &LatentSegment),
+        restart: Restart,
     ) -> Result<()> {
-        let is_flight = self.restart == Restart::Never;
+        let is_flight = restart == Restart::Never;
         let windows = match is_flight {
-            true => flights(segment),
-            false => restart_windows(&latent.time_s, self.restart),
+            true => flights(segment)?,
+            false => restart_windows(&latent.time_s, restart),
         };
         let rollout = rollout_over(compiled, latent, windows);
         let [(_, own), (_, constant), (_, rest)] = &mut self.predictors;
@@ -85,12 +87,12 @@ impl Horizon {
 }
 
 /// Samples from each take-off to the touchdown after it, both counted.
-fn flights(segment: &Segment) -> Vec<Range<usize>> {
-    let in_flight = |sample: usize| !segment.feet[sample].contains(&true);
-    let all = stretches(0..segment.len(), |a, b| in_flight(a) == in_flight(b)).into_iter();
-    all.filter(|stretch| in_flight(stretch.start))
-        .filter(|stretch| stretch.start > 0 && stretch.end < segment.len())
-        .filter(|stretch| stretch.len() >= crate::recording::CHATTER_SAMPLES)
-        .map(|stretch| stretch.start..stretch.end + 1)
-        .collect()
+fn flights(segment: &Segment) -> Result<Vec<Range<usize>>> {
+    let rule = PhaseRule::two_phase().with_min_samples(CHATTER_SAMPLES);
+    let spans = rule.spans(segment)?.into_iter();
+    Ok(spans
+        .filter(|span| span.kind == Stance::Flight)
+        .filter(|span| span.range.start > 0 && span.range.end < segment.len())
+        .map(|span| span.range.start..span.range.end + 1)
+        .collect())
 }

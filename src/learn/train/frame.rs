@@ -33,19 +33,19 @@ const PAIRS: [[Leg; 2]; 2] = [
 /// Rows of an encoder `W_e` before they are chosen, in scaled units.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
-    pub held: DMatrix<f64>, // rows of every encoder, as columns, 18 x h: momentum, then legs
-    pub momentum: usize,    // how many of them are of the momentum, in the order of `MOMENTUM`
-    pub legs: Vec<LegRow>,  // of the others
-    pub free: DMatrix<f64>, // orthonormal directions that the other rows combine, 18 x k
+    pub(super) held: DMatrix<f64>, // rows of every encoder, as columns, 18 x h: momentum, then legs
+    pub(super) momentum: usize, // how many of them are of the momentum, in the order of `MOMENTUM`
+    pub(super) legs: Vec<LegRow>, // of the others
+    pub(super) free: DMatrix<f64>, // orthonormal directions that the other rows combine, 18 x k
 }
 
 /// A row `rho` of a pair of legs. With the momentum rows `b` (forwards or upwards) and `t` (turn) the sum
 /// `rho + b + arm t` is where the pair's feet are: it rests while they stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LegRow {
-    pub body: usize, // the momentum row that it belongs to
-    pub arm: f64,
-    pub rest: f64, // mean of the feet's place while they stand, less the mean of all samples
+    pub(super) body: usize, // the momentum row that it belongs to
+    pub(super) arm: f64,
+    pub(super) rest: f64, // mean of the feet's place while they stand, less the mean of all samples
 }
 
 impl Frame {
@@ -59,8 +59,9 @@ impl Frame {
     }
 
     /// With [`Coordinates::Named`] and two or more latent coordinates, the first two rows are the centre of mass. With
-    /// seven or more the third is the turn about it, and the next four are the places of the feet from there. The others combine sums of `active` coordinates that a mirror leaves alone: neither `y`, roll and
-    /// yaw, nor left and right; nor pitch where a row has it.
+    /// seven or more the third is the turn about it, and the next four are the places of the feet from there. The others
+    /// combine sums of `active` coordinates that a mirror leaves alone: neither `y`, roll and yaw, nor left and right;
+    /// nor pitch where a row has it.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],
@@ -104,9 +105,12 @@ impl Frame {
 
     /// The `latent_dim - h` free directions nearest to the space that the columns of `basis` span.
     pub(super) fn nearest(&self, basis: &DMatrix<f64>, latent_dim: usize) -> DMatrix<f64> {
+        let count = latent_dim - self.held.ncols();
+        if count == 0 {
+            return DMatrix::zeros(STATE_DIM, 0);
+        }
         let inside = self.free.tr_mul(basis).svd(true, false);
         let left = inside.u.expect("invariant: asked for");
-        let count = latent_dim - self.held.ncols();
         let mut order: Vec<usize> = (0..left.ncols()).collect();
         order.sort_by(|&a, &b| inside.singular_values[b].total_cmp(&inside.singular_values[a]));
         &self.free * left.select_columns(&order[..count])

@@ -9,6 +9,7 @@ use super::features::Features;
 use super::frame::{Frame, LegRow, TURN};
 use crate::robot::{BODY_Z, FeetRule, GRAVITY_M_S2};
 
+const HEIGHT: usize = 1; // the momentum row upwards
 const STANDING_DAMPING_PER_S: f64 = 40.0; // of feet that slip
 const STANDING_STIFFNESS_PER_S2: f64 = 500.0; // of the ground
 
@@ -29,42 +30,44 @@ pub(super) struct Standing {
     column: usize,
     row: LegRow,
     velocities: [usize; 3], // terms of rho, b and t
-    positions: [usize; 3],
-    one: usize,
+    /// Terms of their positions, and the constant; none forwards, where the floor is the same everywhere.
+    ground: Option<([usize; 3], usize)>,
 }
 
 impl Standing {
     /// None if the library lacks one of the terms.
     fn of(row: LegRow, column: usize, features: &Features) -> Option<Self> {
         let d = features.latent_dim;
-        let [rho, b, t] = [column, row.body, TURN].map(|k| {
-            let (position, velocity) = (features.variable_term(k), features.variable_term(d + k));
-            position.zip(velocity)
-        });
-        let terms = [rho?, b?, t?];
+        let terms = |first: usize| -> Option<[usize; 3]> {
+            let [rho, b, t] = [column, row.body, TURN].map(|k| features.variable_term(first + k));
+            Some([rho?, b?, t?])
+        };
+        let ground = match row.body {
+            0 => None,
+            _ => Some((terms(0)?, features.constant_term()?)),
+        };
         Some(Self {
             column,
             row,
-            velocities: terms.map(|(_, velocity)| velocity),
-            positions: terms.map(|(position, _)| position),
-            one: features.constant_term()?,
+            velocities: terms(d)?,
+            ground,
         })
     }
 
     /// The column for feet that stand still, given those of the momentum in `xi`.
     pub(super) fn still(&self, xi: &DMatrix<f64>) -> DVector<f64> {
         let LegRow { body, arm, rest } = self.row;
+        let shares = [1.0, 1.0, arm];
         let mut still = -xi.column(body) - xi.column(TURN) * arm;
-        let stiffness = if body == 0 {
-            0.0
-        } else {
-            STANDING_STIFFNESS_PER_S2
-        };
-        for (i, share) in [1.0, 1.0, arm].into_iter().enumerate() {
-            still[self.velocities[i]] -= STANDING_DAMPING_PER_S * share;
-            still[self.positions[i]] -= stiffness * share;
+        for (velocity, share) in self.velocities.into_iter().zip(shares) {
+            still[velocity] -= STANDING_DAMPING_PER_S * share;
         }
-        still[self.one] += stiffness * rest;
+        if let Some((positions, one)) = self.ground {
+            for (position, share) in positions.into_iter().zip(shares) {
+                still[position] -= STANDING_STIFFNESS_PER_S2 * share;
+            }
+            still[one] += STANDING_STIFFNESS_PER_S2 * rest;
+        }
         still
     }
 }
@@ -84,6 +87,12 @@ impl Knowledge {
         self.standing.iter().find(|of| of.column == column)
     }
 
+    /// Whether terms that are not affine are to be chosen.
+    pub(super) fn chooses_beyond(&self, affine: &[bool]) -> bool {
+        let mut chosen = self.free.row_iter().zip(self.kept.row_iter()).zip(affine);
+        chosen.any(|((free, kept), affine)| !affine && free != kept)
+    }
+
     /// What is known of each phase in a frame that holds momentum: the centre of mass as `z1` (forwards) and `z2`
     /// (upwards), the turn about it as `z3`, then the feet's places. The floor is the same everywhere: no term depends
     /// on `z1`. Forces move a centre of mass and losses brake it, wherever it and the legs are: no term of `ddz1` and
@@ -91,7 +100,7 @@ impl Knowledge {
     ///
     /// With feet on the ground `ddz2` depends on its own force and velocity alone, and keeps its constant (gravity, less
     /// what the ground carries of the legs' weight). The turn depends on velocities, on force and moment, and on these
-    /// times the height. Feet stand still but for what the data say: the legs' equations are affine, and all their terms
+    /// times the height. Feet stand still but for what the data say: their equations are affine, and all their terms
     /// stay. In flight `ddz1 = 0`, `ddz2 = -g`, `ddz3 = 0`, no term depends on force or moment, and the legs depend on
     /// their own inputs alone.
     pub(super) fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
@@ -101,7 +110,6 @@ impl Knowledge {
             return each.map(|_| Self::nothing(p, d)).collect();
         }
         let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
-        let legs = frame.momentum..frame.momentum + frame.legs.len();
         each.map(|phase| {
             let mut knowledge = Self::nothing(p, d);
             knowledge.forbid(0..d, features, |variables| variables.contains(&0));
@@ -115,6 +123,7 @@ impl Knowledge {
                 knowledge.forbid(1..2, features, others);
                 one.into_iter()
                     .for_each(|one| knowledge.kept[(one, 1)] = true);
+                knowledge.turn(features, frame);
                 knowledge.stand(features, frame);
             }
             let inputs = (0..d).map(|k| (2 * d + k, k));
@@ -124,10 +133,6 @@ impl Knowledge {
                     knowledge.kept[(term, k)] = free;
                     knowledge.braking[(term, k)] = free && variable < 2 * d;
                 }
-            }
-            for k in (TURN..frame.momentum).chain(legs.clone()) {
-                let free = knowledge.free.column(k).into_owned();
-                knowledge.kept.set_column(k, &free);
             }
             knowledge
         })
@@ -150,23 +155,41 @@ impl Knowledge {
         }
     }
 
-    /// Of a phase with feet on the ground: the turn and the legs.
+    /// All free terms of a column stay, but for those that are neither affine nor the height times a load.
+    fn keep(&mut self, column: usize, features: &Features, loads: &Range<usize>) {
+        for (term, occurring) in features.occurring.iter().enumerate() {
+            let variables: Vec<usize> = (0..occurring.len()).filter(|&v| occurring[v]).collect();
+            let is_arm = matches!(variables[..], [HEIGHT, load] if loads.contains(&load));
+            self.kept[(term, column)] =
+                self.free[(term, column)] && (features.affine[term] || is_arm);
+        }
+    }
+
+    /// Of a phase with feet on the ground.
+    fn turn(&mut self, features: &Features, frame: &Frame) {
+        let d = features.latent_dim;
+        let loads = 2 * d..2 * d + frame.momentum;
+        for k in TURN..frame.momentum {
+            self.forbid(k..k + 1, features, |variables| {
+                let is_load = |v: &usize| loads.contains(v);
+                let is_known = |v: &usize| *v == HEIGHT || (d..2 * d).contains(v) || is_load(v);
+                let has_arm = !variables.contains(&HEIGHT) || variables.iter().any(is_load);
+                !(variables.iter().all(is_known) && has_arm)
+            });
+            self.keep(k, features, &loads);
+        }
+    }
+
+    /// Of a phase with feet on the ground: the legs, also those in the air while others stand, which are learned better so than
+    /// without.
     fn stand(&mut self, features: &Features, frame: &Frame) {
-        let (d, momentum) = (features.latent_dim, frame.momentum);
-        let is_load = |v: &usize| (2 * d..2 * d + momentum).contains(v);
-        self.forbid(TURN..momentum, features, |variables| {
-            let is_known = |v: &usize| *v == 1 || (d..2 * d).contains(v) || is_load(v);
-            let has_arm = !variables.contains(&1) || variables.iter().any(is_load);
-            !(variables.iter().all(is_known) && has_arm)
-        });
-        let columns = frame.legs.iter().zip(momentum..);
-        let standing = columns
-            .clone()
-            .map(|(&row, k)| Standing::of(row, k, features));
-        self.standing = standing.collect::<Option<_>>().unwrap_or_default();
-        for (_, k) in columns {
+        let rows = frame.legs.iter().zip(frame.momentum..);
+        let standing = rows.filter_map(|(&row, k)| Standing::of(row, k, features));
+        self.standing = standing.collect();
+        for k in self.standing.iter().map(|standing| standing.column) {
             for (term, is_affine) in features.affine.iter().enumerate() {
                 self.free[(term, k)] &= is_affine;
+                self.kept[(term, k)] = self.free[(term, k)];
             }
         }
     }
@@ -180,7 +203,7 @@ impl Knowledge {
         self.forbid(0..d, features, |variables| {
             variables.iter().any(|v| loads.contains(v))
         });
-        self.forbid(legs, features, |variables| {
+        self.forbid(legs.clone(), features, |variables| {
             variables.iter().any(|v| *v < 2 * d)
         });
         self.free.column_mut(0).fill(false);
@@ -190,6 +213,9 @@ impl Knowledge {
         }
         for k in TURN..momentum {
             self.free.column_mut(k).fill(false);
+        }
+        for k in legs {
+            self.keep(k, features, &loads);
         }
     }
 }

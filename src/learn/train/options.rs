@@ -169,7 +169,12 @@ impl TrainOptions {
             },
             regression: RegressionOptions {
                 smoothing: 11,
-                slack: 0.1,
+                // Errors of the legs, all whose terms stay, are in the score too.
+                slack: if latent_dim < WHOLE_BODY_DIM {
+                    0.1
+                } else {
+                    0.04
+                },
                 refinements: 10,
                 growth_per_s: Some(3.0),
             },

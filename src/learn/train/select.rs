@@ -179,7 +179,7 @@ impl Trial<'_> {
 type Regressions = [Vec<Regression>; WINDOWS.len()]; // of every phase, for each of the windows
 
 impl Refiner<'_> {
-    /// All combinations; where the library has terms that are not affine also those without them, and the best of these
+    /// All combinations; where there are terms to choose that are not affine also those without them, and the best of these
     /// grown by such terms: rollouts of full libraries diverge more often than not.
     fn try_all<'r>(
         &self,
@@ -187,7 +187,10 @@ impl Refiner<'_> {
         monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'r>> {
         let affine = &self.judge.features.affine;
-        let has_nonlinear = affine.contains(&false);
+        let has_nonlinear = self
+            .knowledge
+            .iter()
+            .any(|phase| phase.chooses_beyond(affine));
         // The affine terms are still to come where full libraries diverge.
         let enough =
             |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
@@ -290,7 +293,7 @@ impl Refiner<'_> {
         let xi = &mut trial.now.xi;
         let mut support = xi[phase].map(|value| value != 0.0);
         support[(row, column)] = active;
-        let tried = trial.regressions[phase].fit_column(column, &support, trial.ridge, &xi[phase]);
+        let tried = trial.regressions[phase].fit_column(column, &support, trial.ridge);
         let before = xi[phase].column(column).into_owned();
         xi[phase].set_column(column, &tried);
         let score = self.score_within(xi, limit);

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::knowledge::Knowledge;
 
 const LEAST_RIDGE: f64 = 1e-10; // on the normalised columns: far above rounding
-const STANDING_RIDGE: f64 = 1e-2; // of changes from feet that stand still
+const CHANGE_RIDGE: f64 = 1e-2; // of changes from feet that stand still
 const RECOMPUTED: usize = 64; // up to this size, supports are solved anew after an elimination, larger ones updated
 
 type Support = DMatrix<bool>; // active terms, library_dim x latent_dim
@@ -69,9 +69,9 @@ impl Regression {
                 .filter(|&i| self.theta_rms[i] > 0.0)
                 .filter(|&i| allowed[i] || self.knowledge.kept[(i, column)])
                 .collect();
-            if self.knowledge.standing(column).is_some() {
+            if let Some(standing) = self.knowledge.standing(column) {
                 for xi in &mut fits {
-                    let fitted = self.solve_near(column, &informative, ridge, xi);
+                    let fitted = self.solve_near(column, &informative, &standing.still(xi));
                     self.store(xi, column, &informative, &fitted);
                 }
                 continue;
@@ -180,16 +180,9 @@ impl Regression {
             .collect()
     }
 
-    /// A column of `xi` anew, of the terms in `support`.
-    pub(super) fn fit_column(
-        &self,
-        column: usize,
-        support: &Support,
-        ridge: f64,
-        xi: &DMatrix<f64>,
-    ) -> DVector<f64> {
+    pub(super) fn fit_column(&self, column: usize, support: &Support, ridge: f64) -> DVector<f64> {
         let rows = self.active_terms(column, support);
-        let solution = self.solve_near(column, &rows, ridge, xi);
+        let solution = self.solve(column, &rows, ridge);
         let mut xi = self.knowledge.known.clone();
         self.store(&mut xi, column, &rows, &solution);
         xi.column(column).into_owned()
@@ -247,24 +240,14 @@ impl Regression {
         self.ridged_gram(support, ridge).solve(&right)
     }
 
-    /// [`Self::solve`], of a leg that stands in this phase the least change from feet that stand still.
-    fn solve_near(
-        &self,
-        column: usize,
-        support: &[usize],
-        ridge: f64,
-        xi: &DMatrix<f64>,
-    ) -> DVector<f64> {
-        let Some(standing) = self.knowledge.standing(column) else {
-            return self.solve(column, support, ridge);
-        };
-        let still = standing.still(xi);
-        let still = support.iter().map(|&i| still[i] * self.theta_rms[i]);
-        let still = DVector::from_iterator(support.len(), still);
+    /// The least change of a column from `prior`, all whose terms stay.
+    fn solve_near(&self, column: usize, support: &[usize], prior: &DVector<f64>) -> DVector<f64> {
+        let prior = support.iter().map(|&i| prior[i] * self.theta_rms[i]);
+        let prior = DVector::from_iterator(support.len(), prior);
         let right = support.iter().map(|&i| self.correlation[(i, column)]);
         let right = DVector::from_iterator(support.len(), right)
-            - self.gram.select_rows(support).select_columns(support) * &still;
-        still + self.ridged_gram(support, STANDING_RIDGE).solve(&right)
+            - self.gram.select_rows(support).select_columns(support) * &prior;
+        prior + self.ridged_gram(support, CHANGE_RIDGE).solve(&right)
     }
 
     fn ridged_gram(&self, support: &[usize], ridge: f64) -> Cholesky<f64, Dyn> {
