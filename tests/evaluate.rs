@@ -109,8 +109,8 @@ fn horizons_are_those_of_the_recording() {
         ["model", "constant velocity", "at rest"]
     );
     let rms = |horizon: usize, predictor: usize, coordinate: usize| {
-        let fit = own[horizon].fit(predictor, &[coordinate]);
-        fit.expect("samples").rms
+        let fits = own[horizon].predictors[predictor].1.fits();
+        fits[coordinate].expect("samples").rms
     };
     let [mut constant, mut rest] = [0.0; 2];
     for sample in 0..segment.len() {
@@ -141,7 +141,9 @@ fn horizons_are_those_of_the_recording() {
     file["phases"][1]["xi"][0][1] = 0.0.into();
     let text = file.to_string();
     let afloat = artifact::read_from_bytes("afloat.json", text.as_bytes()).expect("a model");
-    let missed = horizons(&afloat)[3].fit(0, &[14]).expect("a flight").rms;
+    let missed = horizons(&afloat)[3].predictors[0].1.fits()[14]
+        .expect("a flight")
+        .rms;
     let elapsed_s = segment.time_s[touchdown] - segment.time_s[take_off];
     let fall = 0.5 * 9.81 * elapsed_s * elapsed_s;
     assert!((missed - fall).abs() < 0.02 * fall, "{missed} {fall}");

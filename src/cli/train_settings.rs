@@ -11,7 +11,7 @@ use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
 use crate::robot::Robot;
 use crate::robot_file::read_actuators;
 use crate::train::{
-    AFFINE, Coordinates, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
+    Coordinates, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
 };
 
 /// The word for actuators that stands for no file.
@@ -193,14 +193,14 @@ impl TrainSettings {
         if self.degree.is_none() && !self.trigonometric {
             return default;
         }
-        let standard = match default {
-            Some(LibraryChoice::Standard(standard)) => standard,
-            Some(LibraryChoice::Terms(_)) | None => AFFINE,
+        let (degree, trigonometric, inputs) = match default {
+            Some(LibraryChoice::Standard(of)) => (of.degree, of.trigonometric, of.inputs),
+            Some(LibraryChoice::Terms(_)) | None => (1, false, true),
         };
         Some(LibraryChoice::Standard(StandardLibrary {
-            degree: self.degree.unwrap_or(standard.degree),
-            trigonometric: self.trigonometric || standard.trigonometric,
-            inputs: standard.inputs,
+            degree: self.degree.unwrap_or(degree),
+            trigonometric: self.trigonometric || trigonometric,
+            inputs,
         }))
     }
 

@@ -116,12 +116,25 @@ pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -
         let rows = groups.iter();
         rows.map(move |(name, rows)| (horizon, name, rows))
     });
-    let rms = |horizon: &Horizon, predictor, rows: &[usize]| rms(horizon.fit(predictor, rows));
+    let fits = |horizon: &Horizon, predictor: usize, rows: &[usize]| -> Option<Vec<Fit>> {
+        let fits = horizon.predictors[predictor].1.fits();
+        rows.iter().map(|&row| fits[row]).collect()
+    };
+    let rms = |horizon: &Horizon, predictor, rows: &[usize]| {
+        let squares = fits(horizon, predictor, rows)?.into_iter();
+        let square: f64 = squares.map(|fit| fit.rms * fit.rms).sum();
+        Some((square / rows.len() as f64).sqrt())
+    };
+    let least_r2 = |(horizon, _, rows): &(&Horizon, &String, &Vec<usize>)| -> Option<String> {
+        let all = fits(horizon, 0, rows)?.into_iter().map(|fit| fit.r2);
+        let least = all.collect::<Option<Vec<_>>>()?.into_iter();
+        Some(format!("{:.3}", least.fold(f64::INFINITY, f64::min)))
+    };
     let mut table = Table::of(rows)
         .column("horizon", "", |(horizon, ..)| &horizon.name)
         .column("coordinate", "", |(_, name, _)| *name)
         .column("unit", "", |(.., rows)| &assessment.units[rows[0]])
-        .column("R^2", "", |(horizon, _, rows)| r2(horizon.fit(0, rows)));
+        .column("least R^2", "", least_r2);
     for (predictor, (name, _)) in horizons[0].predictors.iter().enumerate() {
         table = table.column(name, "", |(horizon, _, rows)| rms(horizon, predictor, rows));
     }
@@ -138,7 +151,11 @@ pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -
 pub(crate) fn horizon_json(of: &Assessment<'_>, horizon: &Horizon) -> Value {
     let coordinates = of.names.iter().zip(&of.units).enumerate();
     let coordinates = coordinates.map(|(i, (name, unit))| {
-        let [own, constant, rest] = [0, 1, 2].map(|predictor| horizon.fit(predictor, &[i]));
+        let fits = horizon
+            .predictors
+            .each_ref()
+            .map(|(_, sums)| sums.fits()[i]);
+        let [own, constant, rest] = fits;
         let value = json!({
             "unit": unit,
             "rms": rms(own),

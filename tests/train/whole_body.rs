@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use romc::artifact;
 use romc::evaluate::{CoordinateSums, Fit};
 use romc::lower::CompiledModel;
-use romc::model::ReducedModel;
+use romc::model::{LibraryChoice, ReducedModel, StandardLibrary};
 use romc::recording::Recording;
 use romc::robot::{JOINT_DIM, STATE_DIM};
 use romc::sim::{LatentSegment, Restart, rollout};
@@ -176,7 +176,11 @@ fn equations_of_the_whole_body_obey_what_is_known() {
     );
     // Asked for, the terms are those asked for.
     let mut options = TrainOptions::new("affine", 7);
-    options.library = Some(romc::model::LibraryChoice::Standard(romc::train::AFFINE));
+    options.library = Some(LibraryChoice::Standard(StandardLibrary {
+        degree: 1,
+        trigonometric: false,
+        inputs: true,
+    }));
     let affine = train_with(&jumps("train", 4), &jumps("validation", 1), &options).expect("trains");
     assert_eq!(affine.model.library().terms().len(), 1 + 3 * 7);
     assert_eq!(weights_beyond(&affine.model), 0.0);

@@ -33,6 +33,14 @@ pub struct Assessment<'a> {
     pub remarks: Vec<String>,
 }
 
+/// Sums of one horizon.
+#[derive(Debug, Clone)]
+pub struct Horizon {
+    pub name: String,
+    /// Of the model, of a constant velocity and of a robot that stays.
+    pub predictors: [(&'static str, CoordinateSums); 3],
+}
+
 impl<'a> Assessment<'a> {
     /// Simulates `model` over all segments of `recordings` and measures it.
     pub fn over(

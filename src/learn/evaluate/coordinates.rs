@@ -136,10 +136,6 @@ impl CoordinateSums {
         }
     }
 
-    pub(super) fn of(&self, coordinate: usize) -> FitSums {
-        self.sums[coordinate]
-    }
-
     pub fn fits(&self) -> Vec<Option<Fit>> {
         self.sums.iter().map(FitSums::fit).collect()
     }

@@ -10,22 +10,7 @@ use crate::sim::{restart_windows, rollout_over};
 /// Times between restarts, s.
 const RESTARTS_S: [f64; 3] = [0.1, 0.2, 0.3];
 
-/// Sums of one horizon.
-#[derive(Debug, Clone)]
-pub struct Horizon {
-    pub name: String,
-    /// Of the model, of a constant velocity and of a robot that stays.
-    pub predictors: [(&'static str, CoordinateSums); 3],
-}
-
 impl Horizon {
-    /// The error of a predictor over some coordinates together; none without a sample.
-    pub fn fit(&self, predictor: usize, coordinates: &[usize]) -> Option<Fit> {
-        let sums = &self.predictors[predictor].1;
-        let of = coordinates.iter().map(|&coordinate| sums.of(coordinate));
-        FitSums::jointly(&of.collect::<Vec<_>>()).fit()
-    }
-
     /// Predictions over 0.1, 0.2 and 0.3 s, of all samples between restarts; and over whole flights from the take-off,
     /// of the sample of the touchdown.
     pub fn all(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Vec<Self>> {

@@ -23,13 +23,12 @@ mod verdict;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
 pub use aslip::{Aslip, AslipSums, Baseline};
-pub use assessment::{Assessment, EvaluateError, SegmentRun, remarks};
+pub use assessment::{Assessment, EvaluateError, Horizon, SegmentRun, remarks};
 pub use control_metrics::{ControlMetrics, Summary, control_metrics, usual_settings};
 pub use coordinates::{
     ByContact, Comparison, CoordinateSums, Fit, FitSums, LAMBDA, PointwiseSums, combined_loss,
     is_plausible,
 };
-pub use horizons::Horizon;
 pub use invariance::Invariance;
 pub use prediction::{LinearisedPhase, PredictionError, eigenvalues};
 pub(crate) use prediction::{linearise_phases, state_matrix};

@@ -39,8 +39,8 @@ pub use joint::{
 };
 pub use metrics::{PartScore, PhaseTerms, SeedReport, SetMetrics, TrainReport, Trained, assess};
 pub use options::{
-    AFFINE, Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions,
-    TrainOptions, Transfer,
+    Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions,
+    Transfer,
 };
 pub use progress::{Monitor, Progress};
 pub use task::{Origin, Recordings, SourceFile, sha256};

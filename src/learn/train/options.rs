@@ -25,13 +25,6 @@ use crate::robot::{
     Actuators, BODY_X, BODY_Z, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame,
 };
 
-/// 1, `z`, `dz` and `u`.
-pub const AFFINE: StandardLibrary = StandardLibrary {
-    degree: 1,
-    trigonometric: false,
-    inputs: true,
-};
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -231,7 +224,11 @@ impl TrainOptions {
                 let terms = iter::once("1".to_owned()).chain(affine).chain(loads);
                 LibraryChoice::Terms(terms.collect())
             }
-            None => LibraryChoice::Standard(AFFINE),
+            None => LibraryChoice::Standard(StandardLibrary {
+                degree: 1,
+                trigonometric: false,
+                inputs: true,
+            }),
         };
         let library = Library::of(self.latent_dim, choice)?;
         library.check_distinct()?;
