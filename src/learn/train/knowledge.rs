@@ -87,10 +87,8 @@ impl Knowledge {
         self.standing.iter().find(|of| of.column == column)
     }
 
-    /// Whether terms that are not affine are to be chosen.
-    pub(super) fn chooses_beyond(&self, affine: &[bool]) -> bool {
-        let mut chosen = self.free.row_iter().zip(self.kept.row_iter()).zip(affine);
-        chosen.any(|((free, kept), affine)| !affine && free != kept)
+    pub(super) fn keeps(&self, term: usize) -> bool {
+        self.kept.row(term).iter().any(|kept| *kept)
     }
 
     /// What is known of each phase in a frame that holds momentum: the centre of mass as `z1` (forwards) and `z2`

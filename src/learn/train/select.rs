@@ -187,10 +187,8 @@ impl Refiner<'_> {
         monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'r>> {
         let affine = &self.judge.features.affine;
-        let has_nonlinear = self
-            .knowledge
-            .iter()
-            .any(|phase| phase.chooses_beyond(affine));
+        let is_chosen = |term| !self.knowledge.iter().any(|phase| phase.keeps(term));
+        let has_nonlinear = (0..affine.len()).any(|term| !affine[term] && is_chosen(term));
         // The affine terms are still to come where full libraries diverge.
         let enough =
             |tried: &[Trial<'_>]| any_stable(tried) || (has_nonlinear && !tried.is_empty());
