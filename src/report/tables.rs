@@ -91,7 +91,7 @@ pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     table
 }
 
-/// Rows of a robot's body and of its joints by kind; every coordinate for itself of other states.
+/// Coordinates by row of a table: each of the body, and joints of a kind together; each alone for states without joints.
 fn groups(names: &[String]) -> Vec<(String, Vec<usize>)> {
     let of = |is_one: &dyn Fn(&str) -> bool| -> Vec<usize> {
         (0..names.len()).filter(|&i| is_one(&names[i])).collect()

@@ -1041,7 +1041,7 @@ static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, 
     return online_smaller(online_greater(position, lower), upper);
 }
 
-/* Stores joint positions (rad), clamped to the joint limits, for the command and for a hold. */
+/* Stores the commanded joint positions (rad), clamped to the joint limits. */
 static inline MAYBE_UNUSED void online_memory_keep_posture(online_memory *restrict self, const real *joints,
         const real *lower, const real *upper)
 {

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use romc::artifact;
 use romc::evaluate::{CoordinateSums, Fit};
 use romc::lower::CompiledModel;
@@ -24,7 +24,12 @@ static WHOLE_BODY: LazyLock<ReducedModel> = LazyLock::new(|| {
     trained.expect("trains").model
 });
 
-/// Predictions over 0.1 s, a fit a coordinate.
+fn weights(model: &ReducedModel) -> DMatrix<f64> {
+    let encoder = model.encoder_map().expect("trained");
+    encoder.as_affine().expect("linear").weights().clone()
+}
+
+/// Predictions over 0.1 s, one fit per coordinate.
 fn fits(model: &ReducedModel, recordings: &[Recording]) -> Vec<Fit> {
     let compiled = CompiledModel::new(model).expect("compiles");
     let mut sums = CoordinateSums::new(model).expect("has a decoder");
@@ -72,7 +77,7 @@ fn whole_body_predicts_pitch_and_legs_of_other_recorders() {
         }
         assert!(fits[12].rms < 1.2e-3 && fits[14].rms < 1.5e-3, "{fits:?}");
     }
-    // Every part carries its share: the moment turns the body, legs stand by their own equations.
+    // Predictions need the moment in the equation of the rotation, and the equations of the legs.
     let against_moment = negated(model, "u3", 2);
     let found = r2(&fits(&against_moment, &other), PITCH);
     assert!(found < 0.8, "{found}");
@@ -81,21 +86,15 @@ fn whole_body_predicts_pitch_and_legs_of_other_recorders() {
     assert!(found < 0.9, "{found}");
 }
 
-/// Rows of the encoder: the turn is near that of the rigid-body mechanics of the simulated robot, and feet stand still in
-/// jumps that training never saw.
+/// The row of the rotation is near that of a rigid-body model of the simulated robot, and feet stand still in jumps not used in
+/// training.
 #[test]
 fn rows_of_the_whole_body_are_those_of_mechanics() {
     let model = &*WHOLE_BODY;
-    let weights = model
-        .encoder_map()
-        .expect("trained")
-        .as_affine()
-        .expect("linear")
-        .weights()
-        .clone();
+    let weights = weights(model);
     let row = |k: usize| weights.row(k).transpose();
     let turn = row(2);
-    // Angular momentum per locked inertia at the mean posture, by its mass matrix; over the sums of a left and a right joint.
+    // Weights of the mean of a left and a right joint in the angular momentum, by the mass matrix at the mean posture.
     let mechanics = [(1, 0.060), (2, 0.045), (7, 0.116), (8, 0.003)];
     for (joint, expected) in mechanics {
         let found = turn[joint] + turn[joint + 3];
@@ -105,7 +104,7 @@ fn rows_of_the_whole_body_are_those_of_mechanics() {
         );
     }
     assert!((turn[PITCH] - 1.0).abs() < 1e-12);
-    // The arm of each pair makes its feet rest: regressed here on the unseen jumps themselves.
+    // With the best arm for these jumps, the foot position is constant in the crouch.
     let feet = [(0, 3), (1, 4), (0, 5), (1, 6)];
     for (body, leg) in feet {
         let (mut resting, mut moving) = (0.0, 0.0);
@@ -151,7 +150,7 @@ fn equations_of_the_whole_body_obey_what_is_known() {
     assert!(texts.ends_with(&["z2*u1", "z2*u2", "z2*u3"]), "{texts:?}");
     let term = |name: &str| texts.iter().position(|text| *text == name).expect("a term");
     let [contact, flight] = [0, 1].map(|phase| &model.phases()[phase].xi);
-    // Nothing turns the body in flight; its legs go by their own inputs.
+    // Nothing rotates the body in flight; its legs depend on their own inputs.
     assert_eq!(flight.column(2).amax(), 0.0);
     for (index, text) in texts.iter().enumerate() {
         let own = *text == "1" || ["u4", "u5", "u6", "u7"].contains(text);
@@ -163,7 +162,7 @@ fn equations_of_the_whole_body_obey_what_is_known() {
                 leg + 1
             );
         }
-        // On the ground it turns by velocities, force and moment, wherever it is.
+        // On the ground its rotation depends on velocities, force and moment, not on positions.
         let moves = text.starts_with("dz")
             || text.contains("u1")
             || text.contains("u2")
@@ -172,9 +171,9 @@ fn equations_of_the_whole_body_obey_what_is_known() {
     }
     assert!(
         contact[(term("u3"), 2)] > 0.0,
-        "a moment turns the body its way"
+        "a moment rotates the body in its direction"
     );
-    // Asked for, the terms are those asked for.
+    // A library that is given has no additional terms.
     let mut options = TrainOptions::new("affine", 7);
     options.library = Some(LibraryChoice::Standard(StandardLibrary {
         degree: 1,
@@ -183,18 +182,9 @@ fn equations_of_the_whole_body_obey_what_is_known() {
     }));
     let affine = train_with(&jumps("train", 4), &jumps("validation", 1), &options).expect("trains");
     assert_eq!(affine.model.library().terms().len(), 1 + 3 * 7);
-    assert_eq!(weights_beyond(&affine.model), 0.0);
-}
-
-/// Largest weight of a coordinate out of the plane.
-fn weights_beyond(model: &ReducedModel) -> f64 {
-    let weights = model
-        .encoder_map()
-        .expect("trained")
-        .as_affine()
-        .expect("linear")
-        .weights()
-        .clone();
-    let beyond = [JOINT_DIM + 1, JOINT_DIM + 3, STATE_DIM - 1];
-    weights.select_columns(&beyond).amax()
+    let out_of_plane = [JOINT_DIM + 1, JOINT_DIM + 3, STATE_DIM - 1];
+    assert_eq!(
+        weights(&affine.model).select_columns(&out_of_plane).amax(),
+        0.0
+    );
 }

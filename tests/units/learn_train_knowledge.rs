@@ -16,8 +16,7 @@ fn features() -> Features {
     Features::new(&Library::standard(D, affine).expect("a library"))
 }
 
-/// Whatever moves the momentum, feet that stand still return to their place: upwards as a damped spring, forwards by
-/// damping alone.
+/// With any equations of the momentum, feet follow the prior: a damped spring upwards, damping only forwards.
 #[test]
 fn feet_of_the_equations_of_a_stance_return_to_rest() {
     let features = features();

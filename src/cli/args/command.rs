@@ -217,7 +217,7 @@ pub(crate) struct SimulateArguments {
     /// Time between restarts from the recorded state, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 0.1, value_parser = real(&RESTART_EVERY))]
     pub restart_every: f64,
-    /// Also print the errors of all coordinates over several horizons, beside a constant velocity and a robot at rest
+    /// Also print the errors of all coordinates over several horizons, compared with a constant velocity and a robot at rest
     #[arg(long)]
     pub verbose: bool,
     /// Write the trajectories of all rollouts to this CSV file

@@ -167,8 +167,7 @@ pub(crate) struct TrainSettings {
     /// with --paper)
     #[arg(long, value_name = "RATE", value_parser = finite(&table::GROWTH))]
     pub growth: Option<Finite>,
-    /// Highest degree of the polynomial candidate terms (1 unless given, and from 7 coordinates on also the height times
-    /// force and moment)
+    /// Highest degree of the polynomial candidate terms [default: 1; from 7 coordinates on also z2*u1, z2*u2 and z2*u3]
     #[arg(long, value_name = "P", value_parser = |text: &str| table::DEGREE.parse::<u32>(text))]
     pub degree: Option<u32>,
     /// Add sines and cosines of z and dz to the candidate terms
@@ -209,7 +208,7 @@ pub(crate) struct TrainSettings {
     #[arg(long, value_name = "SHARE", value_parser = finite(&table::MASK_INPUT_SHARE))]
     pub mask_input_share: Option<Finite>,
     /// Rows of a linear encoder: named (the centre of mass, then joints and pitch, left and right alike, from 7 on
-    /// also the turn and the feet; the dynamics obey Newton's second law and the invariances) or free [default: named;
+    /// also rotation and feet; the dynamics obey Newton's second law and the invariances) or free [default: named;
     /// free with --paper or hidden layers]
     #[arg(long, value_name = "KIND")]
     pub coordinates: Option<Coordinates>,

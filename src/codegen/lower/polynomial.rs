@@ -26,8 +26,8 @@ pub(super) struct Polynomials {
 }
 
 impl Polynomials {
-    /// Nothing if straight-line code is expected to run faster, or if a factor may be infinite: times the zero of the
-    /// equation beside it, it would be NaN there.
+    /// None if straight-line code is expected to run faster, or if a factor may be infinite: its product with the zero
+    /// coefficient of the other lane would be NaN.
     pub(crate) fn new(
         pool: &mut ExprPool,
         equations: &[Combination],

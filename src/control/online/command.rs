@@ -193,7 +193,7 @@ impl Memory {
         true
     }
 
-    /// Stores joint positions (rad), clamped to the joint limits, for the command and for a hold.
+    /// Stores the commanded joint positions (rad), clamped to the joint limits.
     pub(super) fn keep_posture(&mut self, joints: &[Real], lower: &[Real], upper: &[Real]) {
         for i in 0..12 {
             self.joint_position[i] = clamped_joint(joints[i], lower[i], upper[i]);

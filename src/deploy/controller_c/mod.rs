@@ -33,7 +33,7 @@ struct Facts<'a> {
     torque_limit: String,
     limits: &'a [(f64, f64)],
     f: &'static str,
-    /// Macros that switch on rows that link stages: the name, and what it compiles in words.
+    /// Macros that enable rows linking stages: name and description.
     switches: Vec<(&'static str, &'static str)>,
     row_numbers: usize,
     solver_stage: String,

@@ -33,11 +33,11 @@ pub struct Assessment<'a> {
     pub remarks: Vec<String>,
 }
 
-/// Sums of one horizon.
+/// Prediction errors over one horizon.
 #[derive(Debug, Clone)]
 pub struct Horizon {
     pub name: String,
-    /// Of the model, of a constant velocity and of a robot that stays.
+    /// The model, a constant velocity, a robot at rest; errors in SI units.
     pub predictors: [(&'static str, CoordinateSums); 3],
 }
 

@@ -74,6 +74,12 @@ impl Mean {
     }
 }
 
+/// State at a sample if the robot kept its velocity from `start` on.
+pub(super) fn coasted(segment: &Segment, start: usize, sample: usize) -> DVector<f64> {
+    let elapsed_s = segment.time_s[sample] - segment.time_s[start];
+    segment.x.column(start) + segment.dx.column(start) * elapsed_s
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoordinateSums {
     sums: Vec<FitSums>,
@@ -119,9 +125,7 @@ impl CoordinateSums {
         rollout: &Rollout,
     ) {
         for (sample, window, _) in rollout.predictions() {
-            let start = window.samples.start;
-            let elapsed_s = segment.time_s[sample] - segment.time_s[start];
-            let x = segment.x.column(start) + segment.dx.column(start) * elapsed_s;
+            let x = coasted(segment, window.samples.start, sample);
             self.add(segment, sample, latent.phase[sample], &x);
         }
         self.windows += rollout.windows.len();

@@ -1,8 +1,9 @@
-//! Predictions of all coordinates over several horizons, beside robots that need no model: one that keeps its velocity
-//! and one that stays where it is.
+//! Prediction errors of all coordinates over several horizons, compared with two baselines: a constant velocity and a
+//! robot at rest.
 
 use std::ops::Range;
 
+use super::coordinates::coasted;
 use super::*;
 use crate::recording::{CHATTER_SAMPLES, PhaseRule, Stance};
 use crate::sim::{restart_windows, rollout_over};
@@ -11,8 +12,8 @@ use crate::sim::{restart_windows, rollout_over};
 const RESTARTS_S: [f64; 3] = [0.1, 0.2, 0.3];
 
 impl Horizon {
-    /// Predictions over 0.1, 0.2 and 0.3 s, of all samples between restarts; and over whole flights from the take-off,
-    /// of the sample of the touchdown.
+    /// Predictions with restarts every 0.1, 0.2 and 0.3 s, all samples; and from each take-off, the sample of the
+    /// touchdown only.
     pub fn all(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Vec<Self>> {
         let names = ["model", "constant velocity", "at rest"];
         let compiled = CompiledModel::new(model)?;
@@ -58,11 +59,13 @@ impl Horizon {
             let phase = latent.phase[sample];
             let x = model.decode(&window.z.column(column).into_owned())?;
             own.add(segment, sample, phase, &x);
-            let before = segment.x.column(start).into_owned();
-            rest.add(segment, sample, phase, &before);
-            let elapsed_s = segment.time_s[sample] - segment.time_s[start];
-            let moved = before + segment.dx.column(start) * elapsed_s;
-            constant.add(segment, sample, phase, &moved);
+            constant.add(segment, sample, phase, &coasted(segment, start, sample));
+            rest.add(
+                segment,
+                sample,
+                phase,
+                &segment.x.column(start).into_owned(),
+            );
         }
         let diverged = rollout.windows.iter();
         own.diverged += diverged.filter(|w| w.diverged_at_s.is_some()).count();

@@ -78,6 +78,12 @@ impl Features {
         self.tape.terms.len()
     }
 
+    /// Every term with the variables that occur in it.
+    pub(super) fn variables(&self) -> impl Iterator<Item = (usize, Vec<usize>)> {
+        let occurring = self.occurring.iter().enumerate();
+        occurring.map(|(term, of)| (term, (0..of.len()).filter(|&v| of[v]).collect()))
+    }
+
     /// The term that is 1.
     pub(super) fn constant_term(&self) -> Option<usize> {
         self.term_of(|step| matches!(step, Step::Number(value) if *value == 1.0))

@@ -1,4 +1,4 @@
-//! Rows of an encoder that physics gives: the robot's momentum, and feet that stand still.
+//! Encoder rows known from physics: momentum of the robot, and feet that stand still.
 
 use std::ops::Range;
 
@@ -7,12 +7,13 @@ use nalgebra::{DMatrix, DVector};
 use super::dataset::{Dataset, Jump, centred, mean};
 use super::options::Coordinates;
 use crate::model::complement;
+use crate::recording::stretches;
 use crate::robot::{
     BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot, STATE_DIM,
 };
 
 const PITCH: usize = JOINT_DIM + 4;
-/// What the momentum rows stand for, in their order: the centre of mass forwards and upwards, and the turn about it.
+/// Body coordinates of the momentum rows: the centre of mass forwards and upwards, and the rotation about it.
 const MOMENTUM: [usize; 3] = [BODY_X, BODY_Z, PITCH];
 pub(super) const TURN: usize = 2;
 /// Latent coordinates from which on the rows are those of the whole body in its plane: three of momentum, four of legs.
@@ -40,12 +41,12 @@ pub(super) struct Frame {
 }
 
 /// A row `rho` of a pair of legs. With the momentum rows `b` (forwards or upwards) and `t` (turn) the sum
-/// `rho + b + arm t` is where the pair's feet are: it rests while they stand.
+/// `rho + b + arm t` is the position of the pair's feet, constant while they stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LegRow {
     pub(super) body: usize, // the momentum row that it belongs to
     pub(super) arm: f64,
-    pub(super) rest: f64, // mean of the feet's place while they stand, less the mean of all samples
+    pub(super) rest: f64, // mean foot position in stances, less the mean of all samples
 }
 
 impl Frame {
@@ -59,9 +60,9 @@ impl Frame {
     }
 
     /// With [`Coordinates::Named`] and two or more latent coordinates, the first two rows are the centre of mass. With
-    /// seven or more the third is the turn about it, and the next four are the places of the feet from there. The others
-    /// combine sums of `active` coordinates that a mirror leaves alone: neither `y`, roll and yaw, nor left and right;
-    /// nor pitch where a row has it.
+    /// seven or more the third is the rotation about it, and the next four are foot positions relative to it. The others
+    /// combine mirror-symmetric sums of `active` coordinates: neither `y`, roll and yaw, nor left and right; nor pitch
+    /// where a row contains it.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],
@@ -117,7 +118,7 @@ impl Frame {
     }
 }
 
-/// An orthonormal basis of what the columns of `free` span beside the parts of `rows` in it.
+/// Orthonormal basis of the span of `free` orthogonal to the projections of `rows` onto it.
 fn without(free: DMatrix<f64>, rows: &[DVector<f64>]) -> DMatrix<f64> {
     if rows.is_empty() || free.ncols() == 0 {
         return free;
@@ -156,7 +157,7 @@ fn joint_of(leg: Leg, joint: usize) -> usize {
 
 /// The first `count` momentum rows, as columns, `18 x count`: `x + c_x^T q`, `z + c_z^T q` and `pitch + c_t^T q` over
 /// the joints `q`, of the body alone where the recordings have no flight. In flight the centre of mass falls freely and
-/// the angular momentum about it stays: `ddx + c_x^T ddq = 0`, `ddz + c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The
+/// the angular momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz + c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The
 /// regression of the body's accelerations on those of the joints (mirrored, ridge) gives `c`, to first order in `q`.
 fn momentum_rows(training: &Dataset, count: usize, robot: &Robot) -> DMatrix<f64> {
     let all: Vec<usize> = (0..JOINT_DIM).collect();
@@ -216,11 +217,11 @@ fn flight_accelerations(training: &Dataset, jump: &Jump, all: &mut Vec<DVector<f
     }
 }
 
-/// Rows of the legs as columns, forwards and upwards of the front pair and of the rear pair; none where too few samples
-/// stand. While a pair stands, `x + arm pitch + w^T q` over its flexions and knees `q` rests, and so does the same with
-/// `z`: the regression of the body's deviations from their means in a stance (ridge) gives `arm` and `w`. The row of a
-/// leg is what is left of that without the momentum rows. Abductions enter as the training's torques there follow those
-/// at flexions and knees: the lift returns them.
+/// Rows of the legs as columns, forwards and upwards of the front pair, then of the rear pair; none if a pair has fewer
+/// than [`LEAST_STANDING`] samples of stance. While a pair stands, `x + arm pitch + w^T q` over its flexions and knees
+/// `q` is constant, and so is the same sum with `z`. Ridge regression of the deviations from the mean of each stance
+/// gives `arm` and `w`. A row is this sum less the momentum rows. Weights of abductions are such that the lift returns
+/// their torques, by [`abduction_torques`].
 fn leg_rows(
     training: &Dataset,
     momentum: &DMatrix<f64>,
@@ -248,40 +249,29 @@ fn leg_rows(
                 + &flexion * of_flexion
                 + &knee * of_knee
                 + &abduction * turned;
-            let place = mean_over(training, &stances, &feet);
+            let rest = mean_over(training, &stances, &feet);
             rows.push((
-                feet - momentum.column(body) - momentum.column(2) * arm,
-                LegRow {
-                    body,
-                    arm,
-                    rest: place,
-                },
+                feet - momentum.column(body) - momentum.column(TURN) * arm,
+                LegRow { body, arm, rest },
             ));
         }
     }
     rows
 }
 
-/// Spans in which both legs of a pair stand, without the first part of each that begins with a touchdown.
+/// Spans in which both feet of a pair are down, without [`SETTLING_S`] after a touchdown.
 fn stances(training: &Dataset, legs: [Leg; 2]) -> Vec<(usize, Range<usize>)> {
     let mut all = Vec::new();
     for (index, jump) in training.jumps.iter().enumerate() {
         let stands = |sample: usize| legs.iter().all(|leg| jump.feet[sample][leg.index()]);
-        let mut first = 0;
-        while first < jump.samples() {
-            let last = (first..jump.samples())
-                .find(|&sample| !stands(sample))
-                .unwrap_or(jump.samples());
-            let settled = match first {
-                0 => 0,
-                _ => (first..last)
-                    .find(|&sample| jump.time_s[sample] - jump.time_s[first] >= SETTLING_S)
-                    .unwrap_or(last),
+        let spans = stretches(0..jump.samples(), |a, b| stands(a) == stands(b)).into_iter();
+        for span in spans.filter(|span| stands(span.start)) {
+            let settled_s = match span.start {
+                0 => f64::NEG_INFINITY,
+                touchdown => jump.time_s[touchdown] + SETTLING_S,
             };
-            if settled < last {
-                all.push((index, settled..last));
-            }
-            first = last + 1;
+            let settled = (span.clone()).find(|&sample| jump.time_s[sample] >= settled_s);
+            all.extend(settled.map(|settled| (index, settled..span.end)));
         }
     }
     all
@@ -304,7 +294,7 @@ fn deviations(training: &Dataset, stances: &[(usize, Range<usize>)]) -> DMatrix<
     all
 }
 
-/// Mean of a row over the stances, less that over all samples.
+/// Mean of a row over the stances, less its mean over all samples.
 fn mean_over(training: &Dataset, stances: &[(usize, Range<usize>)], row: &DVector<f64>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (jump, range) in stances {
@@ -315,7 +305,7 @@ fn mean_over(training: &Dataset, stances: &[(usize, Range<usize>)], row: &DVecto
     sum / count - row.dot(&mean(&training.states(None)))
 }
 
-/// How a pair's torques at its abductions follow those at its flexions and knees over the training's inputs.
+/// Coefficients of the regression of a pair's torques at abductions on those at flexions and knees, over all inputs.
 fn abduction_torques(
     training: &Dataset,
     [abduction, flexion, knee]: [&DVector<f64>; 3],
@@ -326,7 +316,7 @@ fn abduction_torques(
     [fitted[0], fitted[1]]
 }
 
-/// Weights `w` of the rows of `regressors` (`k x n`) with `w^T regressors` nearest to `target`, ridge on standardised rows.
+/// Weights `w` that minimise `|w^T regressors - target|^2` (`k x n`, `n`) with a ridge on standardised rows.
 fn standardised_fit(regressors: &DMatrix<f64>, target: &DVector<f64>) -> DVector<f64> {
     let scales = DVector::from_iterator(
         regressors.nrows(),

@@ -57,8 +57,8 @@ impl Method {
 pub struct TrainOptions {
     pub name: String,
     pub latent_dim: usize,
-    /// Candidate terms. Unless given 1, `z`, `dz` and `u`, and with the coordinates of the whole body its height times force and
-    /// moment.
+    /// Candidate terms. The default is 1, `z`, `dz` and `u`, and with the coordinates of the whole body also products of
+    /// its height with force and moment.
     pub library: Option<LibraryChoice>,
     pub phases: PhaseRule,
     pub seed: u64,
@@ -121,8 +121,8 @@ pub struct EncoderOptions {
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
     /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right; from
-    /// seven coordinates on also the turn about the centre of mass and the places of the feet from there. The dynamics
-    /// obey what is known of them.
+    /// seven coordinates on also the rotation about the centre of mass and foot positions relative to it. The dynamics
+    /// obey known physics.
     Named,
     /// Any rows over all coordinates that move or are actuated.
     Free,
@@ -162,7 +162,7 @@ impl TrainOptions {
             },
             regression: RegressionOptions {
                 smoothing: 11,
-                // Errors of the legs, all whose terms stay, are in the score too.
+                // Smaller, because the score includes legs, whose terms are not dropped.
                 slack: if latent_dim < WHOLE_BODY_DIM {
                     0.1
                 } else {
@@ -210,8 +210,7 @@ impl TrainOptions {
         (0..count).map(|i| self.seed.wrapping_add(i)).collect()
     }
 
-    /// Of the given terms or those that suit the coordinates: the arm of the feet's force about the centre of mass grows with its
-    /// height.
+    /// Library of the given or default terms. Products with the height model the lever arm of the ground forces.
     pub(crate) fn library(&self) -> Result<Library, TrainError> {
         let is_whole =
             self.coordinates() == Coordinates::Named && self.latent_dim >= WHOLE_BODY_DIM;

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::knowledge::Knowledge;
 
 const LEAST_RIDGE: f64 = 1e-10; // on the normalised columns: far above rounding
-const CHANGE_RIDGE: f64 = 1e-2; // of changes from feet that stand still
+const CHANGE_RIDGE: f64 = 1e-2; // of changes from a prior
 const RECOMPUTED: usize = 64; // up to this size, supports are solved anew after an elimination, larger ones updated
 
 type Support = DMatrix<bool>; // active terms, library_dim x latent_dim
@@ -240,7 +240,7 @@ impl Regression {
         self.ridged_gram(support, ridge).solve(&right)
     }
 
-    /// The least change of a column from `prior`, all whose terms stay.
+    /// Ridge regression of a column's change from `prior`; no term is dropped.
     fn solve_near(&self, column: usize, support: &[usize], prior: &DVector<f64>) -> DVector<f64> {
         let prior = support.iter().map(|&i| prior[i] * self.theta_rms[i]);
         let prior = DVector::from_iterator(support.len(), prior);
