@@ -199,7 +199,7 @@ fn generalised_input_of_robots_of_files_is_that_of_the_rule_also_where_it_is_dam
                     let spans = robot.geometry(*leg).spans(&leg.of_joints(&joints));
                     feet[leg.index()] && (spans[0] < 0.3 || spans[1] < 0.12)
                 }));
-                let expected = rule.wrench(&x, &tau, feet).expect("finite");
+                let expected = rule.input_wrench(&x, &tau, feet).expect("finite");
                 let u = input.run(&x, &[0.0; 18], &tau, &numbers_of(feet));
                 for (found, expected) in u[12..].iter().zip(&expected) {
                     let bound = 1e-9 * (1.0 + expected.abs());
@@ -257,12 +257,12 @@ fn generalised_input_is_that_of_the_rule_for_every_frame_and_contact_with_losses
             };
             let [x, dx] = sample(&mut random, knee);
             let tau: [f64; 12] = std::array::from_fn(|_| random.between(-30.0, 30.0));
-            let losses = rule.losses(&std::array::from_fn(|i| dx[i]), &[0.0; 12]);
+            let losses = rule.losses(&std::array::from_fn(|i| dx[i]), &[0.0; 12], [true; 4]);
             let net: [f64; 12] = std::array::from_fn(|i| tau[i] - losses[i]);
             for bits in 0..16_usize {
                 let contact: [bool; 4] = std::array::from_fn(|k| bits >> k & 1 == 1);
                 let u = input.run(&x, &dx, &tau, &numbers_of(contact));
-                let wrench = rule.wrench(&x, &net, contact).expect("finite");
+                let wrench = rule.input_wrench(&x, &net, contact).expect("finite");
                 for i in 0..12 {
                     assert!((u[i] - net[i]).abs() < 1e-14 * (1.0 + tau[i].abs() + losses[i].abs()));
                 }

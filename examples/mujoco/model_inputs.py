@@ -3,7 +3,7 @@
 The model's own generated C is the rule: `NAME_generalised_input`, compiled with `cc` and called
 through ctypes. It takes off what friction takes of the motors' torques; what the inertia of the
 motors takes is taken off here, as romc does with recordings: from accelerations averaged over 11
-samples of equal contact.
+samples of equal contact, by the rule `ground` of a model only while a foot is down.
 """
 
 import ctypes
@@ -19,11 +19,14 @@ WINDOW = 11
 
 @dataclass(frozen=True)
 class ModelInputs:
-    """The rule of a model: its name in C, the compiled library, the motors' inertia (kg m^2)."""
+    """The rule of a model: its name in C, the compiled library, the motors' inertia (kg m^2) and
+    whether it is a loss in flight.
+    """
 
     name: str
     library: pathlib.Path
     armature: tuple
+    in_flight: bool
 
     @classmethod
     def compiled(cls, model_path, folder, romc):
@@ -37,14 +40,17 @@ class ModelInputs:
         subprocess.run([*compile_c, "-o", str(library)], check=True)
         model = json.loads(pathlib.Path(model_path).read_text(encoding="utf-8"))
         armature = model.get("actuators", {}).get("armature", [0.0] * 12)
-        return cls(header.stem, library, tuple(armature))
+        in_flight = model.get("wrench_frame") != "ground"
+        return cls(header.stem, library, tuple(armature), in_flight)
 
     def of(self, jump):
         """(rows, 18) input of a jump with `time_s`, `x`, `dx`, `torque_nm` and `feet`."""
         function = getattr(ctypes.CDLL(str(self.library)), f"{self.name}_generalised_input")
         function.restype = None
         pointer = ctypes.POINTER(ctypes.c_double)
-        tau = jump.torque_nm - np.array(self.armature) * smoothed_accelerations(jump)
+        inertial = np.array(self.armature) * smoothed_accelerations(jump)
+        is_loss = self.in_flight | jump.feet.any(axis=1, keepdims=True)
+        tau = jump.torque_nm - inertial * is_loss
         u = np.zeros((len(tau), 18))
         columns = [np.ascontiguousarray(c, dtype=float) for c in (jump.x, jump.dx, tau, jump.feet)]
         for row in range(len(u)):

@@ -166,6 +166,9 @@ fn input_rule(model: &ReducedModel) -> String {
     let axes = match model.wrench_frame() {
         WrenchFrame::Body => "the body's axes, as published",
         WrenchFrame::World => "the world's axes, moments of roll, pitch and yaw",
+        WrenchFrame::Ground => {
+            "the world's axes, moments of roll, pitch and yaw, of feet that push"
+        }
     };
     let rule = format!("  inputs of robot {}: forces in {axes};", robot.name);
     let Some(actuators) = model.actuators() else {

@@ -10,10 +10,10 @@ use nalgebra::{Matrix3, SMatrix, Vector6};
 
 use super::error::RobotError;
 use super::geometry::Robot;
-use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, LEG_JOINT_DIM, STATE_DIM};
+use super::joints::{BODY_DIM, ContactFlags, FOOT_DIM, JOINT_DIM, LEG_JOINT_DIM, Leg, STATE_DIM};
 use super::leg::{Real, turn_to_world, write_world_axes};
 
-/// Axes of the force and moment in an input.
+/// Axes of the force and moment in an input, and what the ground does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum WrenchFrame {
     /// As published: axes parallel to the body's, the arm of each moment is the foot in its own hip frame.
@@ -23,17 +23,22 @@ pub enum WrenchFrame {
     /// body's origin that do work on the rates of roll, pitch and yaw. Their sum `F . v + M . (d roll, d pitch, d yaw)`
     /// is the power of the feet on the body, which is what `W_e^T u_lat` stands for.
     World,
+    /// As `World`, and feet only push: one in contact whose torques would need a downward force adds nothing, as at the
+    /// end of a stance. In flight the rotors are part of the legs that the input accelerates, so that their inertia is
+    /// no loss.
+    Ground,
 }
 
 impl WrenchFrame {
-    /// Both frames.
-    pub const ALL: [Self; 2] = [Self::Body, Self::World];
+    /// Every frame.
+    pub const ALL: [Self; 3] = [Self::Body, Self::World, Self::Ground];
 
     /// The name in model files and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Body => "body",
             Self::World => "world",
+            Self::Ground => "ground",
         }
     }
 }
@@ -90,16 +95,49 @@ impl InputRule {
         self.frame
     }
 
+    /// Whether the rotors' inertia counts as a loss, with a foot on the ground or without.
+    pub fn inertia_is_loss(&self, is_grounded: bool) -> bool {
+        is_grounded || self.frame != WrenchFrame::Ground
+    }
+
     /// [`Actuators::losses`] in N m at `dq` (rad/s) and `ddq` (rad/s^2); zero without actuators.
-    pub fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
+    pub fn losses(
+        &self,
+        dq: &[f64; JOINT_DIM],
+        ddq: &[f64; JOINT_DIM],
+        feet: ContactFlags,
+    ) -> [f64; JOINT_DIM] {
         match &self.actuators {
             None => [0.0; JOINT_DIM],
-            Some(actuators) => actuators.losses(dq, ddq),
+            Some(actuators) if self.inertia_is_loss(feet.contains(&true)) => {
+                actuators.losses(dq, ddq)
+            }
+            Some(actuators) => actuators.losses(dq, &[0.0; JOINT_DIM]),
         }
     }
 
+    /// Force and moment on the body `[F; M]` in an input, in N and N m: [`Self::wrench`], in [`WrenchFrame::Ground`] of
+    /// the feet that push.
+    pub fn input_wrench(
+        &self,
+        x: &[f64; STATE_DIM],
+        net: &[f64; JOINT_DIM],
+        contact: ContactFlags,
+    ) -> Result<Vector6<f64>, RobotError> {
+        let mut pushing = contact;
+        if self.frame == WrenchFrame::Ground {
+            for leg in Leg::down(contact) {
+                let mut alone = [false; FOOT_DIM];
+                alone[leg.index()] = true;
+                pushing[leg.index()] = self.wrench(x, net, alone)?[2] >= 0.0;
+            }
+        }
+        self.wrench(x, net, pushing)
+    }
+
     /// Force and moment on the body `[F; M]`, in N and N m, of the torques at the links `net` (N m) at a state `x`
-    /// (joint angles and attitude count), by the feet in contact; damped as in [`Robot::damped_force_map`].
+    /// (joint angles and attitude count), by the feet in contact, linear in `net`; damped as in
+    /// [`Robot::damped_force_map`].
     pub fn wrench(
         &self,
         x: &[f64; STATE_DIM],
@@ -109,7 +147,7 @@ impl InputRule {
         let joints = x.first_chunk().expect("joints come first");
         let [.., roll, pitch, yaw] = *x;
         let mut wrench = (self.robot).wrench_by_arms(self.frame, joints, net, contact)?;
-        if self.frame == WrenchFrame::World {
+        if self.frame != WrenchFrame::Body {
             turn_to_world(&[roll, pitch, yaw], 1, &mut wrench);
         }
         Ok(wrench.into())
@@ -124,7 +162,7 @@ impl InputRule {
         contact: ContactFlags,
     ) -> Result<SMatrix<f64, BODY_DIM, JOINT_DIM>, RobotError> {
         let mut map = self.robot.map_by_arms(self.frame, joints, contact)?;
-        if self.frame == WrenchFrame::World {
+        if self.frame != WrenchFrame::Body {
             turn_to_world(&attitude, JOINT_DIM, &mut map);
         }
         Ok(SMatrix::from_row_slice(&map))

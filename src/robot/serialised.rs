@@ -77,7 +77,7 @@ impl<'de> Deserialize<'de> for WrenchFrame {
         let name = String::deserialize(deserializer)?;
         let unknown = |()| {
             let found = serde::de::Unexpected::Str(&name);
-            D::Error::invalid_value(found, &"\"body\" or \"world\"")
+            D::Error::invalid_value(found, &"\"body\", \"world\" or \"ground\"")
         };
         name.parse().map_err(unknown)
     }

@@ -104,7 +104,7 @@ impl Robot {
     fn arm_from(&self, frame: WrenchFrame, leg: Leg) -> [f64; 3] {
         match frame {
             WrenchFrame::Body => [0.0; 3],
-            WrenchFrame::World => self.hip_position_m[leg.index()],
+            WrenchFrame::World | WrenchFrame::Ground => self.hip_position_m[leg.index()],
         }
     }
 

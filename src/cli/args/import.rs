@@ -99,8 +99,8 @@ pub(crate) struct ImportArguments {
     /// romc's own is fr,fl,rr,rl,body
     #[arg(long, value_name = "NAMES", requires = "robot")]
     pub order: Option<CoordinateOrder>,
-    /// Axes of the force and moment in the inputs that the model was trained with: body, as published, unless given, or
-    /// world
+    /// Axes of the force and moment in the inputs that the model was trained with: body, as published, world, or ground
+    /// (as world, of feet that only push) [default: body]
     #[arg(long, value_name = "FRAME", requires = "robot", value_parser = wrench_frame)]
     pub wrench_frame: Option<WrenchFrame>,
     /// Friction and inertia of the joints, if the model was trained with torques less these: a file with a table

@@ -180,7 +180,8 @@ pub(crate) struct TrainSettings {
     /// the training recordings tell (as `romc identify` does), or `none` (identify unless given, none with --paper)
     #[arg(long, value_name = "FILE.toml")]
     pub actuators: Option<String>,
-    /// Axes of force and moment in the inputs: `world` or, as published, `body` (world unless given)
+    /// Axes of force and moment in the inputs: `world`; `ground` for the same of feet that only push, without the rotors'
+    /// inertia as a loss in flight; or, as published, `body` [default: ground, with --paper body]
     #[arg(long, value_name = "FRAME", value_parser = wrench_frame)]
     pub wrench_frame: Option<WrenchFrame>,
     /// Phases of the model

@@ -65,7 +65,7 @@ impl TypedValueParser for RobotParser {
 
 pub(crate) fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
     text.parse()
-        .map_err(|()| format!("found `{text}`, expected `world` or `body`"))
+        .map_err(|()| format!("found `{text}`, expected `ground`, `world` or `body`"))
 }
 
 #[derive(Debug, Clone, Default, Args)]

@@ -9,18 +9,21 @@ use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
 
 const MOST_TERMS: usize = 40;
 
+const WORLD_AXES: &str = "Axes are the world's; the arm p_k of a moment is the foot from the body's origin. The three \
+     moments are the generalised forces of roll, pitch and yaw: they do work on the rates of these angles";
+
 pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerError> {
     let robot = model.robot()?.name;
     let axes = match model.wrench_frame() {
         WrenchFrame::Body => {
             "Axes are parallel to the body's: x forward, y left, z up. The arm p_k of a moment is the foot in \
              its own hip frame, as in the data that models are learned from."
+                .to_owned()
         }
-        WrenchFrame::World => {
-            "Axes are the world's; the arm p_k of a moment is the foot from the body's origin. The three \
-             moments are the generalised forces of roll, pitch and yaw: they do work on the rates of these \
-             angles."
-        }
+        WrenchFrame::World => format!("{WORLD_AXES}."),
+        WrenchFrame::Ground => format!(
+            "{WORLD_AXES}. A foot whose force would point down adds nothing: the ground does not pull."
+        ),
     };
     let (net, losses) = match model.actuators() {
         Some(_) => (
@@ -34,6 +37,18 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerE
             "tau = net: the model knows no losses of the joints, dx and ddx are not used.",
         ),
     };
+    let (inertia, in_flight) = if model.wrench_frame() == WrenchFrame::Ground {
+        (
+            "With a foot on the ground, tau is without what the inertia of the motors takes; in flight with \
+             it.",
+            " In flight give zeros as ddx: what the inertia takes is in net.",
+        )
+    } else {
+        (
+            "What the inertia of the motors takes is not in it, it would need accelerations.",
+            "",
+        )
+    };
     let input = [
         &format!(
             "Generalised inputs of the {robot}: u = [net; sum of F_k; sum of p_k x F_k] over the feet on \
@@ -42,10 +57,9 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerE
         &format!(
             "x, dx: robot coordinates and their velocities in SI units. tau: torques of the motors (N m). \
              feet: 1 on the ground, 0 in the air, order fr, fl, rr, rl. u: net, force (N) and moment (N m) \
-             on the body. net: {net}. What the inertia of the motors takes is not in it, it would need \
-             accelerations."
+             on the body. net: {net}. {inertia}"
         ),
-        axes,
+        &axes,
         &format!(
             "Near a singularity of a leg on the ground its force is damped: a knee that spans less than \
              {LEAST_SPAN} of thigh times calf, a foot nearer to its hip's height than {LEAST_HEIGHT} of the \
@@ -54,13 +68,15 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerE
     ];
     let torque = [
         &format!("Torques of the {robot}'s motors behind torques at the links: {losses}"),
-        "dx, ddx: velocities and accelerations of the robot coordinates in SI units, of which the joints \
-         count (0 to 11). net: the first 12 of u (N m). tau: torques of the motors (N m); limits are the \
-         caller's.",
+        &format!(
+            "dx, ddx: velocities and accelerations of the robot coordinates in SI units, of which the joints \
+             count (0 to 11).{in_flight} net: the first 12 of u (N m). tau: torques of the motors (N m); \
+             limits are the caller's."
+        ),
     ];
     Ok([
-        input.map(str::to_owned).into(),
-        torque.map(str::to_owned).into(),
+        input.map(String::from).into(),
+        torque.map(String::from).into(),
     ])
 }
 

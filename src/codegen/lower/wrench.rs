@@ -71,28 +71,33 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
         angles.push((number(x[k]) + knee).id());
     }
     let frame = rule.wrench_frame();
-    if frame == WrenchFrame::World {
+    if frame != WrenchFrame::Body {
         angles.extend(&x[STATE_DIM - 3..]);
     }
     let (sines, cosines) = sheet.borrow_mut().sin_cos(&angles);
     let at = |angles: [usize; 3]| {
         [&sines, &cosines].map(|values| angles.map(|angle| number(values[angle])))
     };
+    let attitude = [0, 1, 2].map(|angle| JOINT_DIM + angle);
     let of_legs = Leg::ALL.map(|leg| {
         let k = leg.index();
         let turned = at([k, FOOT_DIM + k, 2 * FOOT_DIM + k]);
         let torques = std::array::from_fn(|i| number(feet[k]) * net[LEG_JOINT_DIM * k + i]);
         let arm_from = match frame {
             WrenchFrame::Body => [0.0; 3],
-            WrenchFrame::World => robot.hip_position(leg).into(),
+            WrenchFrame::World | WrenchFrame::Ground => robot.hip_position(leg).into(),
         };
-        leg_wrench(&robot.geometry(leg).shape, arm_from, turned, torques)
+        let wrench = leg_wrench(&robot.geometry(leg).shape, arm_from, turned, torques);
+        match frame {
+            WrenchFrame::Body | WrenchFrame::World => wrench,
+            WrenchFrame::Ground => pushed(at(attitude), wrench),
+        }
     });
     let [fr, fl, rr, rl] = of_legs;
     let wrench = std::array::from_fn(|i| (fr[i] + fl[i]) + (rr[i] + rl[i]));
     let wrench = match frame {
         WrenchFrame::Body => wrench,
-        WrenchFrame::World => in_world(at([0, 1, 2].map(|angle| JOINT_DIM + angle)), wrench),
+        WrenchFrame::World | WrenchFrame::Ground => in_world(at(attitude), wrench),
     };
     let u: Vec<ValueId> = net.into_iter().chain(wrench).map(Number::id).collect();
     builder.output("u", &u);
@@ -116,6 +121,17 @@ fn damped<'b>(numerator: Number<'b>, divisor: Number<'b>, least: f64) -> Number<
     let (square, floor) = (divisor * divisor, divisor.constant(least * least));
     let twice_larger = (square + floor) + (square - floor).abs();
     2.0 * (numerator * divisor) / twice_larger
+}
+
+/// A foot's force and moment in the body's axes, zero where the force is downwards in the world.
+fn pushed<'b>(
+    [[s_r, s_p, _], [c_r, c_p, _]]: [[Number<'b>; 3]; 2],
+    wrench: [Number<'b>; BODY_DIM],
+) -> [Number<'b>; BODY_DIM] {
+    let [f_x, f_y, f_z, ..] = wrench;
+    let up = c_p * (s_r * f_y + c_r * f_z) - s_p * f_x;
+    let pushes = 0.5 + 0.5 * up.unary(Unary::Sign);
+    wrench.map(|entry| pushes * entry)
 }
 
 /// From the body's axes to the generalised forces of its coordinates; sines and cosines of roll, pitch and yaw.

@@ -170,9 +170,16 @@ impl ControlModel {
         std::array::from_fn(|joint| row_product(decoder, joint, dz))
     }
 
-    /// Losses of the joints, N m, over a time `step_s` from latent state `start` to `end` (both `(z, dz)`): at the mean
-    /// decoded velocities, with their difference as acceleration. Zero without actuators, at most the torque limit.
-    pub fn planned_losses(&self, start: &[f64], end: &[f64], step_s: f64) -> [f64; JOINT_DIM] {
+    /// Losses of the joints, N m, over a time `step_s` of a phase from latent state `start` to `end` (both `(z, dz)`): at
+    /// the mean decoded velocities, with their difference as acceleration, by the rule of the inputs. Zero without
+    /// actuators, at most the torque limit.
+    pub fn planned_losses(
+        &self,
+        phase: usize,
+        start: &[f64],
+        end: &[f64],
+        step_s: f64,
+    ) -> [f64; JOINT_DIM] {
         let Some(actuators) = self.input_rule.actuators() else {
             return [0.0; JOINT_DIM];
         };
@@ -181,7 +188,13 @@ impl ControlModel {
             self.decode_joint_velocities(z, dz)
         });
         let limit = self.robot().torque_limit_nm();
-        let of = |joint: usize| actuators.named().map(|(_, values)| values[joint]);
+        let has_inertia = (self.input_rule).inertia_is_loss(self.phases[phase].is_grounded);
+        let armature = if has_inertia {
+            actuators.armature
+        } else {
+            [0.0; JOINT_DIM]
+        };
+        let of = |joint: usize| [actuators.viscous, actuators.dry, armature].map(|of| of[joint]);
         std::array::from_fn(|i| planned_loss(&of(i), before[i], after[i], step_s, limit[i]))
     }
 

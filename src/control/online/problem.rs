@@ -331,7 +331,7 @@ pub fn to_upright(frame: WrenchFrame, attitude: [f64; 2]) -> [[f64; 3]; 3] {
     let mut rotation = [[0.0; 3]; 3];
     match frame {
         WrenchFrame::Body => write_upright(&attitude, &mut rotation),
-        WrenchFrame::World => write_upright(&[0.0; 2], &mut rotation),
+        WrenchFrame::World | WrenchFrame::Ground => write_upright(&[0.0; 2], &mut rotation),
     }
     rotation
 }

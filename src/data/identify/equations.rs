@@ -79,19 +79,15 @@ impl SampleEquations {
                     acceleration: of(&motion.coordinates),
                     torque: of(&torque),
                     torque_rate: of(&torque_rate),
-                    own: own_torques(robot, motion, leg, sample, gravity_m_s2),
+                    own: motion.own_torques(leg, sample, gravity_m_s2),
                 };
                 for (moment, direction) in MOMENTS.into_iter().zip(&motion.leg(leg, sample)) {
                     body.subtract(moment, direction);
                 }
                 if segment.feet[sample][leg.index()] {
-                    let q = leg.of_joints(&segment.joints(sample));
-                    let posture = robot.geometry(leg).manipulability(&q);
-                    match robot.foot_force_map(leg, &q) {
-                        Ok(map) if posture >= LEAST_MANIPULABILITY => {
-                            body.add_foot(&state, &(motion.attitude[sample] * map));
-                        }
-                        Ok(_) | Err(_) => equations.singular[sample] = true,
+                    match &motion.force_maps[sample][leg.index()] {
+                        Some(map) => body.add_foot(&state, map),
+                        None => equations.singular[sample] = true,
                     }
                 }
                 for kind in 0..LEG_JOINT_DIM {
@@ -191,26 +187,17 @@ impl LegSample {
     }
 }
 
-/// Per unit of each of [`OWN`]: a mass at `s` from a point that accelerates by `a` needs the moment `s x (a + s'')`.
+/// Per unit of each of [`OWN`]: a mass at `s` from a point that accelerates by `a` needs the moment `s x (a + s'')`. Of
+/// the acceleration of the hip and the second derivatives of the leg's directions.
 fn own_torques(
-    robot: &Robot,
-    motion: &Motion,
-    leg: Leg,
-    sample: usize,
-    gravity_m_s2: f64,
+    frame: &LegFrame,
+    links: &LegLinks,
+    hip: Vector3<f64>,
+    [side2, thigh2, calf2, thigh_front2, calf_front2]: &Directions,
 ) -> [Vector3<f64>; OWN.len()] {
-    let links = robot.geometry(leg).links();
     let [side_m, thigh_m] = [links.hip.norm(), links.thigh.norm()];
-    let frame = &motion.legs[sample][leg.index()];
     let [to_side, to_knee, to_foot, thigh_front, calf_front] = &frame.directions;
-    let [side2, thigh2, calf2, thigh_front2, calf_front2] = motion.leg(leg, sample);
-    let hip = robot.hip_position(leg);
-    let trunk = motion.body(sample)
-        + Vector3::z() * gravity_m_s2
-        + (0..3).fold(Vector3::zeros(), |sum, axis| {
-            sum + hip[axis] * motion.trunk_axis(axis, sample)
-        });
-    let plane = trunk + side_m * side2;
+    let plane = hip + side_m * side2;
     let knee = plane + thigh_m * thigh2;
     let abduction = frame.abduction;
     let (side, thigh) = (side_m * to_side, thigh_m * to_knee);
@@ -230,16 +217,16 @@ fn own_torques(
         let about_knee = direction.cross(&knee);
         torques(about_knee + thigh.cross(&second), about_knee, second)
     };
-    let thigh_turn = to_knee.cross(&thigh2);
-    let calf_turn = to_foot.cross(&calf2);
+    let thigh_turn = to_knee.cross(thigh2);
+    let calf_turn = to_foot.cross(calf2);
     [
         Vector3::new(abduction.dot(&to_side.cross(&plane)), 0.0, 0.0),
-        on_thigh(to_knee, thigh2),
+        on_thigh(to_knee, *thigh2),
         torques(thigh_turn, none, none),
-        on_calf(to_foot, calf2),
+        on_calf(to_foot, *calf2),
         torques(calf_turn, calf_turn, none),
-        on_thigh(thigh_front, thigh_front2),
-        on_calf(calf_front, calf_front2),
+        on_thigh(thigh_front, *thigh_front2),
+        on_calf(calf_front, *calf_front2),
     ]
 }
 
@@ -268,6 +255,10 @@ pub(crate) struct Motion {
     pub attitude: Vec<Matrix3<f64>>, // rotation from trunk to world at each sample
     pub trunk_rate: Vec<Vector3<f64>>, // angular velocity of the trunk in the world, rad/s
     pub(crate) legs: Vec<[LegFrame; 4]>,
+    /// From the torques of each leg to its force in the world; none near a singular posture and for legs in the air.
+    force_maps: Vec<[Option<Matrix3<f64>>; 4]>,
+    /// Torques of the links of each leg per unit of each of [`OWN`]: without gravity, and by a gravity of 1 m/s^2.
+    own: Vec<[[[Vector3<f64>; OWN.len()]; 2]; 4]>,
     pub coordinates: DMatrix<f64>, // accelerations of the recorded coordinates, 18 x n, per s^2
     directions: DMatrix<f64>, // of trunk axes (9 rows), then of each leg's five directions, 69 x n
 }
@@ -283,6 +274,8 @@ impl Motion {
             attitude: Vec::with_capacity(n),
             trunk_rate: Vec::with_capacity(n),
             legs: Vec::with_capacity(n),
+            force_maps: Vec::with_capacity(n),
+            own: Vec::with_capacity(n),
             coordinates: differences(&segment.time_s, &segment.dx),
             directions: DMatrix::zeros(0, 0),
         };
@@ -314,12 +307,37 @@ impl Motion {
                 }
                 frame
             });
+            let force_map = |leg: Leg| {
+                let q = leg.of_joints(&segment.joints(sample));
+                let is_regular = segment.feet[sample][leg.index()]
+                    && robot.geometry(leg).manipulability(&q) >= LEAST_MANIPULABILITY;
+                let map = is_regular.then(|| robot.foot_force_map(leg, &q).ok());
+                map.flatten().map(|map| attitude * map)
+            };
+            motion.force_maps.push(Leg::ALL.map(force_map));
             motion.attitude.push(attitude);
             motion.trunk_rate.push(rate);
             motion.legs.push(legs);
         }
         motion.directions = differences(&segment.time_s, &rates);
+        for sample in 0..n {
+            let own = Leg::ALL.map(|leg| {
+                let (frame, links) = (&motion.legs[sample][leg.index()], &links[leg.index()]);
+                let hip = robot.hip_position(leg);
+                let turned = (0..3).map(|axis| hip[axis] * motion.trunk_axis(axis, sample));
+                let hip = motion.body(sample) + turned.sum::<Vector3<f64>>();
+                let still = [Vector3::zeros(); 5];
+                [(hip, motion.leg(leg, sample)), (Vector3::z(), still)]
+                    .map(|(hip, directions)| own_torques(frame, links, hip, &directions))
+            });
+            motion.own.push(own);
+        }
         motion
+    }
+
+    fn own_torques(&self, leg: Leg, sample: usize, gravity_m_s2: f64) -> [Vector3<f64>; OWN.len()] {
+        let [without, by_gravity] = &self.own[sample][leg.index()];
+        std::array::from_fn(|i| without[i] + gravity_m_s2 * by_gravity[i])
     }
 
     pub(crate) fn body(&self, sample: usize) -> Vector3<f64> {

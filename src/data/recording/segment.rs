@@ -240,7 +240,7 @@ impl Segment {
             .collect()
     }
 
-    /// What the joints take of the motors' torques, 12 x n, in N m; zero without actuators.
+    /// [`InputRule::losses`] of the joints, 12 x n, in N m.
     pub fn losses(&self, rule: &InputRule) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(JOINT_DIM, self.len());
         if rule.actuators().is_none() {
@@ -250,7 +250,7 @@ impl Segment {
         for (sample, mut column) in out.column_iter_mut().enumerate() {
             let dq = std::array::from_fn(|i| self.dx[(i, sample)]);
             let ddq = std::array::from_fn(|i| ddq[(i, sample)]);
-            column.copy_from_slice(&rule.losses(&dq, &ddq));
+            column.copy_from_slice(&rule.losses(&dq, &ddq, self.feet[sample]));
         }
         out
     }
@@ -293,7 +293,7 @@ impl Segment {
                 continue;
             }
             let net = std::array::from_fn(|i| net[(i, sample)]);
-            let wrench = rule.wrench(&self.state(sample), &net, self.feet[sample]);
+            let wrench = rule.input_wrench(&self.state(sample), &net, self.feet[sample]);
             let refused = |e| RecordingFault::Wrench(Box::new(e)).at(&self.path, self.row(sample));
             to.copy_from(&wrench.map_err(refused)?);
         }

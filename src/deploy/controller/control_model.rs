@@ -66,6 +66,7 @@ impl<'a> ControlModelText<'a> {
             frame: match rule.wrench_frame() {
                 WrenchFrame::Body => "Body",
                 WrenchFrame::World => "World",
+                WrenchFrame::Ground => "Ground",
             },
             actuators: (rule.actuators().iter())
                 .flat_map(|actuators| actuators.named())

@@ -148,10 +148,19 @@ fn input_in_words(rule: &InputRule, name: &str) -> String {
             "force and moment are those of the feet on the body, the force in world axes, the moments \
              those that do work on the rates of roll, pitch and yaw about the body's origin"
         }
+        WrenchFrame::Ground => {
+            "force and moment are those of the feet that push the body, the force in world axes, the \
+             moments those that do work on the rates of roll, pitch and yaw about the body's origin"
+        }
     };
     let of_torques = match rule.actuators() {
         None => "",
-        Some(_) => ", of torques less the inertia of the motors times ddq",
+        Some(_) if rule.inertia_is_loss(false) => {
+            ", of torques less the inertia of the motors times ddq"
+        }
+        Some(_) => {
+            ", of torques less, with a foot on the ground, the inertia of the motors times ddq"
+        }
     };
     let text = format!(
         "Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it{of_torques}."

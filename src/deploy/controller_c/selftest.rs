@@ -140,9 +140,9 @@ fn inputs(rule: &InputRule, jump: &PlannedJump) -> Result<Vec<f64>, EmitError> {
         let ddq = std::array::from_fn(|joint| {
             (jump.dx[(joint, after)] - jump.dx[(joint, before)]) / passed_s
         });
-        let losses = rule.losses(&dq, &ddq);
+        let losses = rule.losses(&dq, &ddq, jump.feet[k]);
         let net: [f64; JOINT_DIM] = std::array::from_fn(|joint| torque[joint] - losses[joint]);
-        let wrench = rule.wrench(&x, &net, jump.feet[k])?;
+        let wrench = rule.input_wrench(&x, &net, jump.feet[k])?;
         u.extend(net);
         u.extend(wrench.iter());
     }

@@ -27,6 +27,9 @@ pub(super) struct Source<'a> {
     n_paired: usize,
     max_nnz: usize,
     has_actuators: bool,
+    /// Of a phase, whether the rotors' inertia is a loss; and without a foot on the ground.
+    inertia_is_loss: String,
+    inertia_is_always_loss: bool,
     given_state: String,
     given_covariance: String,
     acceleration_error: String,
@@ -93,6 +96,12 @@ impl<'a> Source<'a> {
             given_covariance: of_given(|given| &given.covariance),
             acceleration_error: of_given(|given| &given.acceleration_error),
             has_actuators: plant.input_rule().actuators().is_some(),
+            inertia_is_loss: integers(
+                phases
+                    .iter()
+                    .map(|phase| i64::from(plant.input_rule().inertia_is_loss(phase.is_grounded))),
+            ),
+            inertia_is_always_loss: plant.input_rule().inertia_is_loss(false),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: solver_numbers(precision, mpc.qp.accepted_residual),
             functions: for_controller(FUNCTIONS, facts.name),
@@ -107,7 +116,7 @@ impl<'a> Source<'a> {
             legs: nested(Leg::ALL.map(|leg| numbers.leg(&robot.geometry(leg).shape))),
             arm_from: numbers.matrix(match plant.input_rule().wrench_frame() {
                 WrenchFrame::Body => [[0.0; 3]; 4],
-                WrenchFrame::World => robot.hip_position_m,
+                WrenchFrame::World | WrenchFrame::Ground => robot.hip_position_m,
             }),
             torque_mean: numbers.matrix(phases.iter().map(|phase| &phase.torque_mean)),
             torque_deviation: nested(deviations),

@@ -270,7 +270,7 @@ fn lifted_input(
         let net = command.net_torque_nm();
         input[..JOINT_DIM].copy_from_slice(&net);
         let rule = controller.plant().input_rule();
-        if let Ok(wrench) = rule.wrench(&segment.state(sample), &net, segment.feet[sample]) {
+        if let Ok(wrench) = rule.input_wrench(&segment.state(sample), &net, segment.feet[sample]) {
             input[JOINT_DIM..].copy_from_slice(wrench.as_slice());
         }
     }

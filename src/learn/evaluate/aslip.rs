@@ -164,7 +164,7 @@ pub(super) fn stances(
         let force = input.fixed_view::<3, 1>(JOINT_DIM, sample).into_owned();
         let force = match rule.wrench_frame() {
             WrenchFrame::Body => orientation(segment, sample) * force,
-            WrenchFrame::World => force,
+            WrenchFrame::World | WrenchFrame::Ground => force,
         };
         stances.push(Some(Stance {
             foot_m: foot,

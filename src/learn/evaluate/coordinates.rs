@@ -288,7 +288,7 @@ impl LiftSums {
             if feet.contains(&true) {
                 let torque = std::array::from_fn(|joint| lifted[joint]);
                 let force = lifted.rows(JOINT_DIM, 6).into_owned();
-                if let Ok(produced) = rule.wrench(&segment.state(sample), &torque, feet)
+                if let Ok(produced) = rule.input_wrench(&segment.state(sample), &torque, feet)
                     && force.norm() > SMALL_FORCE_N
                 {
                     let off = (&force - produced).norm() / force.norm();

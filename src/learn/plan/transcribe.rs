@@ -161,7 +161,7 @@ impl<'a> Task<'a> {
         });
         let accelerations = &self.seed.decode * mean;
         let first = |v: &DVector<f64>| std::array::from_fn(|i| v[i]);
-        (self.seed.rule).losses(&first(&rates), &first(&accelerations))
+        (self.seed.rule).losses(&first(&rates), &first(&accelerations), of.landmark.feet)
     }
 
     pub(crate) fn program(&self, y: &[f64]) -> ConeProgram {

@@ -53,7 +53,7 @@ impl ScaleOptions {
             force: 0.005,
             moment: match frame {
                 WrenchFrame::Body => 0.05,
-                WrenchFrame::World => 0.02,
+                WrenchFrame::World | WrenchFrame::Ground => 0.02,
             },
         }
     }

@@ -16,6 +16,9 @@ const PITCH: usize = JOINT_DIM + 4;
 /// Body coordinates of the momentum rows: the centre of mass forwards and upwards, and the rotation about it.
 const MOMENTUM: [usize; 3] = [BODY_X, BODY_Z, PITCH];
 pub(super) const TURN: usize = 2;
+/// Latent coordinates from which on the rotation about the centre of mass is a row. With fewer, torques of the legs are
+/// lost when there is one.
+const TURNING_DIM: usize = 5;
 /// Latent coordinates from which on the rows are those of the whole body in its plane: three of momentum, four of legs.
 pub(super) const WHOLE_BODY_DIM: usize = 7;
 const WINDOW_S: f64 = 0.05; // over which accelerations in flight are averaged
@@ -60,7 +63,8 @@ impl Frame {
     }
 
     /// With [`Coordinates::Named`] and two or more latent coordinates, the first two rows are the centre of mass. With
-    /// seven or more the third is the rotation about it, and the next four are foot positions relative to it. The others
+    /// five or more the third is the rotation about it, with seven or more the next four are foot positions relative to
+    /// it. The others
     /// combine mirror-symmetric sums of `active` coordinates: neither `y`, roll and yaw, nor left and right; nor pitch
     /// where a row contains it.
     pub(super) fn new(
@@ -75,7 +79,7 @@ impl Frame {
         }
         let (body, count): (&[usize], usize) = match latent_dim {
             0 | 1 => (&[BODY_X, BODY_Z, PITCH], 0),
-            2..WHOLE_BODY_DIM => (&[PITCH], 2),
+            2..TURNING_DIM => (&[PITCH], 2),
             _ => (&[], MOMENTUM.len()),
         };
         let momentum = momentum_rows(training, count, robot);
@@ -83,7 +87,7 @@ impl Frame {
         let mut held: Vec<DVector<f64>> =
             momentum.column_iter().map(|row| row.into_owned()).collect();
         let mut legs = Vec::new();
-        if count == MOMENTUM.len() {
+        if latent_dim >= WHOLE_BODY_DIM {
             for (row, leg) in leg_rows(training, &momentum, robot) {
                 held.push(row);
                 legs.push(leg);
@@ -97,6 +101,16 @@ impl Frame {
             held: DMatrix::from_fn(STATE_DIM, held.len(), |row, k| held[k][row]),
             momentum: count,
             legs,
+        }
+    }
+
+    /// How many of `latent_dim` coordinates predictions of whole jumps are judged by: of the whole body the first two, the
+    /// centre of mass. Errors of rotation and legs there grow with the least difference at take-off.
+    pub(super) fn judged_over_jumps(&self, latent_dim: usize) -> usize {
+        if self.legs.is_empty() {
+            latent_dim
+        } else {
+            TURN
         }
     }
 

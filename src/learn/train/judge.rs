@@ -13,6 +13,7 @@ const ROLLOUT_WEIGHT: f64 = 0.2; // of whole-jump rollouts against predictions o
 const THINNED: usize = 5; // samples between errors that coefficients are refined by
 /// Jumps of a part: with all errors at once, their derivatives would fill the memory for sets of many jumps.
 const JUMPS: usize = 64;
+const TOGETHER: usize = 8; // windows whose changed predictions are computed at once
 const LEAST_ERROR: f64 = 1e-3; // in standard deviations; others are relative to at least this
 const SHORT: usize = 0; // windows of 0.1 s; LONG: whole jumps
 const LONG: usize = 1;
@@ -23,20 +24,27 @@ pub(super) struct Judge<'a> {
     pub features: &'a Features,
     set: EncodedSet<'a>,
     windows: [Vec<Window>; 2], // short and long
-    scales: [Vec<f64>; 2],     // what errors are multiplied by, a coordinate
+    scales: [Vec<f64>; 2], // what errors are multiplied by; one number for each coordinate that counts
 }
 
 impl<'a> Judge<'a> {
-    pub(super) fn new(features: &'a Features, set: EncodedSet<'a>) -> Self {
-        let inverse_std: Vec<f64> = (0..set.latent_dim())
-            .map(|row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE))
-            .collect();
+    /// Over whole jumps the first `long` coordinates count.
+    pub(super) fn new(features: &'a Features, set: EncodedSet<'a>, long: usize) -> Self {
+        let inverse_std = |count: usize| {
+            let inverse = |row| 1.0 / row_std(set.latent, row).max(f64::MIN_POSITIVE);
+            (0..count).map(inverse).collect()
+        };
         Self {
             features,
             set,
             windows: [Restart::Every(0.1), Restart::Never].map(|every| windows(set.dataset, every)),
-            scales: [inverse_std.clone(), inverse_std],
+            scales: [set.latent_dim(), long].map(inverse_std),
         }
+    }
+
+    /// The same score of predictions on other jumps.
+    pub(super) fn over(&self, set: EncodedSet<'a>) -> Self {
+        Self::new(self.features, set, self.scales[LONG].len())
     }
 
     /// Judges by errors relative to those of `xi`: a tenth less counts alike for a body that jumps 0.5 m and a leg.
@@ -91,10 +99,12 @@ impl<'a> Judge<'a> {
         let candidate = Candidate { features, xi };
         let of_kind = |kind: usize| {
             let mut errors = vec![Vec::new(); changes.len()];
-            for window in self.windows_of(part, kind) {
-                let predictions = predict_changed(candidate, changes, self.set, *window);
-                for (errors, prediction) in errors.iter_mut().zip(&predictions) {
-                    self.add_errors(kind, window, prediction, errors);
+            for windows in self.windows_of(part, kind).chunks(TOGETHER) {
+                let predictions = predict_changed(candidate, changes, self.set, windows);
+                for (window, predictions) in windows.iter().zip(&predictions) {
+                    for (errors, prediction) in errors.iter_mut().zip(predictions) {
+                        self.add_errors(kind, window, prediction, errors);
+                    }
                 }
             }
             errors.into_iter().map(DVector::from_vec)

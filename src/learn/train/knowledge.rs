@@ -7,11 +7,15 @@ use nalgebra::{DMatrix, DVector};
 use super::dataset::Dataset;
 use super::features::Features;
 use super::frame::{Frame, LegRow, TURN};
+use super::latent::EncodedSet;
+use super::sparse::Regression;
+use super::weak_form::flight_samples;
 use crate::robot::{BODY_Z, FeetRule, GRAVITY_M_S2};
 
 const HEIGHT: usize = 1; // the momentum row upwards
-const STANDING_DAMPING_PER_S: f64 = 40.0; // of feet that slip
-const STANDING_STIFFNESS_PER_S2: f64 = 500.0; // of the ground
+const STANDING_DAMPING_PER_S: f64 = 70.0; // of feet that slip
+const STANDING_STIFFNESS_PER_S2: f64 = 400.0; // of the ground
+const FLIGHT_RIDGE: f64 = 1e-4; // on the normalised columns
 
 /// Known coefficients of one phase, and those left to a regression; all `library_dim x latent_dim`.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +25,7 @@ pub(super) struct Knowledge {
     pub kept: DMatrix<bool>,    // free, and stay whatever they explain
     pub braking: DMatrix<bool>, // free, and at most 0 once refined
     standing: Vec<Standing>,    // equations of the legs, if they stand in this phase
+    swinging: Range<usize>,     // columns of the legs, if this phase is flight
 }
 
 /// Prior of a leg on the ground. With the row `rho` of the pair and the momentum rows `b` and `t` its feet are at
@@ -80,7 +85,31 @@ impl Knowledge {
             kept: DMatrix::from_element(library_dim, latent_dim, false),
             braking: DMatrix::from_element(library_dim, latent_dim, false),
             standing: Vec::new(),
+            swinging: 0..0,
         }
+    }
+
+    /// With the equations of the legs in flight known. They depend on inputs only, so that positions are linear in their
+    /// coefficients: least squares over windows and whole flights of the training.
+    pub(super) fn with_flights(
+        &self,
+        set: EncodedSet<'_>,
+        features: &Features,
+        phase: usize,
+    ) -> Self {
+        let mut fitted = self.clone();
+        if self.swinging.is_empty() {
+            return fitted;
+        }
+        let (theta, target) = flight_samples(set, features, phase);
+        let regression = Regression::new(&theta, &target, self.clone());
+        for column in self.swinging.clone() {
+            let coefficients = regression.fit_column(column, &self.free, FLIGHT_RIDGE);
+            fitted.known.set_column(column, &coefficients);
+            fitted.free.column_mut(column).fill(false);
+            fitted.kept.column_mut(column).fill(false);
+        }
+        fitted
     }
 
     pub(super) fn standing(&self, column: usize) -> Option<&Standing> {
@@ -211,9 +240,10 @@ impl Knowledge {
         for k in TURN..momentum {
             self.free.column_mut(k).fill(false);
         }
-        for k in legs {
+        for k in legs.clone() {
             self.keep(k, features, &loads);
         }
+        self.swinging = legs;
     }
 }
 

@@ -148,9 +148,9 @@ impl TrainOptions {
             phases: PhaseRule::two_phase().with_min_samples(CHATTER_SAMPLES),
             seed: 1,
             n_seeds: 1,
-            scaling: ScaleOptions::in_frame(WrenchFrame::World),
+            scaling: ScaleOptions::in_frame(WrenchFrame::Ground),
             actuators: None,
-            wrench_frame: WrenchFrame::World,
+            wrench_frame: WrenchFrame::Ground,
             encoder: EncoderOptions {
                 lift_weight: 1e-3,
                 body_weight: 300.0,

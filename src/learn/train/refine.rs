@@ -48,6 +48,7 @@ impl FreeCoefficients {
         for (phase, (xi, knowledge)) in xi.iter().zip(knowledge).enumerate() {
             let active = (0..xi.len()).filter(|&i| xi[i] != 0.0 && knowledge.free[i]);
             let places = active.map(|i| xi.vector_to_matrix_index(i));
+            let places = places.filter(|(_, column)| knowledge.standing(*column).is_none());
             (free.indices).extend(places.map(|(term, column)| (phase, term, column)));
         }
         free.scales = free.values(xi).abs();
@@ -95,7 +96,8 @@ impl ErrorModel {
 
 impl Refiner<'_> {
     /// Lowers the errors that `training` measures in at most `steps` steps, and gives the coefficients that `judge`
-    /// scores best on the way. Known coefficients stay, and so do those that are 0.
+    /// scores best on the way. Unchanged are known coefficients, those that are 0, and the equations of standing legs,
+    /// which predict unseen jumps worse when refined.
     pub(super) fn refine(
         &self,
         start: Coefficients,

@@ -93,25 +93,34 @@ pub(super) fn predict(
     predictions
 }
 
-/// As [`predict`] for one window, once with each of the changes.
+/// As [`predict`], every window once with each of the changes.
 pub(super) fn predict_changed(
     candidate: Candidate<'_>,
     changes: &[Change],
     set: EncodedSet<'_>,
-    window: Window,
-) -> Vec<DMatrix<f64>> {
-    let phases = &set.dataset.jumps[window.jump].phase[window.start..][..window.steps];
-    let counts = |change: &&Change| phases.contains(&change.place.0);
-    let counted = changes.iter().filter(counts).copied().map(Some);
-    let rows = std::iter::once(None).chain(counted);
-    let rows: Vec<Row> = rows.map(|change| Row { window, change }).collect();
+    windows: &[Window],
+) -> Vec<Vec<DMatrix<f64>>> {
+    let counts = |window: Window, change: &Change| {
+        let phases = &set.dataset.jumps[window.jump].phase[window.start..][..window.steps];
+        phases.contains(&change.place.0)
+    };
+    let mut rows = Vec::new();
+    for &window in windows {
+        let counted = changes.iter().filter(|change| counts(window, change));
+        let each = std::iter::once(None).chain(counted.copied().map(Some));
+        rows.extend(each.map(|change| Row { window, change }));
+    }
     let mut predictions = predict(candidate, set, &rows).into_iter();
-    let unchanged = predictions.next().expect("invariant: one row");
-    let each = changes.iter().map(|change| match counts(&change) {
-        true => predictions.next().expect("invariant: one per change"),
-        false => unchanged.clone(),
+    let mut next = || predictions.next().expect("invariant: one per row");
+    let of_windows = windows.iter().map(|&window| {
+        let unchanged = next();
+        let each = changes.iter().map(|change| match counts(window, change) {
+            true => next(),
+            false => unchanged.clone(),
+        });
+        each.collect()
     });
-    each.collect()
+    of_windows.collect()
 }
 
 struct Stepper<'a> {

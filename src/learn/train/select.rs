@@ -80,7 +80,7 @@ pub(super) fn select(
     let mut tried = refiner.try_all(regressions, monitor);
     let candidates = tried.len();
     let reference = best_of(&tried)?.now.xi.clone();
-    let training = Judge::new(features, set).relative_to(&reference);
+    let training = judge.over(set).relative_to(&reference);
     let relative = &judge.relative_to(&reference);
     for trial in tried.iter_mut().filter(|trial| trial.is_stable()) {
         trial.score_by(relative);
@@ -225,6 +225,9 @@ impl Refiner<'_> {
                 let fits: Vec<Vec<Xi>> = fits.collect();
                 for (number, pruning) in PRUNINGS.into_iter().enumerate() {
                     let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
+                    if tried.iter().any(|trial: &Trial<'_>| trial.now.xi == xi) {
+                        continue;
+                    }
                     let score = self.judge.score_within(&xi, f64::MAX);
                     let mut trial = Trial {
                         now: Coefficients { xi, score },

@@ -320,10 +320,14 @@ impl Task<'_> {
     ) -> Result<Fitted, TrainError> {
         let maps = self.encoded(encoder, decoder);
         let (options, features) = (&self.options.regression, &self.features);
-        let judge = Judge::new(features, maps.judged_set(self));
         let set = maps.training_set(self);
         check_terms(set, features, &self.library)?;
-        let (xi, choice, candidates) = select(set, &self.knowledge, &judge, options, monitor)?;
+        let long = self.frame.judged_over_jumps(set.latent_dim());
+        let judge = Judge::new(features, maps.judged_set(self), long);
+        let knowledge = self.knowledge.iter().enumerate();
+        let knowledge = knowledge.map(|(phase, known)| known.with_flights(set, features, phase));
+        let knowledge: Vec<Knowledge> = knowledge.collect();
+        let (xi, choice, candidates) = select(set, &knowledge, &judge, options, monitor)?;
         Ok(Fitted {
             maps,
             xi,

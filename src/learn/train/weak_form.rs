@@ -8,6 +8,8 @@ use super::latent::EncodedSet;
 use crate::model::Library;
 
 const STRIDE: usize = 5; // samples between the starts of two windows
+const FLIGHT_WINDOW: usize = 50; // samples
+const WHOLE_FLIGHTS: f64 = 10.0; // weight of the errors of whole flights against those of windows
 const LARGEST: f64 = 1e150; // magnitude of a term: sums of its squares stay finite
 
 /// Complains about the first term of `library` without a finite value at a sample, or with one whose square overflows.
@@ -90,6 +92,26 @@ pub(super) fn windowed_samples(
         DMatrix::from_row_slice(n, p, &theta_rows),
         DMatrix::from_row_slice(n, d, &target_rows),
     )
+}
+
+/// Rows of a phase over windows of [`FLIGHT_WINDOW`] samples and over whole spans. The root mean square of the latter
+/// counts [`WHOLE_FLIGHTS`] times as much, however many they are.
+pub(super) fn flight_samples(
+    set: EncodedSet<'_>,
+    features: &Features,
+    phase: usize,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let parts = windowed_samples(set, features, phase, FLIGHT_WINDOW);
+    let whole = windowed_samples(set, features, phase, usize::MAX);
+    let share = parts.0.nrows() as f64 / whole.0.nrows().max(1) as f64;
+    let weight = WHOLE_FLIGHTS * share.sqrt();
+    let stacked = |part: DMatrix<f64>, whole: DMatrix<f64>| {
+        let (above, below) = (part.nrows(), whole.nrows());
+        let mut rows = part.resize_vertically(above + below, 0.0);
+        rows.rows_mut(above, below).copy_from(&(whole * weight));
+        rows
+    };
+    (stacked(parts.0, whole.0), stacked(parts.1, whole.1))
 }
 
 /// Theta integrated once and twice from the first sample on, `n x library_dim`.

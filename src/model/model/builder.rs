@@ -229,7 +229,7 @@ impl ModelBuilder {
     fn check_input_rule(&self) -> Result<()> {
         let part = match (&self.actuators, self.wrench_frame) {
             (Some(_), _) => "actuators",
-            (None, WrenchFrame::World) => "wrench_frame",
+            (None, WrenchFrame::World | WrenchFrame::Ground) => "wrench_frame",
             (None, WrenchFrame::Body) => return Ok(()),
         };
         if self.robot.is_none() {
