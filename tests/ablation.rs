@@ -265,7 +265,10 @@ fn broken(model: &ReducedModel) -> [(&'static str, ReducedModel); 4] {
         ("negated", phases(&|index| -xi(index))),
         ("zeroed", phases(&|index| xi(index) * 0.0)),
         ("columns shuffled", phases(&|index| columns(xi(index)))),
-        ("phases exchanged", phases(&|index| xi(index + 1).clone())),
+        (
+            "phases exchanged",
+            phases(&|index| xi(index + model.phases().len() - 1).clone()),
+        ),
     ]
 }
 

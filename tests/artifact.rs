@@ -467,7 +467,7 @@ fn actuators_and_frame_that_are_wrong_are_refused_at_their_place() {
     });
     assert_eq!(place, "wrench_frame");
     assert!(
-        message.contains("\"hips\", expected \"body\" or \"world\""),
+        message.contains("\"hips\", expected \"body\", \"world\" or \"ground\""),
         "{message}"
     );
     let (place, message) = syntax_refusal("net-torques", |value| {

@@ -494,15 +494,15 @@ fn train_takes_what_the_joints_take_off_the_torques_and_says_so() {
     let written = romc::artifact::read(Path::new(&model)).expect("a model");
     let actuators = written.actuators().expect("given");
     assert_eq!((actuators.viscous[3], actuators.armature[11]), (1.0, 0.01));
-    assert_eq!(written.wrench_frame(), WrenchFrame::World);
+    assert_eq!(written.wrench_frame(), WrenchFrame::Ground);
     let command = written.provenance()["command"].to_string();
     assert!(
         command.contains(&format!("--actuators {losses} ")),
         "{command}"
     );
-    assert!(command.contains("--wrench-frame world"), "{command}");
+    assert!(command.contains("--wrench-frame ground"), "{command}");
     let told = json(&["inspect", &model])["files"][0].clone();
-    assert_eq!(told["wrench_frame"], "world");
+    assert_eq!(told["wrench_frame"], "ground");
     assert_eq!(told["actuators"]["viscous"][1], 0.6);
     let printed = done(&["inspect", &model]);
     assert!(
@@ -536,7 +536,7 @@ fn train_takes_what_the_joints_take_off_the_torques_and_says_so() {
     }
     let error = refused(&["train", jump, "--wrench-frame", "hip", "--output", &model]);
     assert!(
-        error.contains("found `hip`, expected `world` or `body`"),
+        error.contains("found `hip`, expected `ground`, `world` or `body`"),
         "{error}"
     );
 }
@@ -1054,7 +1054,7 @@ fn simulate_writes_one_row_a_sample_without_nan() {
         .lines()
         .find(|line| line.contains("touchdown  body.pitch"));
     assert!(
-        row.is_some_and(|row| row.ends_with("constant velocity, at rest")),
+        row.is_some_and(|row| row.contains("constant velocity, at rest")),
         "{long}"
     );
     let rows = fs::read_to_string(&table).expect("a table");

@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::DVector;
 use romc::evaluate::{Assessment, CoordinateSums, Horizon, PointwiseSums};
 use romc::lower::CompiledModel;
+use romc::model::JumpPart;
 use romc::sim::{LatentSegment, Restart, rollout};
 use romc::{artifact, recording};
 
@@ -105,8 +106,18 @@ fn horizons_are_those_of_the_recording() {
     let names: Vec<&str> = own.iter().map(|of| &of.name[..]).collect();
     assert_eq!(names, ["0.1 s", "0.2 s", "0.3 s", "take-off to touchdown"]);
     assert_eq!(
-        own[0].predictors.each_ref().map(|(name, _)| *name),
-        ["model", "constant velocity", "at rest"]
+        own[0]
+            .predictors
+            .iter()
+            .map(|(name, _)| *name)
+            .collect::<Vec<_>>(),
+        [
+            "model",
+            "constant velocity",
+            "at rest",
+            "mean training jump",
+            "rigid body"
+        ]
     );
     let rms = |horizon: usize, predictor: usize, coordinate: usize| {
         let fits = own[horizon].predictors[predictor].1.fits();
@@ -132,8 +143,38 @@ fn horizons_are_those_of_the_recording() {
     let touchdown = (take_off..segment.len())
         .find(|sample| !in_air(sample))
         .expect("a landing");
-    let moved = segment.x[(16, touchdown)] - segment.x[(16, take_off)];
-    assert!((rms(3, 2, 16) - moved.abs()).abs() < 1e-12);
+    let moved_by = |row: usize| segment.x[(row, touchdown)] - segment.x[(row, take_off)];
+    assert!((rms(3, 2, 16) - moved_by(16).abs()).abs() < 1e-12);
+    // In flight nothing turns a rigid body or pushes it forwards, until the step that ends with the touchdown.
+    let elapsed_s = segment.time_s[touchdown] - segment.time_s[take_off];
+    for row in [12, 16] {
+        assert!((rms(3, 4, row) - rms(3, 1, row)).abs() < 1e-4);
+    }
+    let drop =
+        moved_by(14) - elapsed_s * segment.dx[(14, take_off)] + 0.5 * 9.81 * elapsed_s.powi(2);
+    assert!((rms(3, 4, 14) - drop.abs()).abs() < 1e-4);
+    // The mean jump is that of the goal in the middle of the training's.
+    let prior = model.jump_prior().expect("trained on jumps");
+    let features = prior.features(prior.ranges().map(|range| range.mean));
+    let at = |part: usize, share: f64| {
+        let of = &prior.parts[part];
+        let node = share * (of.nodes() - 1) as f64;
+        let [left, right] = [node.floor(), node.ceil()].map(|node| {
+            let z = JumpPart::at(&of.z, node as usize, &features);
+            model.decode(&z).expect("a latent state")[12]
+        });
+        left + (right - left) * node.fract()
+    };
+    let flight_s = prior.parts[2].duration(&features);
+    let landed = match elapsed_s <= flight_s {
+        true => at(2, elapsed_s / flight_s),
+        false => at(
+            3,
+            (elapsed_s - flight_s) / prior.parts[3].duration(&features),
+        ),
+    };
+    let missed = moved_by(12) - (landed - at(2, 0.0));
+    assert!((rms(3, 3, 12) - missed.abs()).abs() < 1e-9, "{missed}");
     // The shipped model falls as the robot does; without gravity it misses the ground by its fall.
     assert!(rms(3, 0, 14) < 5e-3, "{}", rms(3, 0, 14));
     let mut file: serde_json::Value =
@@ -144,7 +185,6 @@ fn horizons_are_those_of_the_recording() {
     let missed = horizons(&afloat)[3].predictors[0].1.fits()[14]
         .expect("a flight")
         .rms;
-    let elapsed_s = segment.time_s[touchdown] - segment.time_s[take_off];
     let fall = 0.5 * 9.81 * elapsed_s * elapsed_s;
     assert!((missed - fall).abs() < 0.02 * fall, "{missed} {fall}");
 }

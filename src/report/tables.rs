@@ -141,7 +141,9 @@ pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -
     table
         .column("worse than", "", |(horizon, _, rows)| {
             let others = horizon.predictors.iter().enumerate().skip(1);
-            let better = others.filter(|(i, _)| rms(horizon, *i, rows) < rms(horizon, 0, rows));
+            let own = rms(horizon, 0, rows)?;
+            let better =
+                others.filter(|(i, _)| rms(horizon, *i, rows).is_some_and(|other| other < own));
             let better: Vec<&str> = better.map(|(_, (name, _))| *name).collect();
             (!better.is_empty()).then(|| better.join(", "))
         })
@@ -151,18 +153,15 @@ pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -
 pub(crate) fn horizon_json(of: &Assessment<'_>, horizon: &Horizon) -> Value {
     let coordinates = of.names.iter().zip(&of.units).enumerate();
     let coordinates = coordinates.map(|(i, (name, unit))| {
-        let fits = horizon
-            .predictors
-            .each_ref()
-            .map(|(_, sums)| sums.fits()[i]);
-        let [own, constant, rest] = fits;
-        let value = json!({
+        let own = horizon.predictors[0].1.fits()[i];
+        let mut value = json!({
             "unit": unit,
             "rms": rms(own),
             "r2": own.and_then(|fit| fit.r2),
-            "constant_velocity": rms(constant),
-            "at_rest": rms(rest),
         });
+        for (predictor, sums) in &horizon.predictors[1..] {
+            value[predictor.replace(' ', "_")] = json!(rms(sums.fits()[i]));
+        }
         (name.clone(), value)
     });
     let own = &horizon.predictors[0].1;

@@ -254,18 +254,3 @@ fn replay_moves_on_at_the_speed_of_the_push_and_feedback_does_not() {
         assert!(metrics.tracking_rms > without_push, "{metrics:?}");
     }
 }
-
-#[test]
-fn pitch_without_a_latent_coordinate_does_not_make_right_predictions_fail() {
-    let (metrics, _) = metrics_along("go1-other/jump_04", 0.01);
-    let own = metrics.prediction_rms.as_ref().expect("stages");
-    let constant = &metrics.baseline.constant_velocity.prediction_rms;
-    let constant = constant.as_ref().expect("stages");
-    assert!(own.pitch_rad > 2.0 * constant.pitch_rad, "{own:?}");
-    assert_eq!(own.latent.len(), 6);
-    let shares = own.latent.iter().zip(&constant.latent);
-    let share = shares.map(|(own, other)| own / other).sum::<f64>() / 6.0;
-    assert!(share < 0.7, "{share}: {own:?} {constant:?}");
-    let failure = metrics.failure.unwrap_or_default();
-    assert!(!failure.contains("one stage ahead"), "{failure}");
-}

@@ -78,7 +78,9 @@ mod inputs {
             let expected = segment.torque_nm[(4, 15)] - 0.6 * dq - 0.2 - 0.01 * ddq;
             assert!((u[(4, 15)] - expected).abs() < 1e-12);
             let net = std::array::from_fn(|i| u[(i, 15)]);
-            let wrench = rule.input_wrench(&segment.state(15), &net, [true; 4]).unwrap();
+            let wrench = rule
+                .input_wrench(&segment.state(15), &net, [true; 4])
+                .unwrap();
             assert_eq!(u.fixed_view::<6, 1>(12, 15), wrench);
         }
     }

@@ -132,12 +132,22 @@ impl CoordinateSums {
     }
 
     pub(super) fn add(&mut self, segment: &Segment, sample: usize, phase: usize, x: &DVector<f64>) {
-        let sums = self.sums.iter_mut().zip(&mut self.by_phase[phase]);
-        let recorded = segment.x.column(sample);
-        for (((sums, of_phase), &y), &y_hat) in sums.zip(recorded.iter()).zip(x) {
-            sums.add(y, y_hat);
-            of_phase.add(y, y_hat);
+        for (row, y_hat) in x.iter().enumerate() {
+            self.add_one(segment, sample, phase, (row, *y_hat));
         }
+    }
+
+    /// Adds the residual of one coordinate.
+    pub(super) fn add_one(
+        &mut self,
+        segment: &Segment,
+        sample: usize,
+        phase: usize,
+        (row, y_hat): (usize, f64),
+    ) {
+        let y = segment.x[(row, sample)];
+        self.sums[row].add(y, y_hat);
+        self.by_phase[phase][row].add(y, y_hat);
     }
 
     pub fn fits(&self) -> Vec<Option<Fit>> {

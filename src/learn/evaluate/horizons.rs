@@ -1,36 +1,46 @@
-//! Prediction errors of all coordinates over several horizons, compared with two baselines: a constant velocity and a
-//! robot at rest.
+//! Prediction errors of all coordinates over several horizons, compared with baselines: a constant velocity, a robot at
+//! rest, the mean training jump, and a rigid body.
 
 use std::ops::Range;
 
 use super::coordinates::coasted;
 use super::*;
-use crate::recording::{CHATTER_SAMPLES, PhaseRule, Stance};
+use crate::model::JumpPart;
+use crate::recording::{CHATTER_SAMPLES, PhaseRule, Stance, between};
+use crate::robot::{GRAVITY_M_S2, InputRule, WrenchFrame};
 use crate::sim::{restart_windows, rollout_over};
 
 /// Times between restarts, s.
 const RESTARTS_S: [f64; 3] = [0.1, 0.2, 0.3];
+const MODEL: &str = "model";
+const CONSTANT_VELOCITY: &str = "constant velocity";
+const AT_REST: &str = "at rest";
+const MEAN_JUMP: &str = "mean training jump";
+const RIGID_BODY: &str = "rigid body";
 
 impl Horizon {
     /// Predictions with restarts every 0.1, 0.2 and 0.3 s, all samples; and from each take-off, the sample of the
     /// touchdown only.
     pub fn all(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Vec<Self>> {
-        let names = ["model", "constant velocity", "at rest"];
         let compiled = CompiledModel::new(model)?;
+        let segments: Vec<&Segment> = assessment.runs.iter().map(|run| run.segment).collect();
+        let baselines = Baselines {
+            mean_jump: MeanJump::of(model)?,
+            rigid_body: RigidBody::of(model, &segments)?,
+        };
+        let names = [MODEL, CONSTANT_VELOCITY, AT_REST].into_iter();
+        let names = names.chain(baselines.mean_jump.as_ref().map(|_| MEAN_JUMP));
+        let names = names.chain(baselines.rigid_body.as_ref().map(|_| RIGID_BODY));
         let sums = CoordinateSums::new(model)?;
+        let predictors: Vec<_> = names.map(|name| (name, sums.clone())).collect();
         let restarts = RESTARTS_S.map(|time_s| (format!("{time_s} s"), Restart::Every(time_s)));
         let flights = ("take-off to touchdown".to_owned(), Restart::Never);
         let all = restarts.into_iter().chain([flights]);
         all.map(|(name, restart)| {
-            let mut horizon = Self {
-                name,
-                predictors: names.map(|name| (name, sums.clone())),
-            };
-            for SegmentRun {
-                segment, latent, ..
-            } in &assessment.runs
-            {
-                horizon.add(model, &compiled, (segment, latent), restart)?;
+            let predictors = predictors.clone();
+            let mut horizon = Self { name, predictors };
+            for (run, place) in assessment.runs.iter().zip(0..) {
+                horizon.add(model, &compiled, (run, place), &baselines, restart)?;
             }
             Ok(horizon)
         })
@@ -41,32 +51,52 @@ impl Horizon {
         &mut self,
         model: &ReducedModel,
         compiled: &CompiledModel,
-        (segment, latent): (&Segment, &LatentSegment),
+        (run, place): (&SegmentRun<'_>, usize),
+        baselines: &Baselines,
         restart: Restart,
     ) -> Result<()> {
+        let (segment, latent) = (run.segment, &run.latent);
+        let flights = flights(segment)?;
         let is_flight = restart == Restart::Never;
         let windows = match is_flight {
-            true => flights(segment)?,
+            true => flights.clone(),
             false => restart_windows(&latent.time_s, restart),
         };
+        let take_off_s = flights.first().map(|flight| segment.time_s[flight.start]);
         let rollout = rollout_over(compiled, latent, windows);
-        let [(_, own), (_, constant), (_, rest)] = &mut self.predictors;
         for (sample, window, column) in rollout.predictions() {
             let Range { start, end } = window.samples;
             if is_flight && sample + 1 < end {
                 continue;
             }
-            let phase = latent.phase[sample];
-            let x = model.decode(&window.z.column(column).into_owned())?;
-            own.add(segment, sample, phase, &x);
-            constant.add(segment, sample, phase, &coasted(segment, start, sample));
-            rest.add(
-                segment,
-                sample,
-                phase,
-                &segment.x.column(start).into_owned(),
-            );
+            let (phase, from) = (latent.phase[sample], segment.x.column(start));
+            for (name, sums) in &mut self.predictors {
+                let predicted = match *name {
+                    MODEL => Some(model.decode(&window.z.column(column).into_owned())?),
+                    CONSTANT_VELOCITY => Some(coasted(segment, start, sample)),
+                    AT_REST => Some(from.into_owned()),
+                    MEAN_JUMP => {
+                        (baselines.mean_jump.as_ref().zip(take_off_s)).map(|(jump, at_s)| {
+                            let [before, after] = [start, sample]
+                                .map(|sample| jump.at(segment.time_s[sample] - at_s));
+                            from + after - before
+                        })
+                    }
+                    _ => {
+                        let body = baselines.rigid_body.as_ref();
+                        let moved = body.map(|body| body.moved(segment, place, start..sample));
+                        for (row, moved) in BODY.into_iter().zip(moved.into_iter().flatten()) {
+                            sums.add_one(segment, sample, phase, (row, moved));
+                        }
+                        None
+                    }
+                };
+                if let Some(x) = predicted {
+                    sums.add(segment, sample, phase, &x);
+                }
+            }
         }
+        let own = &mut self.predictors[0].1;
         let diverged = rollout.windows.iter();
         own.diverged += diverged.filter(|w| w.diverged_at_s.is_some()).count();
         own.windows += rollout.windows.len();
@@ -83,4 +113,108 @@ fn flights(segment: &Segment) -> Result<Vec<Range<usize>>> {
         .filter(|span| span.range.start > 0 && span.range.end < segment.len())
         .map(|span| span.range.start..span.range.end + 1)
         .collect())
+}
+
+struct Baselines {
+    mean_jump: Option<MeanJump>,
+    rigid_body: Option<RigidBody>,
+}
+
+/// The training jump of the mean goal, by the time since its take-off. A prediction is the change along it.
+struct MeanJump {
+    time_s: Vec<f64>,
+    x: Vec<DVector<f64>>,
+}
+
+impl MeanJump {
+    /// None for a model without a prior of jumps.
+    fn of(model: &ReducedModel) -> Result<Option<Self>> {
+        let Ok(prior) = model.jump_prior() else {
+            return Ok(None);
+        };
+        let mean = prior.ranges().map(|range| range.mean);
+        let features = prior.features(mean);
+        let (mut jump, mut end_s, mut take_off_s) = ((Vec::new(), Vec::new()), 0.0, 0.0);
+        for (part, landmark) in prior.parts.iter().zip(&prior.landmarks.parts) {
+            let duration_s = part.duration(&features);
+            if !landmark.is_grounded() {
+                take_off_s = end_s;
+            }
+            let last = (part.nodes() - 1) as f64;
+            for node in 0..part.nodes() {
+                jump.0.push(end_s + duration_s * node as f64 / last);
+                jump.1
+                    .push(model.decode(&JumpPart::at(&part.z, node, &features))?);
+            }
+            end_s += duration_s;
+        }
+        let (mut time_s, x) = jump;
+        time_s.iter_mut().for_each(|time| *time -= take_off_s);
+        Ok(Some(Self { time_s, x }))
+    }
+
+    fn at(&self, time_s: f64) -> DVector<f64> {
+        let (left, right, share) = between(&self.time_s, time_s);
+        self.x[left].lerp(&self.x[right], share)
+    }
+}
+
+/// State rows of the rigid body: x, z and pitch.
+const BODY: [usize; 3] = [BODY_X, BODY_Z, JOINT_DIM + 4];
+
+/// `ddx = F_x / m`, `ddz = F_z / m - g` and `ddpitch = M_y / I`, with `1 / m` and `1 / I` by least squares of the recorded
+/// accelerations.
+struct RigidBody {
+    accelerations: Vec<DMatrix<f64>>, // of every segment, 3 x n
+}
+
+impl RigidBody {
+    /// None without a sample on the ground.
+    fn of(model: &ReducedModel, segments: &[&Segment]) -> Result<Option<Self>> {
+        let rule = model.input_rule()?;
+        let rule = InputRule::new(rule.robot(), rule.actuators().cloned(), WrenchFrame::Ground);
+        let mut loads = Vec::new();
+        let mut sums = [[0.0; 2]; 2]; // load times acceleration and load squared; of mass and of inertia
+        for segment in segments {
+            let input = segment.input(&rule)?;
+            let load = input.select_rows(&[JOINT_DIM, JOINT_DIM + 2, JOINT_DIM + 4]);
+            for (sample, load) in load.column_iter().enumerate() {
+                for (i, row) in BODY.into_iter().enumerate() {
+                    let fall = if row == BODY_Z { GRAVITY_M_S2 } else { 0.0 };
+                    let of = &mut sums[usize::from(i == 2)];
+                    of[0] += load[i] * (segment.ddx[(row, sample)] + fall);
+                    of[1] += load[i] * load[i];
+                }
+            }
+            loads.push(load);
+        }
+        if sums.iter().any(|of| of[1] <= 0.0) {
+            return Ok(None);
+        }
+        let [by_mass, by_inertia] = sums.map(|of| of[0] / of[1]);
+        let accelerations = loads.into_iter().map(|mut load| {
+            load.rows_mut(0, 2).scale_mut(by_mass);
+            load.row_mut(1).add_scalar_mut(-GRAVITY_M_S2);
+            load.row_mut(2).scale_mut(by_inertia);
+            load
+        });
+        let accelerations = accelerations.collect();
+        Ok(Some(Self { accelerations }))
+    }
+
+    /// Where a body is after the samples of a range, from its state at the first.
+    fn moved(&self, segment: &Segment, place: usize, range: Range<usize>) -> [f64; 3] {
+        let accelerations = &self.accelerations[place];
+        std::array::from_fn(|i| {
+            let state = |m: &DMatrix<f64>| m[(BODY[i], range.start)];
+            let (mut position, mut velocity) = (state(&segment.x), state(&segment.dx));
+            for sample in range.clone() {
+                let h = segment.time_s[sample + 1] - segment.time_s[sample];
+                let [before, after] = [sample, sample + 1].map(|k| accelerations[(i, k)]);
+                position += h * velocity + h * h * (2.0 * before + after) / 6.0;
+                velocity += 0.5 * h * (before + after);
+            }
+            position
+        })
+    }
 }

@@ -10,6 +10,8 @@ const STILL_M: f64 = 1e-4; // error of a constant velocity in body x and z below
 const TORQUE_R2: f64 = 0.5;
 const UNPLANNED_SHARE: f64 = 0.5;
 const LEAST_RANK: usize = 2; // latent directions in which inputs act on the ground: forwards and upwards
+/// Of pitch and legs decoded from the encoded state: below it, the latent state does not represent them.
+const REPRESENTED_R2: f64 = 0.9;
 const WHOLE: &str = "whole motion";
 const TORQUES: &str = "torques";
 const CONTROL: &str = "control";
@@ -203,19 +205,31 @@ fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> 
         let limit = |baseline: f64| (of_own * baseline).min(of_both * x.hypot(z));
         let body = ["body.x", "body.z"].map(|name| row(name, &[name], "m", &limit));
         rows.extend(body.into_iter().flatten());
+        if of == WHOLE {
+            continue; // open loop, the least difference at take-off decides where pitch and legs end
+        }
+        let in_plane = |name: &&str| name.ends_with(".hy") || name.ends_with(".kn");
         let names = Robot::state_names();
-        let joints: Vec<&str> = names[..JOINT_DIM].iter().map(String::as_str).collect();
-        let same = |baseline| baseline;
-        let others = [
-            row("body.pitch", &["body.pitch"], "rad", &same),
-            row("the legs", &joints, "rad", &same),
-        ];
-        rows.extend((others.into_iter().flatten()).map(|row| VerdictRow {
-            counts: false,
-            ..row
-        }));
+        let joints = names[..JOINT_DIM].iter().map(String::as_str);
+        let legs: Vec<&str> = joints.filter(in_plane).collect();
+        for (name, names) in [("body.pitch", &["body.pitch"][..]), ("the legs", &legs)] {
+            rows.extend(
+                row(name, names, "rad", &|baseline| baseline).map(|row| VerdictRow {
+                    counts: are_represented(assessment, names),
+                    ..row
+                }),
+            );
+        }
     }
     rows
+}
+
+/// Whether the latent state tells these coordinates.
+fn are_represented(assessment: &Assessment<'_>, names: &[&str]) -> bool {
+    let r2 = |name: &&str| assessment.fit(&assessment.decoded, name)?.r2;
+    names
+        .iter()
+        .all(|name| r2(name).is_some_and(|r2| r2 >= REPRESENTED_R2))
 }
 
 fn joint_rms(assessment: &Assessment<'_>, sums: &CoordinateSums, names: &[&str]) -> Option<f64> {
