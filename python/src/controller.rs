@@ -95,7 +95,7 @@ impl Controller {
             let mut controller = self.lock();
             let recorded = match input {
                 ReferenceInput::Recorded => {
-                    Some(segment.input_within_limits(controller.plant().input_rule())?)
+                    Some(segment.input(controller.plant().input_rule())?)
                 }
                 ReferenceInput::None => None,
             };

@@ -257,31 +257,16 @@ impl Segment {
 
     /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model: `tau` are the torques at
     /// the links, recorded ones less [`Segment::losses`], `F` and `M` what they and the contacts do to the body
-    /// (equation 22); under the published rule the file's own, if it carries them. Near a singularity of a leg in
-    /// contact its force is damped ([`Robot::damped_force_map`]).
+    /// (equation 22); under the published rule the file's own, if it carries them. Torques beyond a limit of the robot's
+    /// motors, such as commanded ones, count as the limit. Near a singularity of a leg in contact its force is damped
+    /// ([`Robot::damped_force_map`]).
     ///
     /// # Errors
     /// [`RecordingFault::Wrench`] with the row of an angle or torque that is not finite.
     pub fn input(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
-        self.input_of(rule, &self.torque_nm)
-    }
-
-    /// [`Segment::input`] of torques that the robot's motors can give: those beyond a limit count as the limit.
-    pub fn input_within_limits(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
-        self.input_of(rule, &self.torque_within_limits(rule.robot()))
-    }
-
-    pub(crate) fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
-        let mut torque_nm = self.torque_nm.clone();
-        for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
-            row.apply(|torque| *torque = torque.clamp(-limit, *limit));
-        }
-        torque_nm
-    }
-
-    fn input_of(&self, rule: &InputRule, torque_nm: &DMatrix<f64>) -> Outcome<DMatrix<f64>> {
+        let torque_nm = self.torque_within_limits(rule.robot());
         let mut out = DMatrix::zeros(STATE_DIM, self.len());
-        let net = torque_nm - self.losses(rule);
+        let net = &torque_nm - self.losses(rule);
         out.rows_mut(0, JOINT_DIM).copy_from(&net);
         let recorded = self.body_wrench.as_ref().filter(|_| rule.is_published());
         for sample in 0..self.len() {
@@ -298,6 +283,15 @@ impl Segment {
             to.copy_from(&wrench.map_err(refused)?);
         }
         Ok(out)
+    }
+
+    /// Torques, 12 x n, in N m, those beyond a limit of the motors as the limit.
+    pub fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
+        let mut torque_nm = self.torque_nm.clone();
+        for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
+            row.apply(|torque| *torque = torque.clamp(-limit, *limit));
+        }
+        torque_nm
     }
 
     /// The samples of a range as a segment of their own.

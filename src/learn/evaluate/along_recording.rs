@@ -125,7 +125,7 @@ pub fn lift_comparison(
     let mut comparison = Comparison::default();
     let mut u_lat = vec![0.0; controller.plant().latent_dim()];
     for segment in &recording.segments {
-        let input = segment.input_within_limits(controller.plant().input_rule())?;
+        let input = segment.input(controller.plant().input_rule())?;
         let losses = segment.losses(controller.plant().input_rule());
         for (sample, u) in input.as_slice().chunks_exact(STATE_DIM).enumerate() {
             let recorded = segment.torque(sample);
@@ -226,7 +226,7 @@ pub(super) fn set_reference(
     segment: &Segment,
     reference_input: ReferenceInput,
 ) -> Result<(), MpcError> {
-    let input = segment.input_within_limits(controller.plant().input_rule())?;
+    let input = segment.input(controller.plant().input_rule())?;
     controller.set_reference(ReferenceSamples {
         time_s: &segment.time_s,
         x: segment.x.as_slice(),

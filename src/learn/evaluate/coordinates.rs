@@ -284,11 +284,12 @@ impl LiftSums {
         let rule = model.input_rule()?;
         let input = segment.input(&rule)?;
         let losses = segment.losses(&rule);
+        let given = segment.torque_within_limits(robot);
         for sample in 0..segment.len() {
-            let torque = segment.torque(sample);
-            if !is_plausible(robot, &torque) {
+            if !is_plausible(robot, &segment.torque(sample)) {
                 continue;
             }
+            let torque = std::array::from_fn(|joint| given[(joint, sample)]);
             let x = segment.x.column(sample).into_owned();
             let tangent = model.tangent(&x)?;
             let lifted = tangent.lift * (tangent.project * input.column(sample));
