@@ -94,9 +94,7 @@ impl Controller {
         let taken = py.detach(|| -> Result<(), MpcError> {
             let mut controller = self.lock();
             let recorded = match input {
-                ReferenceInput::Recorded => {
-                    Some(segment.input(controller.plant().input_rule())?)
-                }
+                ReferenceInput::Recorded => Some(segment.input(controller.plant().input_rule())?),
                 ReferenceInput::None => None,
             };
             controller.set_reference(ReferenceSamples {

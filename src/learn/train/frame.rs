@@ -114,6 +114,16 @@ impl Frame {
         }
     }
 
+    /// How many momentum rows have their own equations for deviations from the mean jump: all, if the rotation is one.
+    /// Without it their equations miss what the pitch does, and regressions find some of that.
+    pub(super) fn known_in_deviations(&self) -> usize {
+        if self.momentum > TURN {
+            self.momentum
+        } else {
+            0
+        }
+    }
+
     pub(super) fn dim(&self) -> usize {
         self.held.ncols() + self.free.ncols()
     }

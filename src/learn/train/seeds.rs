@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 
 use super::error::TrainError;
-use super::jumps::learn_jumps;
+use super::jumps::{Dynamics, learn_jumps};
 use super::metrics::{SeedReport, Trained};
 use super::progress::Monitor;
-use super::rollout::Xi;
+use super::rollout::{Candidate, Xi};
 use super::task::{Fitted, Origin, Task, provenance};
 use crate::model::{LatentVariable, Library, ModelError};
 
@@ -62,7 +62,16 @@ impl Seeds {
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }
-        let (jumps, deviations) = learn_jumps(best.maps.training_set(&task), &best.maps.encoder);
+        let candidate = Candidate {
+            features: &task.features,
+            xi: &best.xi,
+        };
+        let dynamics = Dynamics {
+            candidate,
+            momentum: task.frame.known_in_deviations(),
+        };
+        let (set, encoder) = (best.maps.training_set(&task), &best.maps.encoder);
+        let (jumps, deviations) = learn_jumps(set, encoder, &dynamics);
         report.deviations = deviations;
         let provenance = provenance(task.options, method, origin, &report);
         let model = task.assemble(best, jumps, provenance)?;

@@ -257,6 +257,7 @@ const RIDGE: f64 = 1e-2; // relative to the variance of each column
 pub(super) struct Fit<'a> {
     pub goal: &'a [GoalRange; GOAL_DIM],
     pub part: usize,
+    pub known: DMatrix<f64>, // the first columns of Xi of deviations, 3 d x m
     pub projector: DMatrix<f64>, // leaves out the change of z by a shift forwards
 }
 
@@ -321,6 +322,7 @@ impl Fit<'_> {
         let mut xi = &inverse * factor.solve(&(&inverse * product));
         let positions = &self.projector * xi.rows(0, d);
         xi.rows_mut(0, d).copy_from(&positions);
+        xi.columns_mut(0, self.known.ncols()).copy_from(&self.known);
         xi
     }
 }

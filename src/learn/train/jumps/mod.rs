@@ -7,8 +7,10 @@ mod landmarks;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::dataset::{Dataset, centred, mean};
+use super::features::FeatureValues;
 use super::latent::{EncodedSet, Latent};
 use super::metrics::PartScore;
+use super::rollout::Candidate;
 use crate::model::{
     self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap, complement,
 };
@@ -23,10 +25,39 @@ struct Sampled {
     parts: Vec<PartNodes>,
 }
 
+/// The equations of a model, of which the first `momentum` coordinates obey known physics.
+pub(super) struct Dynamics<'a> {
+    pub(super) candidate: Candidate<'a>,
+    pub(super) momentum: usize,
+}
+
+impl Dynamics<'_> {
+    /// Slopes of the accelerations of the momentum by `z`, `dz` and `u_lat` about the mean node of a part, `3 d x m`, by
+    /// differences that are exact for products of two.
+    fn slopes(&self, phase: usize, nodes: &[&PartNodes]) -> DMatrix<f64> {
+        let d = nodes[0].z.ncols();
+        let mean_of = |of: fn(&PartNodes) -> &DMatrix<f64>| {
+            let means = nodes.iter().map(|nodes| of(nodes).row_mean());
+            means.fold(RowDVector::zeros(d), |sum, mean| sum + mean) / nodes.len() as f64
+        };
+        let parts = [mean_of(|n| &n.z), mean_of(|n| &n.dz), mean_of(|n| &n.u_lat)];
+        let mean: Vec<f64> = parts.iter().flat_map(|part| part.iter().copied()).collect();
+        let shifted = DMatrix::from_fn(6 * d, 3 * d, |row, k| {
+            let shift = if row % (3 * d) == k { 1.0 } else { 0.0 };
+            mean[k] + if row < 3 * d { shift } else { -shift }
+        });
+        let Candidate { features, xi } = self.candidate;
+        let theta = features.evaluate(&shifted, &mut FeatureValues::default());
+        let values = theta * xi[phase].columns(0, self.momentum);
+        (values.rows(0, 3 * d) - values.rows(3 * d, 3 * d)) * 0.5
+    }
+}
+
 /// None for a nonlinear encoder or too few jumps of one kind.
 pub(super) fn learn_jumps(
     set: EncodedSet<'_>,
     encoder: &StateMap,
+    dynamics: &Dynamics<'_>,
 ) -> (Option<JumpPrior>, Vec<PartScore>) {
     let (training, latent) = (set.dataset, set.latent);
     let nothing = (None, Vec::new());
@@ -56,7 +87,17 @@ pub(super) fn learn_jumps(
     let jumps: Vec<_> = sampled.iter().map(|jump| jump.goal).collect();
     let goal = GoalRange::of(&jumps);
     let (parts, scores) = (0..kind.len())
-        .map(|part| part_of(&sampled, &goal, &kind[part].name, part, &translation))
+        .map(|part| {
+            let nodes: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
+            let known = dynamics.slopes(kind[part].phase, &nodes);
+            part_of(
+                &sampled,
+                &goal,
+                &kind[part].name,
+                (part, known),
+                &translation,
+            )
+        })
         .unzip();
     let landmarks = kind.iter().enumerate().map(|(part, landmark)| {
         let durations = sampled.iter().map(|jump| jump.parts[part].duration_s);
@@ -109,17 +150,18 @@ fn goal_of(training: &Dataset, jump: usize, cut: &Cut) -> [f64; GOAL_DIM] {
 }
 
 /// A part of the prior, and how well deviations from it are explained, each jump left out of prior and fit in turn;
-/// `translation` is the change of `z` by a shift forwards.
+/// `known` are the first columns of Xi of deviations, `translation` is the change of `z` by a shift forwards.
 fn part_of(
     sampled: &[Sampled],
     goal: &[GoalRange; GOAL_DIM],
     name: &str,
-    part: usize,
+    (part, known): (usize, DMatrix<f64>),
     translation: &DVector<f64>,
 ) -> (JumpPart, PartScore) {
     let fit = Fit {
         goal,
         part,
+        known,
         projector: complement(&DMatrix::from_columns(&[translation.column(0)])),
     };
     let all: Vec<&Sampled> = sampled.iter().collect();
