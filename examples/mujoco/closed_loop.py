@@ -34,7 +34,7 @@ ROBOT = "go1"
 EXAMPLE = """example:
   cargo build --release
   MUJOCO_GL=egl python closed_loop.py --out-dir ../../out/closed_loop
-drives the shipped model go1-d6 with its generated controller over the test jumps of the training's
+drives the shipped model go1-d7 with its generated controller over the test jumps of the training's
 recorder and over those of another one; --models takes others, --recordings other folders, --folds 3
 trains three models, each without another third of the training jumps, --seeds 3 with the joint
 method and seeds 1 to 3. Writes closed_loop.csv (one row per run), closed_loop.json, table.txt and
@@ -145,7 +145,7 @@ def parse_arguments():
         description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "--models", type=pathlib.Path, nargs="+", default=[], help="model files (default: go1-d6)"
+        "--models", type=pathlib.Path, nargs="+", default=[], help="model files (default: go1-d7)"
     )
     parser.add_argument("--seeds", type=int, default=0, help="train so many joint models as well")
     parser.add_argument(
@@ -210,7 +210,7 @@ def parse_arguments():
     if arguments.draws < 1:
         parser.error("--draws: at least 1")
     if not (arguments.models or arguments.seeds or arguments.folds):
-        arguments.models = [ROOT / "models/go1-d6.json"]
+        arguments.models = [ROOT / "models/go1-d7.json"]
     return arguments
 
 

@@ -8,6 +8,7 @@ import json
 import pathlib
 import subprocess
 import sys
+import tomllib
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 import romc_controller
 from assessment import assess, repetition_faults
 from closed_loop import named_number, read_jump, write_strip
-from followers import POSITION_GAIN, VELOCITY_GAIN, LatentMpc, Replay
+from followers import LatentMpc, Replay
 from model_inputs import ModelInputs
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
 from primitives import Goal, Recorded
@@ -31,14 +32,6 @@ ROBOT = "go1"
 INSIDE, OUTSIDE = 12, 6
 STRIP_MARGIN_S = 0.14  # of a film strip, before take-off and after landing
 CONDITIONS = (NOMINAL, *(p for p in PERTURBATIONS if p.short in ("+1 kg", "tau 0.9")))
-# Of the controller, where they are not the library's: a plan keeps what the model says, unlike a recorded jump.
-SETTINGS = {
-    "effectiveness_time_s": 1.0,
-    "drive_stiffness_nm_rad": POSITION_GAIN,
-    "drive_damping_nm_s_rad": VELOCITY_GAIN,
-    "terminal_weight": 200.0,
-    "input_weight": 30.0,
-}
 EXAMPLE = """example:
   cargo build --release
   python plan_jumps.py --seed 1 --out-dir ../../out/plan_jumps
@@ -113,6 +106,8 @@ def main():
         for name in ABLATIONS:
             models[name] = ablated(arguments, name)
             methods[name] = Method(name, True)
+    _, answer = planned(arguments, models, "plan", goals[0])
+    arguments.setting = settings_of(answer) | dict(arguments.setting)
     crate = romc_controller.build(arguments.model, folder / arguments.model.stem, arguments.romc)
     tasks = [
         (arguments, models, inputs, crate, name, method, goal, condition)
@@ -144,7 +139,7 @@ def parse_arguments():
         description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seed", type=int, default=1, help="of the goals (default: 1)")
-    parser.add_argument("--model", type=pathlib.Path, default=ROOT / "models/go1-d6.json")
+    parser.add_argument("--model", type=pathlib.Path, default=ROOT / "models/go1-d7.json")
     parser.add_argument("--romc", type=pathlib.Path, default=ROMC, help="the compiler")
     parser.add_argument("--out-dir", type=pathlib.Path, default=ROOT / "out/plan_jumps")
     parser.add_argument(
@@ -156,7 +151,7 @@ def parse_arguments():
     parser.add_argument("--settings", type=pathlib.Path, help="weights of the plan, a TOML file")
     parser.add_argument(
         "--setting", type=named_number, action="append", default=[], metavar="NAME=NUMBER",
-        help=f"a setting of the controller, beside those for plans: {SETTINGS}",
+        help="a setting of the controller, in place of the one in PLAN.settings.toml",
     )
     parser.add_argument(
         "--strips", action="store_true",
@@ -165,7 +160,6 @@ def parse_arguments():
     parser.add_argument("--json", action="store_true", help="print JSON, not the table")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one per core)")
     arguments = parser.parse_args()
-    arguments.setting = SETTINGS | dict(arguments.setting)
     arguments.out_dir, arguments.romc = arguments.out_dir.resolve(), arguments.romc.resolve()
     return arguments
 
@@ -228,6 +222,11 @@ def planned(arguments, models, source, goal):
         print(f"\n{source} {goal}: {answer.stderr.strip()}", file=sys.stderr)
         return None, {}
     return read_jump(output), json.loads(answer.stdout)
+
+
+def settings_of(answer):
+    """Settings of the controller that romc wrote next to a plan."""
+    return tomllib.loads(pathlib.Path(answer["settings"]).read_text(encoding="utf-8"))
 
 
 def reference_of(arguments, models, source, goal):

@@ -139,6 +139,7 @@ fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<Pla
         dx: motion.dx,
         torque_nm: motion.torque_nm,
         feet: motion.feet,
+        settings: plan_settings::beside(path)?,
     }))
 }
 

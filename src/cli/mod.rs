@@ -17,6 +17,7 @@ mod inspect;
 mod manual;
 mod mpc;
 mod plan;
+mod plan_settings;
 mod prepared_recordings;
 mod report;
 mod robot;

@@ -19,21 +19,15 @@ pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let settings = MpcSettings {
-        horizon: arguments.horizon,
-        step_s: arguments.step,
-        lift: arguments.lift,
-        solver: arguments.solver,
-        torque_rate_nm_s: arguments.torque_rate,
-        ..MpcSettings::default()
-    };
+    let settings = settings(arguments)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
     let assessment = Assessment::over(&model, &recordings, RESTART_S)?;
     let verdict = verdict(&model, &assessment, &judged(&runs));
     let failed = failed_runs(&runs);
     let is_failed = !failed.is_empty() || verdict.fails_control();
-    let mut answer = answer(arguments, &runs, (&failed, &verdict), &assessment.remarks);
+    let remarks = &assessment.remarks;
+    let mut answer = answer(arguments, &settings, &runs, (&failed, &verdict), remarks);
     let figures = || Ok(control_figures(&model, &settings, &runs));
     let folder = arguments.figures.as_deref();
     inputs.write_figures(folder, figures, arguments.force, &mut answer)?;
@@ -42,6 +36,28 @@ pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
         write_file(path, table.csv().as_bytes(), arguments.force)?;
     }
     Ok(answer.failed_if(is_failed))
+}
+
+/// Those next to the recordings, where an option does not replace them.
+fn settings(arguments: &MpcArguments) -> Result<MpcSettings, Error> {
+    let beside = |path: &PathBuf| plan_settings::beside(path);
+    let mut settings = beside(&arguments.recordings[0])?;
+    for path in &arguments.recordings[1..] {
+        if beside(path)? != settings {
+            let message = format!(
+                "found settings of the controller that differ from those for {}, expected the same for all recordings: \
+                 follow them one at a time",
+                arguments.recordings[0].display()
+            );
+            return Err(Error::refused(path, message));
+        }
+    }
+    set(&mut settings.horizon, arguments.horizon);
+    set(&mut settings.step_s, arguments.step);
+    set(&mut settings.lift, arguments.lift);
+    set(&mut settings.solver, arguments.solver);
+    settings.torque_rate_nm_s = arguments.torque_rate.or(settings.torque_rate_nm_s);
+    Ok(settings)
 }
 
 pub(super) fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
@@ -93,6 +109,7 @@ pub(super) fn run_with_both_lifts(
 
 fn answer(
     arguments: &MpcArguments,
+    settings: &MpcSettings,
     runs: &[NamedRun],
     (failed, verdict): (&[String], &Verdict),
     remarks: &[String],
@@ -100,8 +117,8 @@ fn answer(
     let mut text = format!(
         "{}: latent MPC, {} stages of {} s\n\n{}\n{}\n",
         arguments.model.display(),
-        arguments.horizon,
-        arguments.step,
+        settings.horizon,
+        settings.step_s,
         control_table(runs),
         run_table(runs)
     );
@@ -116,8 +133,8 @@ fn answer(
     text += &lines("every step: ", &output);
     let json = json!({
         "model": arguments.model.display().to_string(),
-        "horizon": arguments.horizon,
-        "step_s": arguments.step,
+        "horizon": settings.horizon,
+        "step_s": settings.step_s,
         "remarks": remarks,
         "failed": failed,
         "verdict": verdict,

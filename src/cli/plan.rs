@@ -14,6 +14,8 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
         .into_folder(arguments.figures.as_deref())?;
     let output = arguments.output.as_deref();
     inputs.check_output(output, Format::RECORDING, arguments.force)?;
+    let beside = output.map(plan_settings::path_beside);
+    inputs.check_output(beside.as_deref(), Format::TOML, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = arguments.settings.as_deref();
     let settings = settings.map(|path| read_settings(path, PlanSettings::check));
@@ -49,8 +51,15 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let drawn = || Ok(plan_figures(&planned, model.robot()?));
     inputs.write_figures(figures, drawn, arguments.force, &mut answer)?;
     if let Some(path) = output {
+        let (settings, text) = (plan_settings::path_beside(path), plan_settings::text());
         write_recording(path, vec![planned.motion.clone()], None, arguments.force)?;
-        let _ = writeln!(answer.text, "\nthe plan: {}", path.display());
+        write_file(&settings, text.as_bytes(), arguments.force)?;
+        let [path, settings] = [path, &settings].map(|path| path.display().to_string());
+        let _ = writeln!(
+            answer.text,
+            "\nthe plan: {path}\nsettings of its controller: {settings}"
+        );
+        answer.json["settings"] = json!(settings);
     }
     Ok(answer)
 }

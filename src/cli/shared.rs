@@ -361,3 +361,10 @@ pub(super) fn quoted_all(paths: &[PathBuf]) -> String {
     let words: Vec<String> = paths.iter().map(|path| quoted(path)).collect();
     words.join(" ")
 }
+
+/// Replaces an option's value if one is given.
+pub(super) fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
+    if let Some(value) = given {
+        *option = value.into();
+    }
+}

@@ -22,12 +22,6 @@ const IDENTIFIED_FROM: usize = 20;
 /// The settings of the window of predictions beside its weight.
 const WINDOW: &str = "bptt-window bptt-stride bptt-decay bptt-integrator";
 
-fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
-    if let Some(value) = given {
-        *option = value.into();
-    }
-}
-
 impl TrainSettings {
     pub(super) fn read(path: &Path) -> Result<Self, Error> {
         read_settings(path, Self::check)

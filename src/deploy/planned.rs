@@ -7,6 +7,7 @@ use super::controller_c::source::{Numbers, integers, list, nested};
 use crate::codegen::{Precision, tidy};
 use crate::files::EmittedFile;
 use crate::model::ReducedModel;
+use crate::mpc::MpcSettings;
 use crate::recording;
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
 
@@ -31,6 +32,8 @@ pub struct PlannedJump {
     /// Torques of the motors, N m, 12 x n.
     pub torque_nm: DMatrix<f64>,
     pub feet: Vec<ContactFlags>,
+    /// Of the controller that follows it: the defaults of generated code.
+    pub settings: MpcSettings,
 }
 
 impl PlannedJump {
@@ -44,6 +47,7 @@ impl PlannedJump {
             dx: segment.dx,
             torque_nm: segment.torque_nm,
             feet: segment.feet,
+            settings: MpcSettings::default(),
         })
     }
 
@@ -57,6 +61,7 @@ impl PlannedJump {
             u: self.u.select_columns(samples),
             torque_nm: self.torque_nm.select_columns(samples),
             feet: samples.iter().map(|&k| self.feet[k]).collect(),
+            settings: self.settings,
         }
     }
 

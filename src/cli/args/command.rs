@@ -11,7 +11,7 @@ use super::value::{ReadingArguments, RobotParser, choice, count, overwrite, real
 use crate::evaluate::ReferenceInput;
 use crate::files::Overwrite;
 use crate::limits::table::{APEX, DISTANCE, HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
-use crate::mpc::{LIFTS, Lift, MpcSettings, SOLVERS, Solver};
+use crate::mpc::{LIFTS, Lift, SOLVERS, Solver};
 use crate::simplify::Tolerance;
 
 /// The reduced-order model compiler: from recorded jumps to equations, code and torques.
@@ -237,24 +237,25 @@ pub(crate) struct SimulateArguments {
 pub(crate) struct MpcArguments {
     /// Model file
     pub model: PathBuf,
-    /// Recordings to follow
+    /// Recordings to follow; PLAN.csv of `romc plan` with the settings in PLAN.settings.toml, where options do not replace
+    /// them
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
-    /// Number of stages
-    #[arg(long, value_name = "N", default_value_t = MpcSettings::default().horizon, value_parser = count(&HORIZON))]
-    pub horizon: usize,
-    /// Length of a stage in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = MpcSettings::default().step_s, value_parser = real(&STEP))]
-    pub step: f64,
-    /// How latent inputs become joint torques
-    #[arg(long, value_parser = choice(&LIFTS), default_value = "transpose")]
-    pub lift: Lift,
+    /// Number of stages [default: 20]
+    #[arg(long, value_name = "N", value_parser = count(&HORIZON))]
+    pub horizon: Option<usize>,
+    /// Length of a stage in seconds [default: 0.01]
+    #[arg(long, value_name = "SECONDS", value_parser = real(&STEP))]
+    pub step: Option<f64>,
+    /// How latent inputs become joint torques [default: transpose]
+    #[arg(long, value_parser = choice(&LIFTS))]
+    pub lift: Option<Lift>,
     /// Where the input reference comes from
     #[arg(long, value_enum, default_value = "recorded")]
     pub reference_input: ReferenceInput,
-    /// What solves the quadratic program of a step
-    #[arg(long, value_parser = choice(&SOLVERS), default_value = "clarabel")]
-    pub solver: Solver,
+    /// What solves the quadratic program of a step [default: clarabel]
+    #[arg(long, value_parser = choice(&SOLVERS))]
+    pub solver: Option<Solver>,
     /// Largest change of a torque that the transpose lift gives, in N m/s [default: none]
     #[arg(long, value_name = "N_M_PER_S", value_parser = real(&TORQUE_RATE))]
     pub torque_rate: Option<f64>,

@@ -19,7 +19,7 @@ impl Arguments {
             Command::Check(arguments) => of_check(arguments),
             Command::Import(arguments) => of_import(arguments),
             Command::Mpc(arguments) => {
-                Needed("--lift transpose", arguments.lift == Lift::Transpose)
+                Needed("--lift transpose", arguments.lift != Some(Lift::Consistent))
                     .by("--torque-rate", arguments.torque_rate.is_some())
             }
             Command::Plan(arguments) => {

@@ -110,8 +110,8 @@ pub(in crate::deploy) struct SettingText {
 }
 
 impl SettingText {
-    pub(super) fn all() -> Vec<Self> {
-        let defaults = Settings::default().numbers();
+    pub(super) fn all(settings: &Settings) -> Vec<Self> {
+        let defaults = settings.numbers();
         let all = SETTINGS.iter().zip(defaults);
         all.map(|(setting, default)| Self { setting, default })
             .collect()

@@ -16,7 +16,7 @@ use crate::files::EmittedFile;
 use crate::lower::Form;
 use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
-use crate::mpc::interface::{Settings, all_codes};
+use crate::mpc::interface::{SETTINGS, Settings, all_codes};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
 use control_model::{ControlModelText, SettingText, quoted_names};
 
@@ -36,6 +36,8 @@ pub(super) struct Facts<'a> {
     pub(super) texts: Vec<(i32, String)>,
     pub(super) defaults: Settings,
     pub(super) settings: Vec<SettingText>,
+    /// Fields of the settings that are not the library's own, as Rust.
+    chosen: String,
     has_plan: bool,
     link_m: String,
     rust_version: &'static str,
@@ -45,8 +47,9 @@ impl<'a> Facts<'a> {
     pub(super) fn new(
         entries: &'a ModelInterface,
         plant: &'a ControlModel,
-        has_plan: bool,
+        plan: Option<&PlannedJump>,
     ) -> Self {
+        let settings = plan.map_or_else(Default::default, |plan| Settings::from(&plan.settings));
         let (name, robot) = (entries.identifier.as_str(), plant.robot());
         let texts = all_codes().map(|(code, text)| (code, text.to_string_lossy().into_owned()));
         let texts: Vec<(i32, String)> = texts.collect();
@@ -65,9 +68,10 @@ impl<'a> Facts<'a> {
                 .map(|(code, text)| (constant(text), *code))
                 .collect(),
             texts,
-            defaults: Settings::default(),
-            settings: SettingText::all(),
-            has_plan,
+            settings: SettingText::all(&settings),
+            chosen: changed(&settings),
+            defaults: settings,
+            has_plan: plan.is_some(),
             link_m: format!("{:?}", robot.geometry(Leg::FrontRight).lengths_m[0]),
             rust_version: env!("CARGO_PKG_RUST_VERSION"),
         }
@@ -99,7 +103,7 @@ pub(crate) fn emit(
 ) -> Result<Vec<EmittedFile>, EmitError> {
     let plant = plant(equations.model())?;
     let entries = &ModelInterface::new(equations, form, Units::Si)?;
-    let facts = &Facts::new(entries, &plant, plan.is_some());
+    let facts = &Facts::new(entries, &plant, plan);
     let (name, folder) = (facts.name, format!("{}-controller", facts.name));
     let numbers = ControlModelText::new(entries, &plant, format!("// {provenance}")).render()?;
     let mut texts: Vec<(String, String)> = lock::files(provenance).collect();
@@ -166,6 +170,18 @@ fn input_in_words(rule: &InputRule, name: &str) -> String {
         "Of u, {torques}; {wrench}. {name}_generalised_input() of the model makes it{of_torques}."
     );
     wrapped(&text, 100, "").join("\n * ")
+}
+
+/// `name: value, ` of each setting that differs from the library's.
+fn changed(settings: &Settings) -> String {
+    let all = SETTINGS.iter().zip(settings.numbers());
+    let changed = all.zip(Settings::default().numbers());
+    let changed = changed.filter(|((_, own), usual)| own != usual);
+    let fields = changed.map(|((setting, own), _)| match setting.kind {
+        "i32" => format!("{}: {own}, ", setting.name),
+        _ => format!("{}: {own:?}, ", setting.name),
+    });
+    fields.collect()
 }
 
 /// The name of a code: the words of its text before the colon.

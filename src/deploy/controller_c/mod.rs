@@ -77,7 +77,13 @@ pub(crate) fn emit(
             phase: phase.identifier.clone(),
         });
     }
-    let facts = &Facts::new(&entries, &plant, &rows, precision, provenance);
+    let facts = &Facts::new(
+        &entries,
+        &plant,
+        &rows,
+        (precision, options.plan.as_ref()),
+        provenance,
+    );
     let name = facts.name;
     let (what, jump) = match &options.plan {
         Some(plan) => ("A jump of one's own", plan.thinned()),
@@ -111,10 +117,10 @@ impl<'a> Facts<'a> {
         entries: &'a ModelInterface,
         plant: &'a ControlModel,
         rows: &'a StageRows,
-        precision: Precision,
+        (precision, plan): (Precision, Option<&PlannedJump>),
         provenance: &str,
     ) -> Self {
-        let controller = controller::Facts::new(entries, plant, false);
+        let controller = controller::Facts::new(entries, plant, plan);
         let (real, f) = match precision {
             Precision::Double => ("double", ""),
             Precision::Single => ("float", "f"),

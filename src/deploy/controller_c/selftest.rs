@@ -59,7 +59,8 @@ pub(super) fn text(
             true => MissingInput::Estimate,
             false => MissingInput::Mean,
         },
-        ..MpcSettings::default()
+        lift: Lift::Transpose,
+        ..jump.settings
     };
     let consistent = MpcSettings {
         lift: Lift::Consistent,
@@ -85,7 +86,7 @@ pub(super) fn text(
     let text = SelfTest {
         facts,
         steps: runs[0].len(),
-        horizon: MpcSettings::default().horizon,
+        horizon: jump.settings.horizon,
         torques: nested(torques),
         statuses: nested(statuses),
         tolerance: TOLERANCE_NM[place],
