@@ -19,6 +19,7 @@ mod mpc;
 mod plan;
 mod plan_settings;
 mod prepared_recordings;
+mod refine;
 mod report;
 mod robot;
 mod shared;

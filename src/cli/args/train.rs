@@ -82,6 +82,10 @@ pub(crate) struct TrainArguments {
     /// Divide the jumps by these shares for training, validation and test, such as 14,3,3
     #[arg(long, value_name = "SHARES", conflicts_with_all = ["validation", "test"])]
     pub split: Option<Split>,
+    /// Refine this model instead: encoder and decoder stay, coefficients of its equations change where the recordings say
+    /// so, of hardware or of another robot (--robot)
+    #[arg(long, value_name = "MODEL.json")]
+    pub from: Option<PathBuf>,
     /// The model file to write
     #[arg(long, value_name = "MODEL.json")]
     pub output: PathBuf,
@@ -105,7 +109,7 @@ pub(crate) struct TrainArguments {
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub(crate) struct TrainSettings {
     /// Number of latent coordinates d
-    #[arg(long, value_name = "D", required_unless_present = "config", value_parser = count(&table::LATENT_DIM))]
+    #[arg(long, value_name = "D", required_unless_present_any = ["config", "from"], value_parser = count(&table::LATENT_DIM))]
     pub latent_dim: Option<usize>,
     /// How to learn (closed-form unless given)
     #[arg(long, value_enum)]

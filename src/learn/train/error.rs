@@ -64,6 +64,8 @@ pub enum TrainError {
         found: f64,
         limit: f64,
     },
+    #[error("the recordings change no equation of the model. {reasons}")]
+    NothingToRefine { reasons: String },
     #[error("training was cancelled before the first complete model")]
     Cancelled,
     #[error(transparent)]

@@ -11,6 +11,7 @@ mod dataset;
 mod error;
 mod features;
 mod frame;
+mod from_model;
 mod growth;
 mod joint;
 mod judge;
@@ -33,6 +34,7 @@ mod weak_form;
 pub use closed_form::closed_form;
 pub use dataset::{MIN_SAMPLES, ScaleOptions, Split};
 pub use error::TrainError;
+pub use from_model::{Refined, refine_from};
 pub use joint::{
     run::joint,
     unroll::{Integrator, Unroll},

@@ -104,6 +104,7 @@ fn is_of_one_seed(error: &TrainError) -> bool {
             true
         }
         TrainError::NoRecording
+        | TrainError::NothingToRefine { .. }
         | TrainError::Split { .. }
         | TrainError::TooFewSamples { .. }
         | TrainError::PhaseSamples { .. }

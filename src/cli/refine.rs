@@ -1,0 +1,109 @@
+//! `romc train --from`: a trained model refined on recordings of hardware, or of another robot.
+
+use std::path::Path;
+
+use super::args::{TrainArguments, TrainSettings};
+use super::prepared_recordings::RecordedSets;
+use super::robot::chosen;
+use super::*;
+use crate::robot_file::read_actuators;
+use crate::train::{Origin, Refined, refine_from};
+
+pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer, Error> {
+    let settings = own_settings(arguments, from)?;
+    Inputs::reading(&arguments.reading)
+        .and([from])
+        .and(&arguments.recordings)
+        .and_robot(settings.robot.as_deref())
+        .and(&settings.actuators)
+        .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
+    let model = artifact::read(from)?;
+    let robot = match &settings.robot {
+        Some(name) => chosen(name)?,
+        None => model.robot()?,
+    };
+    let actuators = match settings.actuators.as_deref() {
+        None => model.actuators().cloned(),
+        Some("none") => None,
+        Some(path) => Some(read_actuators(Path::new(path), Some(robot))?),
+    };
+    let sets = [&arguments.recordings[..], &[], &[]];
+    let mut recorded = RecordedSets::whole(sets, &arguments.reading, &settings, robot)?;
+    recorded.read()?;
+    recorded.report_findings();
+    let mut command = format!(
+        "romc train --from {} {}",
+        quoted(from),
+        quoted_all(&arguments.recordings)
+    );
+    command += &(settings.as_flags() + &arguments.reading.as_flags());
+    command += &format!(" --output {}", quoted(&arguments.output));
+    let origin = Origin::new(command, &arguments.recordings);
+    let training = &recorded.sets[0].recordings;
+    let mut refined = refine_from(&model, training, robot, actuators, &origin)?;
+    if let Some(name) = &arguments.name {
+        refined.model = refined.model.into_builder().name(name.clone()).build()?;
+    }
+    artifact::write(&arguments.output, &refined.model, arguments.force)?;
+    Ok(answer(arguments, from, &refined))
+}
+
+/// Settings of the recordings; the others are those of the model.
+fn own_settings(arguments: &TrainArguments, from: &Path) -> Result<TrainSettings, Error> {
+    let given = &arguments.settings;
+    let own = TrainSettings {
+        robot: given.robot.clone(),
+        actuators: given.actuators.clone(),
+        leave_out_implausible: given.leave_out_implausible,
+        accelerations: given.accelerations,
+        smooth: given.smooth.clone(),
+        smooth_rows: given.smooth_rows,
+        ..TrainSettings::default()
+    };
+    let others = [
+        (*given != own, "settings of a training"),
+        (!arguments.validation.is_empty(), "--validation"),
+        (!arguments.test.is_empty(), "--test"),
+        (arguments.split.is_some(), "--split"),
+        (arguments.config.is_some(), "--config"),
+    ];
+    match others.into_iter().find(|(is_given, _)| *is_given) {
+        None => Ok(own),
+        Some((_, name)) => {
+            let message = format!(
+                "found {name} with --from, expected --robot, --actuators and options for reading alone: encoder, library and \
+                 phases are those of the model"
+            );
+            Err(Error::refused(from, message))
+        }
+    }
+}
+
+fn answer(arguments: &TrainArguments, from: &Path, refined: &Refined) -> Answer {
+    let table = Table::of(&refined.coefficients)
+        .column("phase", "", |of| &of.phase)
+        .column("equation", "", |of| format!("ddz{}", of.coordinate))
+        .column("term", "", |of| &of.term)
+        .column("before", "scaled", |of| of.before)
+        .column("after", "scaled", |of| of.after)
+        .column("standard errors", "", |of| {
+            format!("{:.1}", of.standard_errors)
+        })
+        .table();
+    let output = arguments.output.display().to_string();
+    let mut text = format!("{output}: {} refined\n\n{table}\n", from.display());
+    for of in &refined.unchanged {
+        let _ = writeln!(
+            text,
+            "unchanged: ddz{} in {}: {}",
+            of.coordinate, of.phase, of.reason
+        );
+    }
+    let json = json!({
+        "from": from.display().to_string(),
+        "output": output,
+        "coefficients": refined.coefficients,
+        "unchanged": refined.unchanged,
+    });
+    Answer::new(text, json)
+}
