@@ -195,11 +195,12 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
 pub(crate) fn invariance_table(invariance: &Invariance) -> Table {
     let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
     let words = format!(
-        "What the model says of physics that is known: gravity in flight {} m/s^2, mass {} kg; decoded joints \
+        "What the model says of physics that is known: gravity in flight {} m/s^2, mass {} kg, rotation {} rad/s^2 per N m; decoded joints \
          move by up to {} rad for a body 1 m further on; by phase, change of the body's acceleration per metre of \
          shift along x and y, and difference between mirror images",
         shown(invariance.gravity_m_s2),
         shown(invariance.mass_kg),
+        shown(invariance.rotation_rad_s2_per_nm),
         significant(invariance.joint_shift_rad_m)
     );
     Table::of(&invariance.phases)

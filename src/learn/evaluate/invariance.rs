@@ -9,6 +9,12 @@ const SHIFT_M: f64 = 0.3;
 const OFF_RAD: f64 = 0.1;
 /// Largest part of another body coordinate in the height of a centre of mass.
 const PURE: f64 = 1e-6;
+/// Share of the inputs' effect in flight below which a combination is a momentum.
+const KEPT: f64 = 1e-3;
+const PITCH: usize = BODY_X + 4;
+/// Entries of a wrench: the vertical force, the moment of pitch.
+const LIFT: usize = 2;
+const MOMENT: usize = 4;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Invariance {
@@ -16,6 +22,9 @@ pub struct Invariance {
     pub gravity_m_s2: Option<f64>,
     /// Vertical force of four feet over the acceleration of that combination.
     pub mass_kg: Option<f64>,
+    /// Acceleration of the rotation about the centre of mass by the feet's moment of pitch; none without such a latent
+    /// combination.
+    pub rotation_rad_s2_per_nm: Option<f64>,
     /// Largest change of a decoded joint angle for a body 1 m further on, rad/m.
     pub joint_shift_rad_m: f64,
     pub phases: Vec<PhaseInvariance>,
@@ -45,15 +54,27 @@ impl Invariance {
         model.robot()?;
         let phases = 0..model.phases().len();
         let phases = phases.map(|phase| Probe::new(model, phase, &rest).invariance());
-        let [gravity_m_s2, mass_kg] = by_height(model, &rest)?;
+        let height = momentum(model, &rest, BODY_Z)?;
+        let gravity_m_s2 = height
+            .as_ref()
+            .and_then(|(_, in_flight)| Some(-(*in_flight)?[0]));
+        let by = |combination: Option<DVector<f64>>, load| match combination {
+            Some(combination) => response(model, &rest, &combination, load),
+            None => Ok(None),
+        };
+        let mass_kg = by(height.map(|(combination, _)| combination), LIFT)?.map(|by| 1.0 / by);
+        let is_kept = |in_flight: &Option<[f64; 2]>| in_flight.is_none_or(|[_, by]| by < KEPT);
+        let rotation = momentum(model, &rest, PITCH)?.filter(|(_, in_flight)| is_kept(in_flight));
+        let rotation = rotation.map(|(combination, _)| combination);
         let mut moved = rest.clone();
         moved[BODY_X] += SHIFT_M;
         let decoded = |x: &DVector<f64>| model.decode(&model.encode(x)?);
         let change = decoded(&moved)? - decoded(&rest)?;
         Ok(Self {
             joint_shift_rad_m: change.rows(0, JOINT_DIM).amax() / SHIFT_M,
-            gravity_m_s2,
-            mass_kg,
+            gravity_m_s2: gravity_m_s2.filter(|value| value.is_finite()),
+            mass_kg: mass_kg.filter(|mass| mass.is_finite()),
+            rotation_rad_s2_per_nm: by(rotation, MOMENT)?,
             phases: phases.collect::<Result<_, _>>()?,
         })
     }
@@ -175,21 +196,28 @@ fn mirrored(vector: &DVector<f64>) -> DVector<f64> {
     image
 }
 
-fn by_height(model: &ReducedModel, rest: &DVector<f64>) -> Result<[Option<f64>; 2], ModelError> {
+/// The combination of latent coordinates that is one body coordinate and joints alone, and of several the one that inputs
+/// move least in flight. With a flight phase also its acceleration there, and by how much inputs move it, as a share of
+/// how they move the coordinates.
+fn momentum(
+    model: &ReducedModel,
+    rest: &DVector<f64>,
+    row: usize,
+) -> Result<Option<(DVector<f64>, Option<[f64; 2]>)>, ModelError> {
     let body_dim = STATE_DIM - JOINT_DIM;
     let encode = model.tangent(rest)?.encode;
     let body = encode.columns(JOINT_DIM, body_dim).transpose();
-    let mut up = DVector::zeros(body_dim);
-    up[BODY_Z - JOINT_DIM] = 1.0;
+    let mut one = DVector::zeros(body_dim);
+    one[row - JOINT_DIM] = 1.0;
     let Ok(inverse) = body.clone().pseudo_inverse(1e-9 * body.amax()) else {
-        return Ok([None; 2]);
+        return Ok(None);
     };
-    let particular = &inverse * &up;
-    if (&body * &particular - up).amax() > PURE {
-        return Ok([None; 2]);
+    let particular = &inverse * &one;
+    if (&body * &particular - one).amax() > PURE {
+        return Ok(None);
     }
     let Some(phase) = model.phase_for([false; 4]) else {
-        return Ok([None, mass_kg(model, rest, &particular)?]);
+        return Ok(Some((particular, None)));
     };
     let d = model.latent_dim();
     let projector = SymmetricEigen::new(DMatrix::identity(d, d) - &inverse * &body);
@@ -203,18 +231,18 @@ fn by_height(model: &ReducedModel, rest: &DVector<f64>) -> Result<[Option<f64>; 
         Some(Ok(inverse)) => &particular - &others * (inverse * (&change * &particular)),
         Some(Err(_)) | None => particular,
     };
-    let gravity_m_s2 = -combination.dot(&ddz);
-    let mass_kg = mass_kg(model, rest, &combination)?;
-    Ok([
-        Some(gravity_m_s2).filter(|value| value.is_finite()),
-        mass_kg,
-    ])
+    let moved = (&change * &combination).norm() / change.norm().max(f64::MIN_POSITIVE);
+    let in_flight = [combination.dot(&ddz), moved];
+    Ok(Some((combination, Some(in_flight))))
 }
 
-fn mass_kg(
+/// The change of a combination's acceleration over a load, of vertical forces of the feet; none if no phase has four feet
+/// down.
+fn response(
     model: &ReducedModel,
     rest: &DVector<f64>,
     combination: &DVector<f64>,
+    load: usize,
 ) -> Result<Option<f64>, ModelError> {
     let feet: ContactFlags = [true; 4];
     let Some(phase) = model.phase_for(feet) else {
@@ -223,20 +251,26 @@ fn mass_kg(
     let (robot, rule) = (model.robot()?, model.input_rule()?);
     let x: [f64; STATE_DIM] = std::array::from_fn(|i| rest[i]);
     let joints = std::array::from_fn(|joint| x[joint]);
-    let mut newton = [0.0; JOINT_DIM];
+    let mut torques = [0.0; JOINT_DIM];
     for leg in Leg::ALL {
+        // Front feet that push up pitch the body back.
+        let up = if load == LIFT || !leg.is_front() {
+            0.25
+        } else {
+            -0.25
+        };
         let jacobian = robot.geometry(leg).foot_jacobian(&leg.of_joints(&joints));
-        let torque = -jacobian.transpose() * SVector::<f64, 3>::new(0.0, 0.0, 0.25);
-        newton[3 * leg.index()..][..3].copy_from_slice(torque.as_slice());
+        let torque = -jacobian.transpose() * SVector::<f64, 3>::new(0.0, 0.0, up);
+        torques[3 * leg.index()..][..3].copy_from_slice(torque.as_slice());
     }
-    let Ok(wrench) = rule.wrench(&x, &newton, feet) else {
+    let Ok(wrench) = rule.wrench(&x, &torques, feet) else {
         return Ok(None);
     };
     let mut u = DVector::zeros(STATE_DIM);
-    u.rows_mut(0, JOINT_DIM).copy_from_slice(&newton);
+    u.rows_mut(0, JOINT_DIM).copy_from_slice(&torques);
     (u.rows_mut(JOINT_DIM, STATE_DIM - JOINT_DIM)).copy_from(&wrench);
     let probe = Probe::new(model, phase, rest);
     let pushed = probe.ddz_at_rest(&(&probe.input + &u))?;
     let change = combination.dot(&(pushed - probe.ddz_at_rest(&probe.input)?));
-    Ok(Some(1.0 / change).filter(|mass| mass.is_finite()))
+    Ok(Some(change / wrench[load]).filter(|change| change.is_finite()))
 }
