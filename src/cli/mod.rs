@@ -128,7 +128,13 @@ fn execute(arguments: &Arguments) -> Result<Answer, Error> {
         Command::Check(arguments) => ("check", check::run(arguments)?),
         Command::Demo(arguments) => ("demo", demo::run(arguments)?),
         Command::Inspect(arguments) => ("inspect", inspect::run(arguments)?),
-        Command::Train(arguments) => ("train", train::run(arguments)?),
+        Command::Train(arguments) => {
+            let refined = arguments
+                .from
+                .as_deref()
+                .map(|from| refine::run(arguments, from));
+            ("train", refined.unwrap_or_else(|| train::run(arguments))?)
+        }
         Command::Study(arguments) => ("study", study::run(arguments)?),
         Command::Convert(arguments) => ("convert", convert::run(arguments)?),
         Command::Identify(arguments) => ("identify", identify::run(arguments)?),

@@ -32,9 +32,7 @@ pub(super) fn beside(recording: &Path) -> Result<MpcSettings, Error> {
         }
     }
     let refused = |error: ControlError| Error::refused(&path, error.to_string());
-    let settings = settings.to_mpc().map_err(refused)?;
-    settings.check().map_err(refused)?;
-    Ok(settings)
+    settings.to_mpc().map_err(refused)
 }
 
 /// The file for a plan: the settings that differ from the usual ones.

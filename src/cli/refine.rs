@@ -93,11 +93,7 @@ fn answer(arguments: &TrainArguments, from: &Path, refined: &Refined) -> Answer 
     let output = arguments.output.display().to_string();
     let mut text = format!("{output}: {} refined\n\n{table}\n", from.display());
     for of in &refined.unchanged {
-        let _ = writeln!(
-            text,
-            "unchanged: ddz{} in {}: {}",
-            of.coordinate, of.phase, of.reason
-        );
+        let _ = writeln!(text, "unchanged: {of}");
     }
     let json = json!({
         "from": from.display().to_string(),

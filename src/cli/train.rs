@@ -13,9 +13,6 @@ use crate::train::{
 };
 
 pub(super) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
-    if let Some(from) = &arguments.from {
-        return refine::run(arguments, from);
-    }
     let settings = TrainSettings::effective(arguments)?;
     Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)

@@ -14,8 +14,8 @@
 //! assert!((foot.x).abs() < 1e-12 && foot.y == -0.08 && foot.z < -0.3);
 //!
 //! // A leg that extends its knee (positive torque) pushes the body up.
-//! let force = go1.foot_force(Leg::FrontRight, &q, &[0.0, 0.0, 5.0])?;
-//! assert!(force.z > 0.0);
+//! let force = go1.foot_force_map(Leg::FrontRight, &q)?;
+//! assert!(5.0 * force[(2, 2)] > 0.0);
 //! # Ok::<(), romc::robot::RobotError>(())
 //! ```
 

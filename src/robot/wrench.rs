@@ -6,7 +6,7 @@
 
 use std::fmt;
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::Matrix3;
 
 use super::error::RobotError;
 use super::geometry::Robot;
@@ -15,23 +15,11 @@ use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, Leg};
 use super::leg::{SINGULAR_BOUND, add_wrench, turn_leg, write_wrench_map};
 
 impl Robot {
-    /// Force of a leg in contact on the body, in N: `F = -J^-T tau` (equation 4), at `q` in rad and `tau` in N m:
-    /// abduction, flexion, knee.
+    /// The matrix `-J^-T` that takes a leg's torques (N m: abduction, flexion, knee) to its force on the body (N, equation
+    /// 4), at joint angles `q` in rad.
     ///
     /// # Errors
     /// [`RobotError::SingularLeg`] at full extension (see `SINGULAR_BOUND`), [`RobotError::NotFinite`].
-    pub fn foot_force(
-        &self,
-        leg: Leg,
-        q: &[f64; 3],
-        tau: &[f64; 3],
-    ) -> Result<Vector3<f64>, RobotError> {
-        let map = self.foot_force_map(leg, q)?;
-        self.require_finite(leg, "torque", tau)?;
-        Ok(map * Vector3::from(*tau))
-    }
-
-    /// The matrix `-J^-T` that takes a leg's torques (N m) to its force on the body (N).
     pub fn foot_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
         let map = self.geometry(leg).force_map(q, true);
@@ -48,19 +36,8 @@ impl Robot {
         map.ok_or_else(|| self.singular(leg, q))
     }
 
-    /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5 to 7, 22): sums of `F_k` and of `x_k x
-    /// F_k` over the feet in contact.
-    pub fn body_wrench(
-        &self,
-        joints: &[f64; JOINT_DIM],
-        torque: &[f64; JOINT_DIM],
-        contact: ContactFlags,
-    ) -> Result<Vector6<f64>, RobotError> {
-        let wrench = self.wrench_by_arms(WrenchFrame::Body, joints, torque, contact);
-        wrench.map(Vector6::from)
-    }
-
-    /// The same with the moments by the arms of a frame, in axes parallel to the body's.
+    /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5 to 7, 22): sums of `F_k` and of `x_k x F_k`
+    /// over the feet in contact, in axes parallel to the body's, with the arms of a frame.
     pub(super) fn wrench_by_arms(
         &self,
         frame: WrenchFrame,

@@ -461,7 +461,7 @@ fn same_measurements_give_the_same_bits() {
 fn stage_rows_keep_only_what_can_be_active() {
     let controller =
         romc::mpc::controller(&model(Equations::Linear), MpcSettings::default()).expect("complete");
-    let rows = controller.stage_rows();
+    let rows = romc::mpc::problem::StageRows::new(controller.plant(), &MpcSettings::default());
     assert!(
         !rows.input.is_empty() && rows.input.len() < 16,
         "{} of 16 torque rows",

@@ -51,8 +51,10 @@ fn sample_torque(random: &mut Random) -> [f64; 12] {
 }
 
 fn with_wrench(torque: &[f64; 12]) -> DVector<f64> {
-    let wrench = go1()
-        .body_wrench(&FOOTING.joints_rad, torque, FOOTING.feet)
+    let mut x = [0.0; 18];
+    x[..12].copy_from_slice(&FOOTING.joints_rad);
+    let wrench = InputRule::published(go1())
+        .wrench(&x, torque, FOOTING.feet)
         .expect("bent legs");
     DVector::from_iterator(18, torque.iter().chain(wrench.iter()).copied())
 }
@@ -129,9 +131,10 @@ fn cone_violation(torque: &[f64; 12], friction: f64) -> f64 {
     let mut worst = f64::NEG_INFINITY;
     for leg in Leg::ALL {
         let leg_torque = leg.of_joints(torque);
-        let force = go1()
-            .foot_force(leg, &leg.of_joints(&FOOTING.joints_rad), &leg_torque)
+        let map = go1()
+            .foot_force_map(leg, &leg.of_joints(&FOOTING.joints_rad))
             .expect("bent legs");
+        let force = map * Vector3::from(leg_torque);
         worst = worst.max(force.x.hypot(force.y) - friction * force.z);
     }
     worst

@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use nalgebra::DMatrix;
-use romc::evaluate::{
-    ControlMetrics, ReferenceInput, along_recording, control_metrics, lift_comparison,
-};
+use romc::evaluate::{ControlMetrics, ReferenceInput, along_recording, control_metrics};
 use romc::mpc::{Lift, MpcSettings, Source};
 use romc::recording::{Recording, Segment};
 
@@ -123,9 +121,13 @@ fn lift_comparison_of_inputs_in_the_encoders_range_is_exact() {
     let model = model(Equations::Nonlinear);
     let recording = recording(&trajectory(&model));
     let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
-    let r2 = lift_comparison(&mut controller, &recording)
-        .expect("a sound recording")
-        .r2();
+    let run = along_recording(
+        &mut controller,
+        &recording,
+        ReferenceInput::Recorded,
+        |_, _| {},
+    );
+    let r2 = run.expect("a sound recording").summary.lift_r2;
     assert!(r2.contact.expect("contact") > 1.0 - 1e-9);
     assert!(r2.flight.expect("flight") > 1.0 - 1e-9);
 }

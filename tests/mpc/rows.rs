@@ -76,7 +76,7 @@ fn dropped_rows_stay_within_the_margin_of_those_that_stay() {
 fn rows_of_stage(settings: MpcSettings) -> Vec<Row> {
     let model = model(Equations::Linear);
     let controller = romc::mpc::controller(&model, settings).expect("the model is complete");
-    let rows = controller.stage_rows().clone();
+    let rows = romc::mpc::problem::StageRows::new(controller.plant(), &settings);
     [rows.input, rows.link, rows.soft, rows.cones].concat()
 }
 

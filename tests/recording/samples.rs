@@ -48,10 +48,8 @@ mod inputs {
         let segment = sample_segment(4);
         let u = segment.input(&published()).unwrap();
         assert_eq!(u.rows(0, 12), segment.torque_nm.rows(0, 12));
-        let wrench = published()
-            .robot()
-            .body_wrench(&segment.joints(2), &segment.torque(2), [true; 4])
-            .unwrap();
+        let wrench = published().wrench(&segment.state(2), &segment.torque(2), [true; 4]);
+        let wrench = wrench.unwrap();
         for axis in 0..BODY_DIM {
             assert_eq!(u[(12 + axis, 2)], wrench[axis]);
         }
@@ -93,7 +91,10 @@ mod inputs {
             let noise = if j % 2 == 0 { 11.0 } else { -11.0 };
             noise + if j < 30 { 0.0 } else { 500.0 }
         });
-        let smooth = segment.joint_accelerations();
+        // Of joints that lose an inertia of one times their acceleration.
+        let rotors = Actuators::of_leg([0.0; 3], [0.0; 3], [1.0; 3]);
+        let robot = published().robot();
+        let smooth = segment.losses(&InputRule::new(robot, Some(rotors), WrenchFrame::World));
         assert_eq!(smooth.nrows(), JOINT_DIM);
         assert!(smooth.columns(5, 20).amax() <= 1.0 + 1e-12);
         assert!(smooth.columns(0, 30).amax() <= 11.0);

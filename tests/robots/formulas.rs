@@ -245,7 +245,7 @@ fn torques() -> [f64; JOINT_DIM] {
 
 #[test]
 fn foot_force_of_a_leg_beyond_the_singular_bound_is_an_error_with_leg_and_angles() {
-    let force = |knee: f64| go1().foot_force(Leg::RearLeft, &[0.0, 0.2, knee], &[1.0; 3]);
+    let force = |knee: f64| go1().foot_force_map(Leg::RearLeft, &[0.0, 0.2, knee]);
     for knee in [0.0, -1e-4] {
         let Err(RobotError::SingularLeg {
             leg, joints_rad, ..
@@ -268,15 +268,20 @@ fn foot_force_not_finite_argument_is_an_error() {
         (q, [0.0, nan, 0.0], "leg fr has the torque NaN"),
         ([f64::INFINITY, 0.7, -1.4], [0.0; 3], "joint angle inf"),
     ] {
-        let error = go1().foot_force(Leg::FrontRight, &q, &tau).unwrap_err();
+        let x = std::array::from_fn(|i| if i < 3 { q[i] } else { 0.0 });
+        let torques = std::array::from_fn(|i| if i < 3 { tau[i] } else { 0.0 });
+        let down = [true, false, false, false];
+        let error = InputRule::published(go1())
+            .wrench(&x, &torques, down)
+            .unwrap_err();
         assert!(error.to_string().contains(said), "{error}");
     }
 }
 
 #[test]
 fn body_wrench_without_contact_is_zero_even_at_a_singular_posture() {
-    let wrench = go1()
-        .body_wrench(&[0.0; 12], &torques(), [false; 4])
+    let wrench = InputRule::published(go1())
+        .wrench(&[0.0; 18], &torques(), [false; 4])
         .unwrap();
     assert_eq!(wrench, Vector6::zeros());
     for frame in WrenchFrame::ALL {
@@ -322,7 +327,11 @@ fn damped_force_map_is_continuous_and_bounded_through_both_singularities() {
 #[test]
 fn body_wrench_moment_is_arm_cross_force() {
     let contact = [false, true, false, false];
-    let wrench = go1().body_wrench(&stand(), &torques(), contact).unwrap();
+    let mut x = [0.0; STATE_DIM];
+    x[..JOINT_DIM].copy_from_slice(&stand());
+    let wrench = InputRule::published(go1())
+        .wrench(&x, &torques(), contact)
+        .unwrap();
     let q = Leg::FrontLeft.of_joints(&stand());
     let arm = go1().geometry(Leg::FrontLeft).foot_position(&q);
     let force = Vector3::new(wrench[0], wrench[1], wrench[2]);
@@ -370,7 +379,8 @@ fn world_wrench_does_the_work_of_the_feet_on_the_bodys_coordinates() {
             let forces: Vec<(Leg, Vector3<f64>)> = legs
                 .map(|leg| {
                     let (q, tau) = (leg.of_joints(&joints), leg.of_joints(&tau));
-                    (leg, turn * rule.robot().foot_force(leg, &q, &tau).unwrap())
+                    let map = rule.robot().foot_force_map(leg, &q).unwrap();
+                    (leg, turn * map * Vector3::from(tau))
                 })
                 .collect();
             for i in 0..STATE_DIM {

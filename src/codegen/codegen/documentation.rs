@@ -66,18 +66,23 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerE
              leg."
         ),
     ];
+    Ok([
+        input.map(String::from).into(),
+        of_torques(model, losses, in_flight),
+    ])
+}
+
+fn of_torques(model: &ReducedModel, losses: &str, in_flight: &str) -> Vec<String> {
+    let robot = model.robot().map_or("robot", |robot| robot.name);
     let torque = [
-        &format!("Torques of the {robot}'s motors behind torques at the links: {losses}"),
-        &format!(
+        format!("Torques of the {robot}'s motors behind torques at the links: {losses}"),
+        format!(
             "dx, ddx: velocities and accelerations of the robot coordinates in SI units, of which the joints \
              count (0 to 11).{in_flight} net: the first 12 of u (N m). tau: torques of the motors (N m); \
              limits are the caller's."
         ),
     ];
-    Ok([
-        input.map(String::from).into(),
-        torque.map(String::from).into(),
-    ])
+    torque.into()
 }
 
 /// Of each map: its equation with an affine and with a nonlinear encoder or decoder, and its arrays, in which the point

@@ -135,11 +135,6 @@ impl Controller {
         &self.settings
     }
 
-    /// The rows of each stage that were found to matter.
-    pub fn stage_rows(&self) -> &StageRows {
-        &self.near_rows
-    }
-
     /// The conic solver with the program of the last step, if that is what solves it.
     pub fn solver(&self) -> Option<&QpSolver> {
         self.engine.conic()

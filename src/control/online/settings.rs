@@ -278,10 +278,11 @@ macro_rules! settings {
                         setting.accepts.check(setting.name, found)?;
                     }
                 }
-                Ok(MpcSettings {
+                let settings = MpcSettings {
                     $($field: InC::of([$(self.$name as f64),*]),)*
                     ..MpcSettings::default()
-                })
+                };
+                settings.check().map(|()| settings)
             }
         }
 
@@ -401,7 +402,7 @@ impl MpcSettings {
     ///
     /// # Errors
     /// [`ControlError::Setting`] of the first that is not accepted.
-    pub fn check(&self) -> Result<(), ControlError> {
+    pub(crate) fn check(&self) -> Result<(), ControlError> {
         self.check_table()?;
         let (qp, fallback) = (&self.qp, &self.fallback);
         for (name, found) in [

@@ -217,7 +217,7 @@ impl Segment {
 
     /// Accelerations of the joints, 12 x n, in rad/s^2: [`Self::ddx`] averaged over 20 ms within stretches of equal
     /// contact (a foot down, or none), so that noise and the spikes of landings do not become torques.
-    pub fn joint_accelerations(&self) -> DMatrix<f64> {
+    fn joint_accelerations(&self) -> DMatrix<f64> {
         let half = match self.mean_step_s() {
             step if step > 0.0 => (0.5 * ACCELERATION_WINDOW_S / step).round() as usize,
             _ => 0,
@@ -286,7 +286,7 @@ impl Segment {
     }
 
     /// Torques, 12 x n, in N m, those beyond a limit of the motors as the limit.
-    pub fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
+    pub(crate) fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
         let mut torque_nm = self.torque_nm.clone();
         for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
             row.apply(|torque| *torque = torque.clamp(-limit, *limit));

@@ -96,11 +96,7 @@ impl<'a> Source<'a> {
             given_covariance: of_given(|given| &given.covariance),
             acceleration_error: of_given(|given| &given.acceleration_error),
             has_actuators: plant.input_rule().actuators().is_some(),
-            inertia_is_loss: integers(
-                phases
-                    .iter()
-                    .map(|phase| i64::from(plant.input_rule().inertia_is_loss(phase.is_grounded))),
-            ),
+            inertia_is_loss: inertia_is_loss(plant),
             inertia_is_always_loss: plant.input_rule().inertia_is_loss(false),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: solver_numbers(precision, mpc.qp.accepted_residual),
@@ -125,6 +121,12 @@ impl<'a> Source<'a> {
             phases: &entries.phases,
         })
     }
+}
+
+/// Of each phase, whether the rotors' inertia is a loss.
+fn inertia_is_loss(plant: &ControlModel) -> String {
+    let is_loss = |phase: &ControlPhase| plant.input_rule().inertia_is_loss(phase.is_grounded);
+    integers(plant.phases().iter().map(|phase| i64::from(is_loss(phase))))
 }
 
 /// Where iterations end. In single precision rounding ends the progress earlier; torques of a lift would be off by 0.1 N m

@@ -118,7 +118,7 @@ pub fn along_recording(
 }
 
 /// The torques that the lift makes of exactly projected recorded inputs, at every sample: what the lift alone loses.
-pub fn lift_comparison(
+fn lift_comparison(
     controller: &mut Controller,
     recording: &Recording,
 ) -> Result<Comparison, MpcError> {

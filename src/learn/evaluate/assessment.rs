@@ -88,10 +88,7 @@ impl<'a> Assessment<'a> {
                 sums.add_constant_velocity(segment, &latent, rollout);
             }
             assessment.pointwise.add(model, segment, &latent)?;
-            for (sample, z) in latent.z.column_iter().enumerate() {
-                let x = model.decode(&z.into_owned())?;
-                (assessment.decoded).add(segment, sample, latent.phase[sample], &x);
-            }
+            assessment.decoded.add_decoded(model, segment, &latent)?;
             assessment.lift.add(model, segment)?;
             let baselines = assessment.baselines.iter_mut();
             let baselines = baselines.map(|baseline| baseline.add(&rule, segment, restart));

@@ -6,7 +6,7 @@ use super::verdict::failure;
 use super::*;
 use crate::mpc::problem::has_links_or_cones;
 use crate::mpc::{MpcSettings, Solver, Status, structured::MAX_STRUCTURED_DIM};
-use crate::robot::rotation;
+use crate::robot::{InputRule, rotation};
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct StepTimes {
@@ -26,7 +26,7 @@ pub struct Summary {
     /// Of [`Controller::prepare`](crate::mpc::Controller::prepare), which no command waits for.
     pub prepare_us: StepTimes,
     pub torque_r2: ByContact,
-    /// Of the lift alone, see [`lift_comparison`](super::lift_comparison).
+    /// Of the lift alone: recorded inputs projected and lifted.
     pub lift_r2: ByContact,
     pub torque_rms_nm: Option<f64>,
     /// Of planned minus reference positions, in standard deviations of the reference.
@@ -350,12 +350,12 @@ impl Deviation {
         &mut self,
         segment: &Segment,
         sample: usize,
-        robot: &Robot,
+        robot: &'static Robot,
         difference_nm: &[f64; JOINT_DIM],
     ) {
         let step_s = segment.time_s[sample + 1] - segment.time_s[sample];
         let (x, feet) = (segment.state(sample), segment.feet[sample]);
-        let wrench = robot.body_wrench(&segment.joints(sample), difference_nm, feet);
+        let wrench = InputRule::published(robot).wrench(&x, difference_nm, feet);
         let force = wrench.map_or(Vector3::zeros(), |all| all.fixed_rows::<3>(0).into_owned());
         let force = rotation([x[15], x[16], x[17]]) * force;
         self.velocity_m_s += force * (step_s / robot.mass_kg());

@@ -137,6 +137,20 @@ impl CoordinateSums {
         }
     }
 
+    /// Adds residuals of the encoded state decoded again, sample by sample.
+    pub(super) fn add_decoded(
+        &mut self,
+        model: &ReducedModel,
+        segment: &Segment,
+        latent: &LatentSegment,
+    ) -> Result<(), ModelError> {
+        for (sample, z) in latent.z.column_iter().enumerate() {
+            let x = model.decode(&z.into_owned())?;
+            self.add(segment, sample, latent.phase[sample], &x);
+        }
+        Ok(())
+    }
+
     /// Adds the residual of one coordinate.
     pub(super) fn add_one(
         &mut self,
@@ -284,12 +298,12 @@ impl LiftSums {
         let rule = model.input_rule()?;
         let input = segment.input(&rule)?;
         let losses = segment.losses(&rule);
-        let given = segment.torque_within_limits(robot);
         for sample in 0..segment.len() {
             if !is_plausible(robot, &segment.torque(sample)) {
                 continue;
             }
-            let torque = std::array::from_fn(|joint| given[(joint, sample)]);
+            // Torques within the motors' limits.
+            let torque = std::array::from_fn(|i| input[(i, sample)] + losses[(i, sample)]);
             let x = segment.x.column(sample).into_owned();
             let tangent = model.tangent(&x)?;
             let lifted = tangent.lift * (tangent.project * input.column(sample));

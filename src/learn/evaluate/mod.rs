@@ -21,7 +21,7 @@ mod prediction;
 mod round_trip;
 mod verdict;
 
-pub use along_recording::{ReferenceInput, Run, StepRow, along_recording, lift_comparison};
+pub use along_recording::{ReferenceInput, Run, StepRow, along_recording};
 pub use aslip::{Aslip, AslipSums, Baseline};
 pub use assessment::{Assessment, EvaluateError, Horizon, SegmentRun, remarks};
 pub use control_metrics::{ControlMetrics, Summary, control_metrics, usual_settings};

@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use serde_json::{Map, Value, json};
 
 use super::dataset::{Dataset, Scaling};
 use super::error::TrainError;
@@ -39,19 +40,12 @@ pub struct RefinedCoefficient {
     pub standard_errors: f64,
 }
 
-/// An equation that stays as it was, and why.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct UnchangedEquation {
-    pub phase: String,
-    pub coordinate: usize,
-    pub reason: &'static str,
-}
-
 #[derive(Clone, Debug)]
 pub struct Refined {
     pub model: ReducedModel,
     pub coefficients: Vec<RefinedCoefficient>,
-    pub unchanged: Vec<UnchangedEquation>,
+    /// Equations that stay as they were, and why.
+    pub unchanged: Vec<String>,
 }
 
 const NO_SAMPLES: &str = "too few samples of the phase";
@@ -70,6 +64,95 @@ pub fn refine_from(
     origin: &Origin,
 ) -> Result<Refined, TrainError> {
     let rule = InputRule::new(robot, actuators.clone(), model.wrench_frame());
+    let data = Data {
+        model,
+        features: Features::new(model.library()),
+        whole: encoded(model, recordings, &rule)?,
+        parts: encoded(model, &parts(recordings), &rule)?.each(),
+    };
+    let all = data.whole.set();
+    let judge = Judge::new(&data.features, all, 0);
+    let score = |xi: &[DMatrix<f64>]| judge.score_within(xi, f64::MAX);
+    let before = model.phases().iter().map(|phase| phase.xi.clone());
+    let mut xi: Vec<DMatrix<f64>> = before.collect();
+    let (mut coefficients, mut unchanged) = (Vec::new(), Vec::new());
+    for phase in 0..xi.len() {
+        let found = data.refined_phase(phase, &mut unchanged);
+        let mut tried = xi.clone();
+        for (term, of) in &found {
+            tried[phase][(*term, of.coordinate - 1)] = of.after;
+        }
+        if score(&tried) < score(&xi) {
+            xi = tried;
+            coefficients.extend(found.into_iter().map(|(_, of)| of));
+        } else if !found.is_empty() {
+            unchanged.push(format!("{}: {ROLLOUTS}", model.phases()[phase].name));
+        }
+    }
+    if coefficients.is_empty() {
+        let reasons = unchanged.join("; ");
+        return Err(TrainError::NothingToRefine { reasons });
+    }
+    let phases = model.phases().iter().cloned().zip(xi);
+    let phases = phases.map(|(phase, xi)| Phase { xi, ..phase });
+    let is_same_robot = model.robot().is_ok_and(|own| own.name == robot.name);
+    // What another robot's jumps look like is not what this one's do.
+    let prior = model.jump_prior().ok().cloned().filter(|_| is_same_robot);
+    let builder = model.clone().into_builder().phases(phases.collect());
+    let builder = builder.robot(robot).actuators(actuators).jump_prior(prior);
+    let model = builder
+        .provenance(provenance(model, origin, &coefficients))
+        .build()?;
+    Ok(Refined {
+        model,
+        coefficients,
+        unchanged,
+    })
+}
+
+/// The model's, with the command and recordings of the refinement and what it changed.
+fn provenance(
+    model: &ReducedModel,
+    origin: &Origin,
+    coefficients: &[RefinedCoefficient],
+) -> Map<String, Value> {
+    let mut provenance = model.provenance().clone();
+    provenance.insert("command".to_owned(), origin.command.clone().into());
+    provenance.insert("refined_on".to_owned(), json!(origin.recordings));
+    provenance.insert("refined_coefficients".to_owned(), json!(coefficients));
+    provenance
+}
+
+struct Encoded {
+    dataset: Dataset,
+    latent: Vec<Latent>,
+}
+
+impl Encoded {
+    fn set(&self) -> EncodedSet<'_> {
+        EncodedSet::new(&self.dataset, &self.latent)
+    }
+
+    /// A set for each jump.
+    fn each(self) -> Vec<Self> {
+        let Self { dataset, latent } = self;
+        let jumps = dataset.jumps.iter().zip(latent);
+        let each = jumps.map(|(jump, latent)| Self {
+            dataset: Dataset {
+                jumps: vec![jump.clone()],
+                ..dataset.clone()
+            },
+            latent: vec![latent],
+        });
+        each.collect()
+    }
+}
+
+fn encoded(
+    model: &ReducedModel,
+    recordings: &[Recording],
+    rule: &InputRule,
+) -> Result<Encoded, TrainError> {
     let scaling = Scaling {
         state: model.state_factors()?,
         input: model.input_factors()?,
@@ -80,109 +163,71 @@ pub fn refine_from(
     };
     let phases = PhaseRule::new(model.phases().iter().map(pattern).collect());
     let phases = phases.with_min_samples(CHATTER_SAMPLES);
-    let dataset =
-        |recordings: &[Recording]| Dataset::new(recordings, &rule, &phases, &scaling, SMOOTHING);
-    let features = &Features::new(model.library());
-    let encoder = model.encoder_map()?;
-    let whole = dataset(recordings)?;
-    let latent = Latent::of(&whole, encoder);
-    let all = EncodedSet::new(&whole, &latent);
-    let cut = dataset(&parts(recordings))?;
-    let parts = cut.jumps.iter().map(|jump| {
-        let part = Dataset {
-            jumps: vec![jump.clone()],
-            ..cut.clone()
-        };
-        let latent = Latent::of(&part, encoder);
-        (part, latent)
-    });
-    let parts: Vec<(Dataset, Vec<Latent>)> = parts.collect();
-    let judge = Judge::new(features, all, 0);
-    let mut xi: Vec<DMatrix<f64>> = model
-        .phases()
-        .iter()
-        .map(|phase| phase.xi.clone())
-        .collect();
-    let (mut coefficients, mut unchanged) = (Vec::new(), Vec::new());
-    for (phase, own) in model.phases().iter().enumerate() {
+    let dataset = Dataset::new(recordings, rule, &phases, &scaling, SMOOTHING)?;
+    let latent = Latent::of(&dataset, model.encoder_map()?);
+    Ok(Encoded { dataset, latent })
+}
+
+struct Data<'a> {
+    model: &'a ReducedModel,
+    features: Features,
+    whole: Encoded,
+    parts: Vec<Encoded>,
+}
+
+impl Data<'_> {
+    /// Changed coefficients of a phase with the number of their term; reasons for its other equations are added.
+    fn refined_phase(
+        &self,
+        phase: usize,
+        unchanged: &mut Vec<String>,
+    ) -> Vec<(usize, RefinedCoefficient)> {
+        let own = &self.model.phases()[phase];
         let is_flight = own.feet == FeetRule::None;
-        let sums_of = |set: EncodedSet<'_>| {
+        let sums = |of: &Encoded| {
             let (theta, target) = match is_flight {
-                true => flight_samples(set, features, phase),
-                false => windowed_samples(set, features, phase, WINDOW),
+                true => flight_samples(of.set(), &self.features, phase),
+                false => windowed_samples(of.set(), &self.features, phase, WINDOW),
             };
             Sums::of(&theta, &(target - &theta * &own.xi))
         };
-        let of_parts = parts.iter();
-        let of_parts = of_parts.map(|(part, latent)| sums_of(EncodedSet::new(part, latent)));
-        let of_parts: Vec<Sums> = of_parts.filter(|sums| sums.rows > 0).collect();
-        let of_all = sums_of(all);
-        let (mut tried, mut found) = (xi.clone(), Vec::new());
-        let stays = |coordinate: usize, reason| UnchangedEquation {
-            phase: own.name.clone(),
-            coordinate: coordinate + 1,
-            reason,
-        };
-        for k in 0..model.latent_dim() {
-            let support = support(&own.xi, features, k, is_flight);
+        let all = sums(&self.whole);
+        let parts: Vec<Sums> = self
+            .parts
+            .iter()
+            .map(sums)
+            .filter(|sums| sums.rows > 0)
+            .collect();
+        let is_enough = all.rows >= LEAST_ROWS && parts.len() > 1;
+        let mut found = Vec::new();
+        for k in 0..self.model.latent_dim() {
+            let support = support(&own.xi, &self.features, k, is_flight);
             if support.is_empty() {
                 continue;
             }
-            let enough = of_all.rows >= LEAST_ROWS && of_parts.len() > 1;
-            match enough.then(|| change(&of_all, &of_parts, k, &support)) {
-                None => unchanged.push(stays(k, NO_SAMPLES)),
-                Some(None) => unchanged.push(stays(k, NO_BETTER)),
-                Some(Some((change, deviation))) => {
-                    for ((&term, change), deviation) in support.iter().zip(&change).zip(&deviation)
-                    {
-                        let before = own.xi[(term, k)];
-                        tried[phase][(term, k)] = before + change;
-                        found.push(RefinedCoefficient {
-                            phase: own.name.clone(),
-                            coordinate: k + 1,
-                            term: model.library().terms()[term].text.clone(),
-                            before,
-                            after: before + change,
-                            standard_errors: (change / deviation).abs(),
-                        });
-                    }
-                }
+            let Some(changed) = is_enough.then(|| change(&all, &parts, k, &support)) else {
+                unchanged.push(format!("ddz{} in {}: {NO_SAMPLES}", k + 1, own.name));
+                continue;
+            };
+            let Some((change, deviation)) = changed else {
+                unchanged.push(format!("ddz{} in {}: {NO_BETTER}", k + 1, own.name));
+                continue;
+            };
+            for ((term, change), deviation) in support.into_iter().zip(&change).zip(&deviation) {
+                let before = own.xi[(term, k)];
+                let coefficient = RefinedCoefficient {
+                    phase: own.name.clone(),
+                    coordinate: k + 1,
+                    term: self.model.library().terms()[term].text.clone(),
+                    before,
+                    after: before + change,
+                    standard_errors: (change / deviation).abs(),
+                };
+                found.push((term, coefficient));
             }
         }
-        let [before, after] = [&xi, &tried].map(|xi| judge.score_within(xi, f64::MAX));
-        if after < before {
-            xi = tried;
-            coefficients.extend(found);
-        } else {
-            found.dedup_by_key(|coefficient| coefficient.coordinate);
-            unchanged.extend((found.iter()).map(|of| stays(of.coordinate - 1, ROLLOUTS)));
-        }
+        found
     }
-    if coefficients.is_empty() {
-        let reasons = unchanged.iter();
-        let reasons = reasons.map(|of| format!("{}, z{}: {}", of.phase, of.coordinate, of.reason));
-        return Err(TrainError::NothingToRefine {
-            reasons: reasons.collect::<Vec<_>>().join("; "),
-        });
-    }
-    let mut provenance = model.provenance().clone();
-    provenance.insert("command".to_owned(), origin.command.clone().into());
-    let recorded = serde_json::to_value(&origin.recordings).expect("texts");
-    provenance.insert("refined_on".to_owned(), recorded);
-    let changes = serde_json::to_value(&coefficients).expect("texts and numbers");
-    provenance.insert("refined_coefficients".to_owned(), changes);
-    let phases = model.phases().iter().cloned().zip(xi);
-    let phases = phases.map(|(phase, xi)| Phase { xi, ..phase });
-    let is_same_robot = model.robot().is_ok_and(|own| own.name == robot.name);
-    // What another robot's jumps look like is not what this one's do.
-    let prior = model.jump_prior().ok().cloned().filter(|_| is_same_robot);
-    let builder = model.clone().into_builder().phases(phases.collect());
-    let builder = builder.robot(robot).actuators(actuators).jump_prior(prior);
-    Ok(Refined {
-        model: builder.provenance(provenance).build()?,
-        coefficients,
-        unchanged,
-    })
 }
 
 /// The segments; cut into parts of [`PART_S`] where there are fewer than [`LEAST_PARTS`], so that some can be left out.

@@ -34,7 +34,8 @@ pub(super) struct Dynamics<'a> {
 impl Dynamics<'_> {
     /// Slopes of the accelerations of the momentum by `z`, `dz` and `u_lat` about the mean node of a part, `3 d x m`, by
     /// differences that are exact for products of two.
-    fn slopes(&self, phase: usize, nodes: &[&PartNodes]) -> DMatrix<f64> {
+    fn slopes(&self, phase: usize, sampled: &[Sampled], part: usize) -> DMatrix<f64> {
+        let nodes: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
         let d = nodes[0].z.ncols();
         let mean_of = |of: fn(&PartNodes) -> &DMatrix<f64>| {
             let means = nodes.iter().map(|nodes| of(nodes).row_mean());
@@ -88,15 +89,9 @@ pub(super) fn learn_jumps(
     let goal = GoalRange::of(&jumps);
     let (parts, scores) = (0..kind.len())
         .map(|part| {
-            let nodes: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
-            let known = dynamics.slopes(kind[part].phase, &nodes);
-            part_of(
-                &sampled,
-                &goal,
-                &kind[part].name,
-                (part, known),
-                &translation,
-            )
+            let known = dynamics.slopes(kind[part].phase, &sampled, part);
+            let name = &kind[part].name;
+            part_of(&sampled, &goal, name, (part, known), &translation)
         })
         .unzip();
     let landmarks = kind.iter().enumerate().map(|(part, landmark)| {
