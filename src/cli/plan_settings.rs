@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::mpc::interface::{SETTINGS, Settings};
-use crate::mpc::{ControlError, MpcSettings};
+use crate::mpc::{ControlError, Effectiveness, MpcSettings};
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
 pub(super) fn path_beside(plan: &Path) -> PathBuf {
@@ -35,9 +35,25 @@ pub(super) fn beside(recording: &Path) -> Result<MpcSettings, Error> {
     settings.to_mpc().map_err(refused)
 }
 
+/// Unlike a recorded jump, a plan obeys the model: its inputs count more, and so do velocities and the end of a horizon.
+/// How much of the input arrives is estimated, under the joint PD of the examples.
+fn of_plans() -> MpcSettings {
+    MpcSettings {
+        input_weight: 30.0,
+        velocity_weight: 1.0,
+        terminal_weight: 100.0,
+        effectiveness: Some(Effectiveness {
+            time_constant_s: 1.0,
+            stiffness_nm_rad: 20.0,
+            damping_nm_s_rad: 0.8,
+        }),
+        ..MpcSettings::default()
+    }
+}
+
 /// The file for a plan: the settings that differ from the usual ones.
 pub(super) fn text() -> String {
-    let both = [MpcSettings::of_plans(), MpcSettings::default()];
+    let both = [of_plans(), MpcSettings::default()];
     let [own, usual] = both.map(|settings| Settings::from(&settings).numbers());
     let mut text = "# Settings of the controller for the plan of the same name. `romc mpc` and `romc compile --plan`\n\
                     # read them. In flight, keep the torques of the commands: they swing the legs.\n"

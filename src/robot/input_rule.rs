@@ -100,7 +100,7 @@ impl InputRule {
         is_grounded || self.frame != WrenchFrame::Ground
     }
 
-    /// [`Actuators::losses`] in N m at `dq` (rad/s) and `ddq` (rad/s^2); zero without actuators.
+    /// [`joint_loss`] of every joint in N m at `dq` (rad/s) and `ddq` (rad/s^2); zero without actuators.
     pub fn losses(
         &self,
         dq: &[f64; JOINT_DIM],
@@ -228,7 +228,7 @@ impl Actuators {
 
     /// [`joint_loss`] of every joint at velocities `dq` (rad/s) and accelerations `ddq` (rad/s^2).
     #[must_use]
-    pub fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
+    fn losses(&self, dq: &[f64; JOINT_DIM], ddq: &[f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         let of = |joint: usize| self.named().map(|(_, values)| values[joint]);
         std::array::from_fn(|i| joint_loss(&of(i), dq[i], ddq[i]))
     }

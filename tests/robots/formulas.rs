@@ -41,10 +41,50 @@ fn losses_oppose_the_motion_and_are_dry_friction_alone_when_slow() {
         dry: [0.2; JOINT_DIM],
         armature: [0.01; JOINT_DIM],
     };
-    let losses = actuators.losses(&[-2.0; JOINT_DIM], &[30.0; JOINT_DIM]);
-    assert!((losses[0] - (-1.2 - 0.2 + 0.3)).abs() < 1e-12);
-    let slow = actuators.losses(&[0.5; JOINT_DIM], &[0.0; JOINT_DIM])[3];
-    assert!((slow - 0.5).abs() < 1e-8, "{slow}");
+    let (fast, still) = ([30.0; JOINT_DIM], [0.0; JOINT_DIM]);
+    let [world, ground] = [WrenchFrame::World, WrenchFrame::Ground].map(|frame| {
+        let rule = InputRule::new(go1(), Some(actuators.clone()), frame);
+        move |dq: f64, ddq: &[f64; JOINT_DIM], down| rule.losses(&[dq; JOINT_DIM], ddq, [down; 4])
+    });
+    for down in [true, false] {
+        assert!((world(-2.0, &fast, down)[0] - (-1.2 - 0.2 + 0.3)).abs() < 1e-12);
+        let slow = world(0.5, &still, down)[3];
+        assert!((slow - 0.5).abs() < 1e-8, "{slow}");
+    }
+    // In flight the rotors belong to the legs.
+    assert_eq!(ground(-2.0, &fast, true), world(-2.0, &fast, true));
+    assert_eq!(ground(-2.0, &fast, false), world(-2.0, &still, false));
+}
+
+#[test]
+fn feet_that_would_pull_add_nothing_by_the_rule_of_the_ground() {
+    let rule = |frame| InputRule::new(go1(), None, frame);
+    let [world, ground] = [rule(WrenchFrame::World), rule(WrenchFrame::Ground)];
+    let mut x = state();
+    x[15..].fill(0.0);
+    let alone = |leg: Leg| std::array::from_fn(|k| k == leg.index());
+    let mut tau = torques();
+    let mut pulling = [false; 4];
+    for (leg, down) in Leg::ALL.into_iter().zip(&mut pulling) {
+        *down = world.wrench(&x, &tau, alone(leg)).unwrap()[2] < 0.0;
+    }
+    // A leg that pushes, turned into one that pulls by its opposite torques.
+    let pushing = Leg::ALL
+        .into_iter()
+        .find(|leg| !pulling[leg.index()])
+        .expect("one pushes");
+    for torque in &mut tau[3 * pushing.index()..][..3] {
+        *torque = -*torque;
+    }
+    pulling[pushing.index()] = true;
+    let push = pulling.map(|pulls| !pulls);
+    let expected = world.wrench(&x, &tau, push).unwrap();
+    assert_eq!(ground.input_wrench(&x, &tau, [true; 4]).unwrap(), expected);
+    let all = world.wrench(&x, &tau, [true; 4]).unwrap();
+    assert_eq!(world.input_wrench(&x, &tau, [true; 4]).unwrap(), all);
+    assert!((all - expected).norm() > 1.0);
+    // What a change of torques does is linear, whichever feet push.
+    assert_eq!(ground.wrench(&x, &tau, [true; 4]).unwrap(), all);
 }
 
 /// A leg of the usual shape, with its hip to one side and its foot before the calf.

@@ -382,26 +382,7 @@ settings! {
 }
 
 impl MpcSettings {
-    /// For a plan. Unlike a recorded jump it obeys the model, so that its inputs count more, and so do velocities and the
-    /// end of a horizon. How much of the input arrives is estimated, under a joint PD of 20 N m/rad and 0.8 N m s/rad.
-    pub fn of_plans() -> Self {
-        Self {
-            input_weight: 30.0,
-            velocity_weight: 1.0,
-            terminal_weight: 100.0,
-            effectiveness: Some(Effectiveness {
-                time_constant_s: 1.0,
-                stiffness_nm_rad: 20.0,
-                damping_nm_s_rad: 0.8,
-            }),
-            ..Self::default()
-        }
-    }
-
     /// Checks every number.
-    ///
-    /// # Errors
-    /// [`ControlError::Setting`] of the first that is not accepted.
     pub(crate) fn check(&self) -> Result<(), ControlError> {
         self.check_table()?;
         let (qp, fallback) = (&self.qp, &self.fallback);

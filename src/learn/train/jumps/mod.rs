@@ -75,11 +75,6 @@ pub(super) fn learn_jumps(
     let sampled = sampled(set, &chosen);
     let translation = affine.weights().column(BODY_X).into_owned();
     let heights = |jump: usize| training.jumps[jump].x.row(BODY_Z) / scale[BODY_Z];
-    let mut start = DVector::zeros(scale.len());
-    for &(jump, _) in &chosen {
-        let first = training.jumps[jump].x.column(0);
-        start += first.component_div(scale) / chosen.len() as f64;
-    }
     let end_heights = chosen.iter().map(|&(jump, cut)| heights(jump)[cut.end()]);
     let landing_heights = chosen.iter().map(|&(jump, cut)| {
         let first = cut.landing().unwrap_or(cut.end());
@@ -107,7 +102,7 @@ pub(super) fn learn_jumps(
         landmarks: Landmarks {
             parts: landmarks.collect(),
             jumps,
-            start: start.map(rounded),
+            start: mean_start(training, &chosen).map(rounded),
             end_height_m: range_of(end_heights),
             landing_height_m: range_of(landing_heights)[0],
         },
@@ -115,6 +110,17 @@ pub(super) fn learn_jumps(
         parts,
     };
     (Some(prior), scores)
+}
+
+/// SI units.
+fn mean_start(training: &Dataset, chosen: &[(usize, &Cut)]) -> DVector<f64> {
+    let scale = &training.scaling.state;
+    let first = |(jump, _): &(usize, &Cut)| training.jumps[*jump].x.column(0).component_div(scale);
+    let sum = chosen
+        .iter()
+        .map(first)
+        .fold(DVector::zeros(scale.len()), |sum, x| sum + x);
+    sum / chosen.len() as f64
 }
 
 fn sampled(set: EncodedSet<'_>, chosen: &[(usize, &Cut)]) -> Vec<Sampled> {
