@@ -281,6 +281,27 @@ fn verdict_on(model: &ReducedModel, paths: &[&str]) -> Verdict {
     verdict
 }
 
+/// A model that turns the wrong way in contact predicts the pitch worse than a constant velocity, and its legs with it.
+#[test]
+fn pitch_that_is_wrong_makes_the_verdict_fail() {
+    let model = shipped("go1-d7");
+    let mut phases = model.phases().to_vec();
+    phases[0].xi.column_mut(2).neg_mut();
+    let wrong = model
+        .into_builder()
+        .phases(phases)
+        .build()
+        .expect("a model");
+    let verdict = verdict_on(&wrong, &["examples/recordings/go1/test_02.csv.gz"]);
+    let row = verdict
+        .rows
+        .iter()
+        .find(|row| row.name.contains("body.pitch"));
+    let row = row.expect("a row");
+    assert_eq!((row.counts, row.passed), (true, Some(false)), "{row:?}");
+    assert_eq!(verdict.failed[0], "0.1 s");
+}
+
 #[test]
 fn every_row_that_praises_the_dynamics_falls_with_them() {
     let go1 = "examples/recordings/go1/test_02.csv.gz";
@@ -290,6 +311,7 @@ fn every_row_that_praises_the_dynamics_falls_with_them() {
         ("go1-d2", go1, &all[..2]),
         ("go1-d4", go1, all),
         ("go1-d6", go1, all),
+        ("go1-d7", go1, all),
         ("go2-async-d4", go2, all),
     ] {
         let model = shipped(name);
@@ -317,9 +339,21 @@ fn shipped_models_are_fit_for_everything_on_jumps_of_their_robot() {
     };
     for jumps in [of("go1", "test", 3), of("go1-other", "jump", 8)] {
         let paths: Vec<&str> = jumps.iter().map(String::as_str).collect();
-        for name in ["go1-d4", "go1-d6"] {
+        for name in ["go1-d4", "go1-d6", "go1-d7"] {
             let verdict = verdict_on(&shipped(name), &paths);
             assert_eq!(verdict.fit_for.len(), 4, "{name}: {verdict:?}");
+            // Only a model with a coordinate for it is judged by its pitch.
+            let row = |of: &str| {
+                let named = verdict.rows.iter().find(|row| row.name.contains(of));
+                let row = named.expect("of every model");
+                (row.counts, row.passed)
+            };
+            assert_eq!(
+                row("body.pitch"),
+                (name != "go1-d4", Some(name != "go1-d4"))
+            );
+            assert_eq!(row("the legs").1, Some(true));
+            assert!(row("the legs").0 || name == "go1-d4", "{name}");
         }
         let verdict = verdict_on(&shipped("go1-d2"), &paths);
         assert_eq!(verdict.fit_for, ["0.1 s", "whole motion"], "{verdict:?}");

@@ -68,6 +68,47 @@ fn plan_is_a_recording_that_other_commands_take() {
 
     let followed: Value =
         serde_json::from_str(&done(folder, &["mpc", &model, "plan.csv", "--json"])).expect("JSON");
+    assert_eq!(said["settings"], "plan.settings.toml");
+    let torques = |name: &str, settings: &str| {
+        fs::copy(folder.join("plan.csv"), folder.join(format!("{name}.csv"))).expect("copied");
+        fs::write(folder.join(format!("{name}.settings.toml")), settings).expect("written");
+        let (plan, output) = (format!("{name}.csv"), format!("{name}-torques.csv"));
+        done(folder, &["mpc", &model, &plan, "--output", &output]);
+        let table = fs::read_to_string(folder.join(output)).expect("a table");
+        // Without the name of the recording and the times of the solver.
+        let lines = table.lines().map(|line| {
+            let fields = line.split(',').enumerate();
+            let kept = fields.filter(|(i, _)| ![0, 5].contains(i));
+            kept.map(|(_, field)| field.to_owned()).collect::<Vec<_>>()
+        });
+        lines.collect::<Vec<_>>()
+    };
+    let own = fs::read_to_string(folder.join("plan.settings.toml")).expect("written");
+    assert!(own.contains("terminal_weight = 100.0 #"), "{own}");
+    // The settings next to a plan are those of its controller: without them, commands are others.
+    let [with, without] = [torques("with", &own), torques("without", "")];
+    assert_ne!(with, without);
+    assert_eq!(
+        torques(
+            "again",
+            "terminal_weight = 100.0\ninput_weight = 30.0\nvelocity_weight = 1.0\n\
+        effectiveness_time_s = 1.0\ndrive_stiffness_nm_rad = 20.0\ndrive_damping_nm_s_rad = 0.8\n"
+        ),
+        with
+    );
+    for (settings, expected) in [
+        ("weight = 1.0", "found `weight`"),
+        ("input_weight = -1.0", "`input_weight` is -1"),
+    ] {
+        fs::write(folder.join("with.settings.toml"), settings).expect("written");
+        let output = romc(folder, &["mpc", &model, "with.csv"]);
+        let stderr = text(&output.stderr);
+        assert!(
+            stderr.contains("with.settings.toml") && stderr.contains(expected),
+            "{stderr}"
+        );
+        assert_eq!(output.status.code(), Some(1));
+    }
     let run = &followed["runs"][0];
     assert_eq!(run["solved"], run["steps"], "{run}");
     assert!(number(&run["lift"]["torque_r2"]["contact"]) > 0.99, "{run}");

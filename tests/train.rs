@@ -2,6 +2,8 @@
 
 #[path = "train/definitions.rs"]
 mod definitions;
+#[path = "train/from_model.rs"]
+mod from_model;
 #[path = "train/known_system.rs"]
 mod known_system;
 mod outside;

@@ -15,6 +15,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let output = arguments.output.as_deref();
     inputs.check_output(output, Format::RECORDING, arguments.force)?;
     let beside = output.map(plan_settings::path_beside);
+    let beside = beside.filter(|path| !plan_settings::is_there(path));
     inputs.check_output(beside.as_deref(), Format::TOML, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let settings = arguments.settings.as_deref();
@@ -53,7 +54,9 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     if let Some(path) = output {
         let (settings, text) = (plan_settings::path_beside(path), plan_settings::text());
         write_recording(path, vec![planned.motion.clone()], None, arguments.force)?;
-        write_file(&settings, text.as_bytes(), arguments.force)?;
+        if !plan_settings::is_there(&settings) {
+            write_file(&settings, text.as_bytes(), arguments.force)?;
+        }
         let [path, settings] = [path, &settings].map(|path| path.display().to_string());
         let _ = writeln!(
             answer.text,

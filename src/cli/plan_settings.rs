@@ -65,3 +65,8 @@ pub(super) fn text() -> String {
     }
     text
 }
+
+/// Whether a file has this text already, as after a plan of the same name in another format.
+pub(super) fn is_there(path: &Path) -> bool {
+    std::fs::read(path).is_ok_and(|found| found == text().as_bytes())
+}

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use nalgebra::{DMatrix, DVector};
 use romc::artifact;
-use romc::evaluate::{CoordinateSums, Fit};
+use romc::evaluate::{Assessment, CoordinateSums, Fit, Horizon};
 use romc::lower::CompiledModel;
 use romc::model::{LibraryChoice, ReducedModel, StandardLibrary};
 use romc::recording::Recording;
@@ -187,4 +187,31 @@ fn equations_of_the_whole_body_obey_what_is_known() {
         weights(&affine.model).select_columns(&out_of_plane).amax(),
         0.0
     );
+}
+
+/// Errors at the touchdown after flights without a restart: pitch and a knee, of the model and of a robot at rest.
+fn at_touchdown(model: &ReducedModel) -> [[f64; 2]; 2] {
+    let recordings = jumps("test", 3);
+    let assessment = Assessment::over(model, &recordings, 0.1).expect("of its robot");
+    let horizons = Horizon::all(model, &assessment).expect("the same");
+    let predictors = &horizons[3].predictors;
+    assert_eq!([predictors[0].0, predictors[2].0], ["model", "at rest"]);
+    [PITCH, 5].map(|coordinate| {
+        [0, 2].map(|of| predictors[of].1.fits()[coordinate].expect("flights").rms)
+    })
+}
+
+#[test]
+fn legs_and_rotation_hold_from_take_off_to_touchdown() {
+    let [pitch, knee] = at_touchdown(&WHOLE_BODY);
+    assert!(pitch[0] < 0.015 && pitch[1] > 0.03, "{pitch:?}");
+    assert!(knee[0] < 0.06 && knee[1] > 0.15, "{knee:?}");
+    // With flights' equations of the legs zeroed, or of a whole phase exchanged, they do not.
+    let mut phases = WHOLE_BODY.phases().to_vec();
+    for leg in 3..7 {
+        phases[1].xi.column_mut(leg).fill(0.0);
+    }
+    let still = WHOLE_BODY.clone().into_builder().phases(phases).build();
+    let [_, knee] = at_touchdown(&still.expect("sound"));
+    assert!(knee[0] > 0.15, "{knee:?}");
 }

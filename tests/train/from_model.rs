@@ -1,0 +1,95 @@
+//! A trained model refined on other recordings.
+
+use std::path::Path;
+
+use romc::artifact;
+use romc::evaluate::Assessment;
+use romc::model::ReducedModel;
+use romc::recording::Recording;
+use romc::train::{Origin, TrainError, refine_from};
+
+use super::{go1, jumps};
+
+/// Error of body z over 0.1 s on the test jumps, m.
+fn error_m(model: &ReducedModel) -> f64 {
+    let recordings = jumps("test", 3);
+    let assessment = Assessment::over(model, &recordings, 0.1).expect("of its robot");
+    let fit = assessment.fit(&assessment.restarted, "body.z");
+    fit.expect("samples").rms
+}
+
+/// A robot that is 15 % heavier than the model says, and gravity in contact that is 5 % less.
+#[test]
+fn wrong_mass_is_found_again_with_its_standard_errors() {
+    let right = artifact::read(Path::new("models/go1-d7.json")).expect("shipped");
+    let terms = right.library().terms();
+    let term = |text: &str| {
+        terms
+            .iter()
+            .position(|term| term.text == text)
+            .expect("a term")
+    };
+    let (force, one) = (term("u2"), term("1"));
+    let mut phases = right.phases().to_vec();
+    phases[0].xi[(force, 1)] *= 0.85;
+    phases[0].xi[(one, 1)] *= 0.95;
+    let wrong = right
+        .clone()
+        .into_builder()
+        .phases(phases)
+        .build()
+        .expect("sound");
+    let training = jumps("train", 5);
+    let origin = Origin::default();
+    let refined = refine_from(
+        &wrong,
+        &training,
+        go1(),
+        wrong.actuators().cloned(),
+        &origin,
+    );
+    let refined = refined.expect("refines");
+    let xi = |model: &ReducedModel| model.phases()[0].xi[(force, 1)];
+    let [before, after] =
+        [&wrong, &refined.model].map(|model| (xi(model) / xi(&right) - 1.0).abs());
+    assert!(before > 0.14 && after < 0.05, "{before} {after}");
+    let changed = refined.coefficients.iter();
+    let mut changed = changed.filter(|of| of.coordinate == 2 && of.term == "u2");
+    let changed = changed.next().expect("the force of ddz2");
+    assert!(changed.standard_errors > 5.0, "{changed:?}");
+    let [wrong_m, refined_m, right_m] = [&wrong, &refined.model, &right].map(error_m);
+    assert!(
+        wrong_m > 2.5 * right_m && refined_m < 1.1 * right_m,
+        "{wrong_m} {refined_m} {right_m}"
+    );
+    // Free fall is physics.
+    assert_eq!(
+        refined.model.phases()[1].xi.column(1),
+        right.phases()[1].xi.column(1)
+    );
+    assert_eq!(refined.model.encoder_map().ok(), right.encoder_map().ok());
+}
+
+#[test]
+fn recordings_that_say_nothing_are_refused_with_the_reasons() {
+    let model = artifact::read(Path::new("models/go1-d7.json")).expect("shipped");
+    let jump = jumps("train", 1).remove(0);
+    // A stance of 0.1 s.
+    let short = Recording {
+        segments: vec![jump.segments[0].slice(0..51)],
+        ..jump
+    };
+    let origin = Origin::default();
+    let error = refine_from(&model, &[short], go1(), model.actuators().cloned(), &origin);
+    let Err(TrainError::NothingToRefine { reasons }) = error else {
+        panic!("{error:?}");
+    };
+    assert!(
+        reasons.contains("ddz1 in contact: too few samples"),
+        "{reasons}"
+    );
+    assert!(
+        reasons.contains("ddz7 in flight: too few samples"),
+        "{reasons}"
+    );
+}
