@@ -22,7 +22,7 @@ fn main() {
     let number = |name: &str, default: u64| -> u64 {
         value_of(name).map_or(default, |text| text.parse().expect("a whole number"))
     };
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/go1-d6.json");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/go1-d7.json");
     let path = value_of("--model").map_or(shipped, Into::into);
     let model = romc::artifact::read(&path).expect("a model file");
     let prior = model.jump_prior().expect("a model that plans");

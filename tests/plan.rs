@@ -15,7 +15,7 @@ use serde_json::Value;
 /// A shipped model that plans.
 fn model() -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    root.join("models/go1-d6.json").display().to_string()
+    root.join("models/go1-d7.json").display().to_string()
 }
 
 /// Runs, expects success, returns stdout.
@@ -126,7 +126,7 @@ fn plan_is_a_recording_that_other_commands_take() {
         ],
     );
     assert!(emitted.contains("controller"), "{emitted}");
-    let of_example = folder.join("code/go1_d6-controller/examples/go1_d6_plan.c");
+    let of_example = folder.join("code/go1_d7-controller/examples/go1_d7_plan.c");
     let source = fs::read_to_string(of_example).expect("the plan of the example");
     let written = source.split([',', '{', '}', '\n', ' ']);
     let written: Vec<f64> = (written.filter(|word| word.contains('e')))
@@ -148,7 +148,7 @@ fn plan_is_a_recording_that_other_commands_take() {
 #[test]
 fn plan_ends_at_the_sum_of_its_durations_with_the_steps_of_the_model() {
     let folder = tempfile::tempdir().expect("a folder");
-    let model = model().replace("go1-d6", "go2-async-d4");
+    let model = model().replace("go1-d7", "go2-async-d4");
     for (distance, output) in [("0.28", "a.csv"), ("0.3", "b.csv"), ("0.33", "c.csv")] {
         let goal = ["--distance", distance, "--apex", "0.12", "--force"];
         let plan = ["plan", &model, "--output", output, "--json"];

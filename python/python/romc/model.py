@@ -76,7 +76,7 @@ class Model:
         - `order`: the order of the 18 coordinates in the arrays, such as `"body,fl,fr,rl,rr"`, if it is not romc's.
         - `phases`: the feet that select each phase, `any`, `none`, `always` or patterns such as `"0011,0001"` (fr
           fl rr rl), the first match wins; `contact` and `flight` are known.
-        - `wrench_frame`: axes of the force and moment in the inputs, `"body"` (as published) or `"world"`.
+        - `wrench_frame`: axes of the force and moment in the inputs, `"body"` (as published), `"world"` or `"ground"`.
         - `actuators`: friction and inertia of the joints, if training took them from the torques: a mapping of
           `"viscous"` (N m s/rad), `"dry"` (N m) and `"armature"` (kg m^2), 12 numbers each or 3 for a leg, or a file
           of `romc identify`.

@@ -276,8 +276,8 @@ pub(crate) struct MpcArguments {
 #[command(
     after_help = "Exit code 1 and a reason where there is no plan to be trusted.\n\n\
                   Examples:\n  \
-                  romc plan models/go1-d6.json --distance 0.35 --apex 0.15 --output plan.csv\n  \
-                  romc plan models/go1-d6.json --reach --figures reach"
+                  romc plan models/go1-d7.json --distance 0.35 --apex 0.15 --output plan.csv\n  \
+                  romc plan models/go1-d7.json --reach --figures reach"
 )]
 pub(crate) struct PlanArguments {
     /// Model file with `landmarks` and `prior`, as `romc train` writes them

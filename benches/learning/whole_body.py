@@ -1,0 +1,82 @@
+"""Trains models of the whole body without parts of the recipe and prints the table of docs/learning.md.
+
+    cargo build --release && python3 benches/learning/whole_body.py
+
+Every row is a training on the jumps of `examples/recordings/go1` and the errors of `romc simulate --verbose` along its
+test jumps, then along `go1-other`. Less than a minute on two cores; needs Python alone.
+"""
+
+import argparse
+import json
+import pathlib
+import subprocess
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+RECORDINGS = ROOT / "examples" / "recordings"
+SETS = ("go1/test_*.csv.gz", "go1-other/*.csv.gz")
+ROWS = [
+    (7, "", "d = 7"),
+    (7, "--wrench-frame world", "feet that pull, rotors' inertia as a loss in flight"),
+    (7, "--degree 1", "no products with the height"),
+    (7, "--actuators none", "torques of the motors"),
+    (7, "--refinements 0", "no refinement"),
+    (7, "--coordinates free", "no known rows and equations"),
+    (6, "", "d = 6: no known rows of the legs"),
+    (4, "", "d = 4: no row of the rotation"),
+]
+HEAD = (
+    "| | x, z, mm | pitch R^2, 0.1 and 0.2 s | least R^2 of legs | pitch, knees at touchdown, mrad "
+    "| other: x, z | other: pitch | other: legs | other: touchdown |\n" + "|---" * 9 + "|"
+)
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target" / "release" / "romc")
+    romc = parser.parse_args().romc.resolve()
+    print(HEAD)
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (dimension, flags, name) in enumerate(ROWS):
+            model = pathlib.Path(folder) / f"m{number}.json"
+            train = [romc, "train", *jumps("go1/train_*.csv.gz"), "--validation"]
+            train += [*jumps("go1/validation_*.csv.gz"), "--latent-dim", dimension, *flags.split()]
+            run([*train, "--output", model])
+            cells = [cell for of in SETS for cell in figures(romc, model, jumps(of))]
+            shown = f"{name}, `{flags}`" if flags else name
+            print("| " + " | ".join([shown, *cells]) + " |", flush=True)
+
+
+def jumps(pattern):
+    return sorted(RECORDINGS.glob(pattern))
+
+
+def run(command):
+    """The answer of a command, whose verdict may be that the model fails."""
+    done = subprocess.run([str(part) for part in command], cwd=ROOT, capture_output=True, text=True)
+    if not done.stdout:
+        raise SystemExit(done.stderr)
+    return done.stdout
+
+
+def figures(romc, model, recordings):
+    """The cells of one set of recordings."""
+    answer = json.loads(run([romc, "simulate", model, *recordings, "--verbose", "--json"]))
+    soon, later, _, landed = (horizon["coordinates"] for horizon in answer["horizons"])
+    legs = [name for name in soon if name.endswith((".hy", ".kn"))]
+    knees = [landed[name]["rms"] for name in legs if name.endswith(".kn")]
+    knee = (sum(rms * rms for rms in knees) / len(knees)) ** 0.5
+    x, z = (1e3 * soon[name]["rms"] for name in ("body.x", "body.z"))
+    pitch = [coordinates["body.pitch"]["r2"] for coordinates in (soon, later)]
+    return [
+        f"{x:.2f}, {z:.2f}",
+        f"{pitch[0]:.3f}, {pitch[1]:.2f}",
+        f"{min(soon[name]['r2'] for name in legs):.3f}",
+        f"{1e3 * landed['body.pitch']['rms']:.1f}, {1e3 * knee:.0f}",
+    ]
+
+
+if __name__ == "__main__":
+    main()
