@@ -281,7 +281,7 @@ fn verdict_on(model: &ReducedModel, paths: &[&str]) -> Verdict {
     verdict
 }
 
-/// A model that turns the wrong way in contact predicts the pitch worse than a constant velocity, and its legs with it.
+/// A model that turns the wrong way in contact predicts the pitch worse than a constant velocity.
 #[test]
 fn pitch_that_is_wrong_makes_the_verdict_fail() {
     let model = shipped("go1-d7");

@@ -106,7 +106,10 @@ def main():
         for name in ABLATIONS:
             models[name] = ablated(arguments, name)
             methods[name] = Method(name, True)
-    _, answer = planned(arguments, models, "plan", goals[0])
+    plans = (planned(arguments, models, "plan", goal) for goal in goals)
+    answer = next((answer for jump, answer in plans if jump is not None), None)
+    if answer is None:
+        raise SystemExit("no goal has a plan")
     arguments.setting = settings_of(answer) | dict(arguments.setting)
     crate = romc_controller.build(arguments.model, folder / arguments.model.stem, arguments.romc)
     tasks = [

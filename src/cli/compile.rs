@@ -131,6 +131,12 @@ fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<Pla
             "--plan without a target that jumps it; add --emit controller or controller-c";
         return Err(Error::refused(path, message));
     }
+    let settings = plan_settings::beside(path)?;
+    if settings.torque_rate_nm_s.is_some() {
+        let message =
+            "found `torque_rate_nm_s`, expected none: generated controllers have it as an option";
+        return Err(Error::refused(&plan_settings::path_beside(path), message));
+    }
     let motion = read_jump(model, path, &arguments.simplification.reading)?;
     Ok(Some(PlannedJump {
         u: motion.input(&model.input_rule()?)?,
@@ -139,7 +145,7 @@ fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<Pla
         dx: motion.dx,
         torque_nm: motion.torque_nm,
         feet: motion.feet,
-        settings: plan_settings::beside(path)?,
+        settings,
     }))
 }
 

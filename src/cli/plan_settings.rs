@@ -26,6 +26,13 @@ pub(super) fn beside(recording: &Path) -> Result<MpcSettings, Error> {
     let numbers: BTreeMap<String, f64> = read_settings(&path, |_| Ok(()))?;
     let mut settings = Settings::from(&usual);
     for (name, number) in numbers {
+        let is_whole = SETTINGS
+            .iter()
+            .any(|of| of.name == name && of.kind == "i32");
+        if is_whole && number.fract() != 0.0 {
+            let message = format!("`{name}` is {number}, expected a whole number");
+            return Err(Error::refused(&path, message));
+        }
         if !settings.set(&name, number) {
             let message = format!("found `{name}`, expected names of settings of the controller");
             return Err(Error::refused(&path, message));

@@ -25,25 +25,38 @@ pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer, Err
     let actuators = match settings.actuators.as_deref() {
         None => model.actuators().cloned(),
         Some("none") => None,
+        Some("identify") => {
+            let message = "found `--actuators identify` with --from, expected a file of `romc identify`, or none";
+            return Err(Error::refused(from, message));
+        }
         Some(path) => Some(read_actuators(Path::new(path), Some(robot))?),
     };
+    let is_other = model.robot().is_ok_and(|own| own.name != robot.name);
+    if is_other && settings.actuators.is_none() && actuators.is_some() {
+        note(
+            "joint friction and rotor inertia are those of the model's robot; --actuators replaces them",
+        );
+    }
     let sets = [&arguments.recordings[..], &[], &[]];
     let mut recorded = RecordedSets::whole(sets, &arguments.reading, &settings, robot)?;
-    recorded.read()?;
+    note_repeated(&recorded.files());
+    let read = recorded.read();
     recorded.report_findings();
+    read?;
     let mut command = format!(
         "romc train --from {} {}",
         quoted(from),
         quoted_all(&arguments.recordings)
     );
     command += &(settings.as_flags() + &arguments.reading.as_flags());
+    let name = arguments.name.iter();
+    command.extend(name.map(|name| format!(" --name {}", quoted_text(name))));
     command += &format!(" --output {}", quoted(&arguments.output));
     let origin = Origin::new(command, &arguments.recordings);
     let training = &recorded.sets[0].recordings;
     let mut refined = refine_from(&model, training, robot, actuators, &origin)?;
-    if let Some(name) = &arguments.name {
-        refined.model = refined.model.into_builder().name(name.clone()).build()?;
-    }
+    let name = named(arguments.name.as_deref(), &arguments.output);
+    refined.model = refined.model.into_builder().name(name).build()?;
     artifact::write(&arguments.output, &refined.model, arguments.force)?;
     Ok(answer(arguments, from, &refined))
 }

@@ -71,7 +71,7 @@ fn wrong_mass_is_found_again_with_its_standard_errors() {
 }
 
 #[test]
-fn recordings_that_say_nothing_are_refused_with_the_reasons() {
+fn recordings_without_information_are_refused_with_the_reasons() {
     let model = artifact::read(Path::new("models/go1-d7.json")).expect("shipped");
     let jump = jumps("train", 1).remove(0);
     // A stance of 0.1 s.

@@ -206,7 +206,7 @@ fn legs_and_rotation_hold_from_take_off_to_touchdown() {
     let [pitch, knee] = at_touchdown(&WHOLE_BODY);
     assert!(pitch[0] < 0.015 && pitch[1] > 0.03, "{pitch:?}");
     assert!(knee[0] < 0.06 && knee[1] > 0.15, "{knee:?}");
-    // With flights' equations of the legs zeroed, or of a whole phase exchanged, they do not.
+    // With the legs' equations of flights zeroed they do not.
     let mut phases = WHOLE_BODY.phases().to_vec();
     for leg in 3..7 {
         phases[1].xi.column_mut(leg).fill(0.0);

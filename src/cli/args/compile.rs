@@ -27,7 +27,7 @@ pub(crate) struct CompileArguments {
     #[arg(long, value_name = "DIR")]
     pub out_dir: PathBuf,
     /// A recording that the C examples of generated controllers follow, such as `romc plan` makes: of the model's own
-    /// robot, where that is not a go1
+    /// robot, where that is not a go1. Settings in PLAN.settings.toml are the defaults of these controllers
     #[arg(long, value_name = "PLAN.csv")]
     pub plan: Option<PathBuf>,
     #[command(flatten)]

@@ -82,8 +82,8 @@ pub(crate) struct TrainArguments {
     /// Divide the jumps by these shares for training, validation and test, such as 14,3,3
     #[arg(long, value_name = "SHARES", conflicts_with_all = ["validation", "test"])]
     pub split: Option<Split>,
-    /// Refine this model instead: encoder and decoder stay, coefficients of its equations change where the recordings say
-    /// so, of hardware or of another robot (--robot)
+    /// Refine this model on recordings of hardware, or of another robot (--robot): encoder and decoder stay, coefficients
+    /// of its equations change where left-out parts are predicted better
     #[arg(long, value_name = "MODEL.json")]
     pub from: Option<PathBuf>,
     /// The model file to write
@@ -184,8 +184,8 @@ pub(crate) struct TrainSettings {
     /// the training recordings tell (as `romc identify` does), or `none` (identify unless given, none with --paper)
     #[arg(long, value_name = "FILE.toml")]
     pub actuators: Option<String>,
-    /// Axes of force and moment in the inputs: `world`; `ground` for the same of feet that only push, without the rotors'
-    /// inertia as a loss in flight; or, as published, `body` [default: ground, with --paper body]
+    /// Axes of force and moment in the inputs: `world`, or `body` as published. `ground` is `world` of feet that only push,
+    /// without the rotors' inertia as a loss in flight [default: ground, with --paper body]
     #[arg(long, value_name = "FRAME", value_parser = wrench_frame)]
     pub wrench_frame: Option<WrenchFrame>,
     /// Phases of the model

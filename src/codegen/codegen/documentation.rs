@@ -37,15 +37,16 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerE
             "tau = net: the model knows no losses of the joints, dx and ddx are not used.",
         ),
     };
-    let (inertia, in_flight) = if model.wrench_frame() == WrenchFrame::Ground {
+    let is_ground = model.wrench_frame() == WrenchFrame::Ground && model.actuators().is_some();
+    let (inertia, in_flight) = if is_ground {
         (
-            "With a foot on the ground, tau is without what the inertia of the motors takes; in flight with \
-             it.",
-            " In flight give zeros as ddx: what the inertia takes is in net.",
+            "With a foot on the ground, subtract the motors' inertia times acceleration from tau before; in \
+             flight do not.",
+            " In flight give zeros as ddx: the motors' inertia is part of net.",
         )
     } else {
         (
-            "What the inertia of the motors takes is not in it, it would need accelerations.",
+            "The torque of the motors' inertia is not subtracted: that needs accelerations.",
             "",
         )
     };

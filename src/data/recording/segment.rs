@@ -289,7 +289,11 @@ impl Segment {
     pub(crate) fn torque_within_limits(&self, robot: &Robot) -> DMatrix<f64> {
         let mut torque_nm = self.torque_nm.clone();
         for (mut row, limit) in torque_nm.row_iter_mut().zip(robot.torque_limit_nm()) {
-            row.apply(|torque| *torque = torque.clamp(-limit, *limit));
+            row.apply(|torque| {
+                if torque.is_finite() {
+                    *torque = torque.clamp(-limit, *limit);
+                }
+            });
         }
         torque_nm
     }

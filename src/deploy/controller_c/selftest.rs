@@ -60,6 +60,7 @@ pub(super) fn text(
             false => MissingInput::Mean,
         },
         lift: Lift::Transpose,
+        linearisation: Linearisation::Reference,
         ..jump.settings
     };
     let consistent = MpcSettings {
@@ -142,7 +143,9 @@ fn inputs(rule: &InputRule, jump: &PlannedJump) -> Result<Vec<f64>, EmitError> {
             (jump.dx[(joint, after)] - jump.dx[(joint, before)]) / passed_s
         });
         let losses = rule.losses(&dq, &ddq, jump.feet[k]);
-        let net: [f64; JOINT_DIM] = std::array::from_fn(|joint| torque[joint] - losses[joint]);
+        let limits = rule.robot().torque_limit_nm();
+        let within = |joint: usize| torque[joint].clamp(-limits[joint], limits[joint]);
+        let net: [f64; JOINT_DIM] = std::array::from_fn(|joint| within(joint) - losses[joint]);
         let wrench = rule.input_wrench(&x, &net, jump.feet[k])?;
         u.extend(net);
         u.extend(wrench.iter());

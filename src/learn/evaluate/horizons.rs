@@ -134,11 +134,11 @@ impl MeanJump {
         };
         let mean = prior.ranges().map(|range| range.mean);
         let features = prior.features(mean);
-        let (mut jump, mut end_s, mut take_off_s) = ((Vec::new(), Vec::new()), 0.0, 0.0);
+        let (mut jump, mut end_s, mut take_off_s) = ((Vec::new(), Vec::new()), 0.0, None);
         for (part, landmark) in prior.parts.iter().zip(&prior.landmarks.parts) {
             let duration_s = part.duration(&features);
             if !landmark.is_grounded() {
-                take_off_s = end_s;
+                take_off_s.get_or_insert(end_s);
             }
             let last = (part.nodes() - 1) as f64;
             for node in 0..part.nodes() {
@@ -149,6 +149,7 @@ impl MeanJump {
             end_s += duration_s;
         }
         let (mut time_s, x) = jump;
+        let take_off_s = take_off_s.unwrap_or_default();
         time_s.iter_mut().for_each(|time| *time -= take_off_s);
         Ok(Some(Self { time_s, x }))
     }

@@ -4,6 +4,7 @@
 use nalgebra::{SVector, SymmetricEigen};
 
 use super::*;
+use crate::robot::{InputRule, WrenchFrame};
 
 const SHIFT_M: f64 = 0.3;
 const OFF_RAD: f64 = 0.1;
@@ -269,8 +270,13 @@ fn response(
     let mut u = DVector::zeros(STATE_DIM);
     u.rows_mut(0, JOINT_DIM).copy_from_slice(&torques);
     (u.rows_mut(JOINT_DIM, STATE_DIM - JOINT_DIM)).copy_from(&wrench);
+    // In the body's frame arms are those of the hips.
+    let about_origin = InputRule::new(robot, None, WrenchFrame::World);
+    let Ok(loads) = about_origin.wrench(&x, &torques, feet) else {
+        return Ok(None);
+    };
     let probe = Probe::new(model, phase, rest);
     let pushed = probe.ddz_at_rest(&(&probe.input + &u))?;
     let change = combination.dot(&(pushed - probe.ddz_at_rest(&probe.input)?));
-    Ok(Some(change / wrench[load]).filter(|change| change.is_finite()))
+    Ok(Some(change / loads[load]).filter(|change| change.is_finite()))
 }

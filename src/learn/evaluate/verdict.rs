@@ -224,7 +224,7 @@ fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> 
     rows
 }
 
-/// Whether the latent state tells these coordinates.
+/// Whether the latent state represents these coordinates.
 fn are_represented(assessment: &Assessment<'_>, names: &[&str]) -> bool {
     let r2 = |name: &&str| assessment.fit(&assessment.decoded, name)?.r2;
     names

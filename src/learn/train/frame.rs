@@ -64,9 +64,8 @@ impl Frame {
 
     /// With [`Coordinates::Named`] and two or more latent coordinates, the first two rows are the centre of mass. With
     /// five or more the third is the rotation about it, with seven or more the next four are foot positions relative to
-    /// it. The others
-    /// combine mirror-symmetric sums of `active` coordinates: neither `y`, roll and yaw, nor left and right; nor pitch
-    /// where a row contains it.
+    /// it. The others combine mirror-symmetric sums of `active` coordinates: neither `y`, roll and yaw, nor left and
+    /// right; nor pitch where a row contains it.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],

@@ -9,14 +9,14 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::dataset::{Dataset, Scaling};
+use super::dataset::{Dataset, MIN_SAMPLES, Scaling};
 use super::error::TrainError;
 use super::features::Features;
 use super::judge::Judge;
 use super::latent::{EncodedSet, Latent};
 use super::task::Origin;
 use super::weak_form::{flight_samples, windowed_samples};
-use crate::model::{Phase, ReducedModel};
+use crate::model::{InputStatistics, Phase, ReducedModel};
 use crate::recording::{CHATTER_SAMPLES, PhasePattern, PhaseRule, Recording, Segment};
 use crate::robot::{Actuators, FeetRule, InputRule, Robot};
 
@@ -50,7 +50,8 @@ pub struct Refined {
 
 const NO_SAMPLES: &str = "too few samples of the phase";
 const NO_BETTER: &str = "no change predicts left-out parts better";
-const ROLLOUTS: &str = "with the changes of this phase, predictions over 0.1 s get worse";
+const ROLLOUTS: &str =
+    "with its changes, predictions over 0.1 s get no better, or whole jumps diverge";
 
 /// Refines `model` on recordings of `robot`, whose joints have the losses `actuators`.
 ///
@@ -72,7 +73,9 @@ pub fn refine_from(
     };
     let all = data.whole.set();
     let judge = Judge::new(&data.features, all, 0);
+    let whole = Judge::new(&data.features, all, model.latent_dim());
     let score = |xi: &[DMatrix<f64>]| judge.score_within(xi, f64::MAX);
+    let stays_finite = |xi: &[DMatrix<f64>]| whole.score_within(xi, f64::MAX).is_finite();
     let before = model.phases().iter().map(|phase| phase.xi.clone());
     let mut xi: Vec<DMatrix<f64>> = before.collect();
     let (mut coefficients, mut unchanged) = (Vec::new(), Vec::new());
@@ -82,7 +85,8 @@ pub fn refine_from(
         for (term, of) in &found {
             tried[phase][(*term, of.coordinate - 1)] = of.after;
         }
-        if score(&tried) < score(&xi) {
+        let diverges = !stays_finite(&tried) && stays_finite(&xi);
+        if score(&tried) < score(&xi) && !diverges {
             xi = tried;
             coefficients.extend(found.into_iter().map(|(_, of)| of));
         } else if !found.is_empty() {
@@ -97,8 +101,13 @@ pub fn refine_from(
     let phases = phases.map(|(phase, xi)| Phase { xi, ..phase });
     let is_same_robot = model.robot().is_ok_and(|own| own.name == robot.name);
     // What another robot's jumps look like is not what this one's do.
-    let prior = model.jump_prior().ok().cloned().filter(|_| is_same_robot);
+    let mut prior = model.jump_prior().ok().cloned().filter(|_| is_same_robot);
+    // Plans then obey the refined equations.
+    for part in prior.iter_mut().flat_map(|prior| &mut prior.parts) {
+        part.xi = None;
+    }
     let builder = model.clone().into_builder().phases(phases.collect());
+    let builder = builder.all_input_statistics(data.statistics(is_same_robot));
     let builder = builder.robot(robot).actuators(actuators).jump_prior(prior);
     let model = builder
         .provenance(provenance(model, origin, &coefficients))
@@ -118,6 +127,13 @@ fn provenance(
 ) -> Map<String, Value> {
     let mut provenance = model.provenance().clone();
     provenance.insert("command".to_owned(), origin.command.clone().into());
+    let mut recordings = provenance
+        .get("recordings")
+        .and_then(Value::as_array)
+        .cloned();
+    let all = recordings.get_or_insert_default();
+    all.extend(origin.recordings.iter().map(|file| json!(file)));
+    provenance.insert("recordings".to_owned(), json!(all));
     provenance.insert("refined_on".to_owned(), json!(origin.recordings));
     provenance.insert("refined_coefficients".to_owned(), json!(coefficients));
     provenance
@@ -176,6 +192,20 @@ struct Data<'a> {
 }
 
 impl Data<'_> {
+    /// Of the inputs: the model's own for its robot, of another robot those of the recordings where there are some.
+    fn statistics(&self, is_same_robot: bool) -> Vec<(String, InputStatistics)> {
+        let phases = self.model.phases().iter().enumerate();
+        let each = phases.filter_map(|(phase, own)| {
+            let dataset = &self.whole.dataset;
+            let statistics = match !is_same_robot && dataset.samples(Some(phase)) >= MIN_SAMPLES {
+                true => dataset.input_statistics(phase),
+                false => self.model.input_statistics(phase).ok()?.clone(),
+            };
+            Some((own.name.clone(), statistics))
+        });
+        each.collect()
+    }
+
     /// Changed coefficients of a phase with the number of their term; reasons for its other equations are added.
     fn refined_phase(
         &self,
@@ -199,9 +229,10 @@ impl Data<'_> {
             .filter(|sums| sums.rows > 0)
             .collect();
         let is_enough = all.rows >= LEAST_ROWS && parts.len() > 1;
-        let mut found = Vec::new();
-        for k in 0..self.model.latent_dim() {
-            let support = support(&own.xi, &self.features, k, is_flight);
+        let (mut found, d) = (Vec::new(), self.model.latent_dim());
+        for k in 0..d {
+            let mut support = support(&own.xi, &self.features, k, is_flight);
+            support.retain(|&term| all.gram[(term, term)] > 0.0);
             if support.is_empty() {
                 continue;
             }
@@ -215,12 +246,18 @@ impl Data<'_> {
             };
             for ((term, change), deviation) in support.into_iter().zip(&change).zip(&deviation) {
                 let before = own.xi[(term, k)];
+                let mut after = before + change;
+                // What brakes the momentum does not drive it.
+                let is_braking = self.features.variable_term(d + k) == Some(term);
+                if k < 2 && is_braking && before <= 0.0 {
+                    after = after.min(0.0);
+                }
                 let coefficient = RefinedCoefficient {
                     phase: own.name.clone(),
                     coordinate: k + 1,
                     term: self.model.library().terms()[term].text.clone(),
                     before,
-                    after: before + change,
+                    after,
                     standard_errors: (change / deviation).abs(),
                 };
                 found.push((term, coefficient));
@@ -237,7 +274,8 @@ fn parts(recordings: &[Recording]) -> Vec<Recording> {
         if count >= LEAST_PARTS {
             return vec![segment.clone()];
         }
-        let pieces = ((segment.duration_s() / PART_S) as usize).max(1);
+        let pieces = (segment.duration_s() / PART_S) as usize;
+        let pieces = pieces.min(segment.len() / MIN_SAMPLES).max(1);
         let border = |piece: usize| piece * segment.len() / pieces;
         (0..pieces)
             .map(|piece| segment.slice(border(piece)..border(piece + 1)))
@@ -341,7 +379,12 @@ fn change(
         sum + &score * score.transpose()
     });
     let covariance = &inverse * scores * &inverse;
-    Some((change, covariance.diagonal().map(f64::sqrt)))
+    Some((
+        change,
+        covariance
+            .diagonal()
+            .map(|square| square.max(f64::MIN_POSITIVE).sqrt()),
+    ))
 }
 
 fn ridged(gram: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {

@@ -120,9 +120,9 @@ pub struct EncoderOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
-    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right; from
-    /// seven coordinates on also the rotation about the centre of mass and foot positions relative to it. The dynamics
-    /// obey known physics.
+    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right. From
+    /// five coordinates on also the rotation about the centre of mass, from seven on foot positions relative to it. The
+    /// dynamics obey known physics.
     Named,
     /// Any rows over all coordinates that move or are actuated.
     Free,

@@ -18,6 +18,7 @@ use crate::robot::{BODY_X, BODY_Z};
 use landmarks::{Cut, Fit, GoalRegression, PartNodes, intervals, of_commonest_kind, sample};
 
 pub(super) const LEAST_JUMPS: usize = 6; // of one kind, to show how jumps depend on their goal
+const STEP: f64 = 1e-3; // of differences, scaled units
 const DIGITS: usize = 6; // significant, of what is kept: beyond those of any recording
 
 struct Sampled {
@@ -33,7 +34,7 @@ pub(super) struct Dynamics<'a> {
 
 impl Dynamics<'_> {
     /// Slopes of the accelerations of the momentum by `z`, `dz` and `u_lat` about the mean node of a part, `3 d x m`, by
-    /// differences that are exact for products of two.
+    /// central differences.
     fn slopes(&self, phase: usize, sampled: &[Sampled], part: usize) -> DMatrix<f64> {
         let nodes: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
         let d = nodes[0].z.ncols();
@@ -44,13 +45,13 @@ impl Dynamics<'_> {
         let parts = [mean_of(|n| &n.z), mean_of(|n| &n.dz), mean_of(|n| &n.u_lat)];
         let mean: Vec<f64> = parts.iter().flat_map(|part| part.iter().copied()).collect();
         let shifted = DMatrix::from_fn(6 * d, 3 * d, |row, k| {
-            let shift = if row % (3 * d) == k { 1.0 } else { 0.0 };
+            let shift = if row % (3 * d) == k { STEP } else { 0.0 };
             mean[k] + if row < 3 * d { shift } else { -shift }
         });
         let Candidate { features, xi } = self.candidate;
         let theta = features.evaluate(&shifted, &mut FeatureValues::default());
         let values = theta * xi[phase].columns(0, self.momentum);
-        (values.rows(0, 3 * d) - values.rows(3 * d, 3 * d)) * 0.5
+        (values.rows(0, 3 * d) - values.rows(3 * d, 3 * d)) / (2.0 * STEP)
     }
 }
 
@@ -150,8 +151,8 @@ fn goal_of(training: &Dataset, jump: usize, cut: &Cut) -> [f64; GOAL_DIM] {
     [distance, row.max() - row[0], row[0]].map(rounded)
 }
 
-/// A part of the prior, and how well deviations from it are explained, each jump left out of prior and fit in turn;
-/// `known` are the first columns of Xi of deviations, `translation` is the change of `z` by a shift forwards.
+/// A part of the prior, and how well deviations from it are explained, each jump left out of prior and fit in turn, but
+/// not of `known`, the first columns of Xi of deviations, `translation` is the change of `z` by a shift forwards.
 fn part_of(
     sampled: &[Sampled],
     goal: &[GoalRange; GOAL_DIM],
