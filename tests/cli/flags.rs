@@ -135,7 +135,7 @@ const ELSEWHERE: &str = "json help version force output out-dir \
     report: study figures plan restart-every tolerance clock columns \
     import: format map weights xi-layout library library-order latent-dim phase input-scaling wrench-frame \
     actuators sample-time inputs-from unchecked name description \
-    train: validation test split config latent-dim method robot paper seed seeds epochs encoder-layers \
+    train: from validation test split config latent-dim method robot paper seed seeds epochs encoder-layers \
     decoder-layers activation lift-weight body-weight bptt-weight bptt-window bptt-stride bptt-decay \
     bptt-integrator slack refinements growth no-rotation degree trigonometric terms actuators wrench-frame phases \
     leave-out-implausible accelerations smooth smooth-rows moving-average mask-std mask-input-share coordinates state-scaling \
