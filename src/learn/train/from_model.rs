@@ -232,7 +232,8 @@ impl Data<'_> {
         let (mut found, d) = (Vec::new(), self.model.latent_dim());
         for k in 0..d {
             let mut support = support(&own.xi, &self.features, k, is_flight);
-            support.retain(|&term| all.gram[(term, term)] > 0.0);
+            // A term that is zero throughout has no part in a change.
+            support.retain(|&term| !is_enough || all.gram[(term, term)] > 0.0);
             if support.is_empty() {
                 continue;
             }
