@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::*;
 use crate::mpc::interface::{SETTINGS, Settings};
 use crate::mpc::{ControlError, Effectiveness, MpcSettings};
+use crate::robot::{Leg, Robot};
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
 pub(super) fn path_beside(plan: &Path) -> PathBuf {
@@ -43,24 +44,32 @@ pub(super) fn beside(recording: &Path) -> Result<MpcSettings, Error> {
 }
 
 /// Unlike a recorded jump, a plan obeys the model: its inputs count more, and so do velocities and the end of a horizon.
-/// How much of the input arrives is estimated, under the joint PD of the examples.
-fn of_plans() -> MpcSettings {
+/// How much of the input arrives is estimated, under a joint PD: on the Go1 20 N m/rad and 0.8 N m s/rad as in the
+/// examples, on others in proportion to mass times length of the legs.
+fn of_plans(robot: &Robot) -> MpcSettings {
+    let size = |robot: &Robot| {
+        let legs = robot.geometry(Leg::FrontRight).lengths_m;
+        robot.mass_kg() * (legs[0] + legs[1])
+    };
+    let go1 = crate::robot_file::by_name("go1").expect("a registered robot");
+    let share = size(robot) / size(go1);
+    let gain = |of_go1: f64| (1e3 * of_go1 * share).round() / 1e3;
     MpcSettings {
         input_weight: 30.0,
         velocity_weight: 1.0,
         terminal_weight: 100.0,
         effectiveness: Some(Effectiveness {
             time_constant_s: 1.0,
-            stiffness_nm_rad: 20.0,
-            damping_nm_s_rad: 0.8,
+            stiffness_nm_rad: gain(20.0),
+            damping_nm_s_rad: gain(0.8),
         }),
         ..MpcSettings::default()
     }
 }
 
-/// The file for a plan: the settings that differ from the usual ones.
-pub(super) fn text() -> String {
-    let both = [of_plans(), MpcSettings::default()];
+/// The file for a plan of a robot: the settings that differ from the usual ones.
+pub(super) fn text(robot: &Robot) -> String {
+    let both = [of_plans(robot), MpcSettings::default()];
     let [own, usual] = both.map(|settings| Settings::from(&settings).numbers());
     let mut text = "# Settings of the controller for the plan of the same name. `romc mpc` and `romc compile --plan`\n\
                     # read them. In flight, keep the torques of the commands: they swing the legs.\n"
@@ -74,6 +83,6 @@ pub(super) fn text() -> String {
 }
 
 /// Whether a file has this text already, as after a plan of the same name in another format.
-pub(super) fn is_there(path: &Path) -> bool {
-    std::fs::read(path).is_ok_and(|found| found == text().as_bytes())
+pub(super) fn is_there(path: &Path, robot: &Robot) -> bool {
+    std::fs::read(path).is_ok_and(|found| found == text(robot).as_bytes())
 }
