@@ -542,6 +542,24 @@ fn train_takes_what_the_joints_take_off_the_torques_and_says_so() {
 }
 
 #[test]
+fn refinement_refuses_what_the_model_decides_and_names_it() {
+    let folder = folder();
+    let output = path(&folder, "refined.json");
+    let from = ["train", "--from", MODEL, JUMP, "--output", &output];
+    for (flag, value) in [
+        ("--latent-dim", "7"),
+        ("--validation", JUMP),
+        ("--slack", "0.1"),
+    ] {
+        let error = failed(&[&from[..], &[flag, value]].concat());
+        assert!(error.contains(MODEL) && error.contains(flag), "{error}");
+    }
+    let error = failed(&[&from[..], &["--actuators", "identify"]].concat());
+    assert!(error.contains("--actuators identify"), "{error}");
+    assert!(!Path::new(&output).exists());
+}
+
+#[test]
 fn train_takes_settings_from_a_file_and_flags_override_it() {
     let folder = folder();
     let (config, model) = (path(&folder, "train.toml"), path(&folder, "m.json"));

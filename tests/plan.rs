@@ -162,6 +162,16 @@ fn plan_ends_at_the_sum_of_its_durations_with_the_steps_of_the_model() {
         assert!((end_s - planned_s).abs() < 1e-9, "{end_s} {planned_s}");
         assert!((segment.mean_step_s() - 0.002).abs() < 3e-6, "{output}");
     }
+    // The joint PD of a Go2, which is heavier than a Go1, is stiffer.
+    let settings = fs::read_to_string(folder.path().join("a.settings.toml")).expect("written");
+    let line = settings
+        .lines()
+        .find(|line| line.starts_with("drive_stiffness_nm_rad"));
+    let gain = line.and_then(|line| line.split(' ').nth(2)?.parse::<f64>().ok());
+    assert!(
+        gain.is_some_and(|gain| gain > 24.0 && gain < 27.0),
+        "{settings}"
+    );
 }
 
 #[test]

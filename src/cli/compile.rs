@@ -131,11 +131,11 @@ fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<Pla
             "--plan without a target that jumps it; add --emit controller or controller-c";
         return Err(Error::refused(path, message));
     }
-    let settings = plan_settings::beside(path)?;
+    let settings = plan_settings::read_for(path)?;
     if settings.torque_rate_nm_s.is_some() {
         let message =
             "found `torque_rate_nm_s`, expected none: generated controllers have it as an option";
-        return Err(Error::refused(&plan_settings::path_beside(path), message));
+        return Err(Error::refused(&plan_settings::path_for(path), message));
     }
     let motion = read_jump(model, path, &arguments.simplification.reading)?;
     Ok(Some(PlannedJump {

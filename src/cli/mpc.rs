@@ -40,10 +40,9 @@ pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
 
 /// Those next to the recordings, where an option does not replace them.
 fn settings(arguments: &MpcArguments) -> Result<MpcSettings, Error> {
-    let beside = |path: &PathBuf| plan_settings::beside(path);
-    let mut settings = beside(&arguments.recordings[0])?;
+    let mut settings = plan_settings::read_for(&arguments.recordings[0])?;
     for path in &arguments.recordings[1..] {
-        if beside(path)? != settings {
+        if plan_settings::read_for(path)? != settings {
             let message = format!(
                 "found settings of the controller that differ from those for {}, expected the same for all recordings: \
                  follow them one at a time",

@@ -16,9 +16,9 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     inputs.check_output(output, Format::RECORDING, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let robot = model.robot()?;
-    let beside = output.map(plan_settings::path_beside);
-    let beside = beside.filter(|path| !plan_settings::is_there(path, robot));
-    inputs.check_output(beside.as_deref(), Format::TOML, arguments.force)?;
+    let settings_path = output.map(plan_settings::path_for);
+    let settings_path = settings_path.filter(|path| !plan_settings::is_there(path, robot));
+    inputs.check_output(settings_path.as_deref(), Format::TOML, arguments.force)?;
     let settings = arguments.settings.as_deref();
     let settings = settings.map(|path| read_settings(path, PlanSettings::check));
     let settings = settings.transpose()?.unwrap_or_default();
@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let drawn = || Ok(plan_figures(&planned, model.robot()?));
     inputs.write_figures(figures, drawn, arguments.force, &mut answer)?;
     if let Some(path) = output {
-        let (settings, text) = (plan_settings::path_beside(path), plan_settings::text(robot));
+        let (settings, text) = (plan_settings::path_for(path), plan_settings::text(robot));
         write_recording(path, vec![planned.motion.clone()], None, arguments.force)?;
         if !plan_settings::is_there(&settings, robot) {
             write_file(&settings, text.as_bytes(), arguments.force)?;

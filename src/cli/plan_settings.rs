@@ -8,18 +8,24 @@ use crate::mpc::{ControlError, Effectiveness, MpcSettings};
 use crate::robot::{Leg, Robot};
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
-pub(super) fn path_beside(plan: &Path) -> PathBuf {
-    let name = plan.file_name().unwrap_or_default().to_string_lossy();
-    let endings = [".gz", ".csv", ".mcap"];
-    let stem = endings.iter().fold(&*name, |name, ending| {
-        name.strip_suffix(ending).unwrap_or(name)
-    });
-    plan.with_file_name(format!("{stem}.settings.toml"))
+pub(super) fn path_for(plan: &Path) -> PathBuf {
+    let mut stem = plan.to_owned();
+    for ending in ["gz", "csv", "mcap"] {
+        if stem
+            .extension()
+            .is_some_and(|own| own.eq_ignore_ascii_case(ending))
+        {
+            stem.set_extension("");
+        }
+    }
+    let mut path = stem.into_os_string();
+    path.push(".settings.toml");
+    path.into()
 }
 
 /// The settings next to a recording; the usual ones where there is no file.
-pub(super) fn beside(recording: &Path) -> Result<MpcSettings, Error> {
-    let path = path_beside(recording);
+pub(super) fn read_for(recording: &Path) -> Result<MpcSettings, Error> {
+    let path = path_for(recording);
     let usual = MpcSettings::default();
     if !path.is_file() {
         return Ok(usual);

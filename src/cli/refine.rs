@@ -73,8 +73,15 @@ fn own_settings(arguments: &TrainArguments, from: &Path) -> Result<TrainSettings
         smooth_rows: given.smooth_rows,
         ..TrainSettings::default()
     };
+    let flags = given.as_flags();
+    let own_flags = own.as_flags();
+    let is_foreign = |flag: &&str| flag.starts_with("--") && !own_flags.contains(*flag);
+    let of_training = flags.split_whitespace().find(is_foreign);
     let others = [
-        (*given != own, "settings of a training"),
+        (
+            *given != own,
+            of_training.unwrap_or("a setting of a training"),
+        ),
         (!arguments.validation.is_empty(), "--validation"),
         (!arguments.test.is_empty(), "--test"),
         (arguments.split.is_some(), "--split"),

@@ -134,23 +134,19 @@ impl MeanJump {
         };
         let mean = prior.ranges().map(|range| range.mean);
         let features = prior.features(mean);
-        let (mut jump, mut end_s, mut take_off_s) = ((Vec::new(), Vec::new()), 0.0, None);
-        for (part, landmark) in prior.parts.iter().zip(&prior.landmarks.parts) {
+        let parts = prior.parts.iter().zip(&prior.landmarks.parts);
+        let launch = parts.take_while(|(_, landmark)| landmark.is_grounded());
+        let take_off_s: f64 = launch.map(|(part, _)| part.duration(&features)).sum();
+        let (mut time_s, mut x, mut start_s) = (Vec::new(), Vec::new(), -take_off_s);
+        for part in &prior.parts {
             let duration_s = part.duration(&features);
-            if !landmark.is_grounded() {
-                take_off_s.get_or_insert(end_s);
-            }
             let last = (part.nodes() - 1) as f64;
             for node in 0..part.nodes() {
-                jump.0.push(end_s + duration_s * node as f64 / last);
-                jump.1
-                    .push(model.decode(&JumpPart::at(&part.z, node, &features))?);
+                time_s.push(start_s + duration_s * node as f64 / last);
+                x.push(model.decode(&JumpPart::at(&part.z, node, &features))?);
             }
-            end_s += duration_s;
+            start_s += duration_s;
         }
-        let (mut time_s, x) = jump;
-        let take_off_s = take_off_s.unwrap_or_default();
-        time_s.iter_mut().for_each(|time| *time -= take_off_s);
         Ok(Some(Self { time_s, x }))
     }
 
