@@ -22,7 +22,7 @@ use romc::artifact;
 use romc::ir::Interpreter;
 use romc::lower;
 use romc::model::{AffineMap, Library, ReducedModel, Scaling, StateMap};
-use romc::robot::{Actuators, InputRule, Leg, Robot, WrenchFrame};
+use romc::robot::{Actuators, InputRule, Leg, LegMoments, Robot, WrenchFrame};
 use romc::robot_file::{self, RobotEntry, RobotFileError, RobotOptions};
 use serde_json::Value;
 
@@ -214,7 +214,7 @@ fn generalised_input_of_robots_of_files_is_that_of_the_rule_also_where_it_is_dam
     }
 }
 
-/// Every built-in robot with and without losses of the joints, in both frames.
+/// Every built-in robot with and without losses of the joints, in every frame; and with the weight of its legs.
 fn rules() -> Vec<InputRule> {
     let actuators = Actuators::of_leg([1.0, 0.6, 0.5], [0.2, 0.0, 0.3], [0.01; 3]);
     let mut rules = Vec::new();
@@ -224,8 +224,53 @@ fn rules() -> Vec<InputRule> {
             rules.push(InputRule::new(robot, None, frame));
             rules.push(InputRule::new(robot, Some(actuators.clone()), frame));
         }
+        let legs = Some(LegMoments {
+            side_kg_m: 0.07,
+            thigh_kg_m: 0.072,
+            calf_kg_m: 0.029,
+            thigh_kg_m2: 0.018,
+            calf_kg_m2: 0.006,
+        });
+        let moving = Actuators {
+            legs,
+            ..actuators.clone()
+        };
+        rules.push(InputRule::new(robot, Some(moving), WrenchFrame::Ground));
     }
     rules
+}
+
+#[test]
+fn leg_torque_is_that_of_the_rule_for_every_robot_and_contact() {
+    let mut random = Random(23);
+    let moving = rules().into_iter().filter(|rule| rule.legs().is_some());
+    let mut compared = 0;
+    for rule in moving {
+        let program = lower::leg_torque(&over_robot(&rule)).expect("lowers");
+        let mut interpreter = Interpreter::new(&program.expect("a rule with legs"));
+        for bits in 0..16_usize {
+            let [x, dx] = sample(&mut random, (-2.7, -0.9));
+            let ddx = std::array::from_fn(|_| random.between(-60.0, 60.0));
+            let contact: [bool; 4] = std::array::from_fn(|k| bits >> k & 1 == 1);
+            let inputs = [&x[..], &dx, &ddx, &numbers_of(contact)].map(<[f64]>::to_vec);
+            let found = interpreter.results(&inputs).remove(0);
+            let expected = rule.leg_torques([&x, &dx, &ddx], contact);
+            for (found, expected) in found.iter().zip(expected) {
+                assert!(
+                    (found - expected).abs() < 1e-11 * (1.0 + expected.abs()),
+                    "{rule:?}"
+                );
+                compared += usize::from(expected.abs() > 0.1);
+            }
+        }
+    }
+    assert!(compared > 200, "{compared}");
+    let without = InputRule::published(romc::robot_file::by_name("go1").expect("a known robot"));
+    assert!(
+        lower::leg_torque(&over_robot(&without))
+            .expect("lowers")
+            .is_none()
+    );
 }
 
 /// A state and its velocities.
@@ -257,7 +302,7 @@ fn generalised_input_is_that_of_the_rule_for_every_frame_and_contact_with_losses
             };
             let [x, dx] = sample(&mut random, knee);
             let tau: [f64; 12] = std::array::from_fn(|_| random.between(-30.0, 30.0));
-            let losses = rule.losses(&std::array::from_fn(|i| dx[i]), &[0.0; 12], [true; 4]);
+            let losses = rule.losses([&x, &dx, &[0.0; 18]], [false; 4]);
             let net: [f64; 12] = std::array::from_fn(|i| tau[i] - losses[i]);
             for bits in 0..16_usize {
                 let contact: [bool; 4] = std::array::from_fn(|k| bits >> k & 1 == 1);

@@ -1,9 +1,10 @@
 """Inputs of a jump by the rule of a model: what its controller takes as `u` of a reference.
 
 The model's own generated C is the rule: `NAME_generalised_input`, compiled with `cc` and called
-through ctypes. It takes off what friction takes of the motors' torques; what the inertia of the
-motors takes is taken off here, as romc does with recordings: from accelerations averaged over 11
-samples of equal contact, by the rule `ground` of a model only while a foot is down.
+through ctypes. It takes off what friction takes of the motors' torques; what the inertia of motors
+and legs takes is taken off here, as romc does with recordings: from accelerations averaged over 11
+samples of equal contact, by the rule `ground` of a model that of the motors only while a foot is
+down, and that of a leg (`NAME_leg_torque`, where the model has it) while its own foot is.
 """
 
 import ctypes
@@ -45,25 +46,33 @@ class ModelInputs:
 
     def of(self, jump):
         """(rows, 18) input of a jump with `time_s`, `x`, `dx`, `torque_nm` and `feet`."""
-        function = getattr(ctypes.CDLL(str(self.library)), f"{self.name}_generalised_input")
-        function.restype = None
-        pointer = ctypes.POINTER(ctypes.c_double)
-        inertial = np.array(self.armature) * smoothed_accelerations(jump)
+        library = ctypes.CDLL(str(self.library))
+        ddx = smoothed_accelerations(jump)
         is_loss = self.in_flight | jump.feet.any(axis=1, keepdims=True)
-        tau = jump.torque_nm - inertial * is_loss
-        u = np.zeros((len(tau), 18))
-        columns = [np.ascontiguousarray(c, dtype=float) for c in (jump.x, jump.dx, tau, jump.feet)]
-        for row in range(len(u)):
-            arguments = [column[row].ctypes.data_as(pointer) for column in columns]
-            function(*arguments, u[row].ctypes.data_as(pointer))
-        return u
+        tau = jump.torque_nm - np.array(self.armature) * ddx[:, :12] * is_loss
+        legs = getattr(library, f"{self.name}_leg_torque", None)
+        if legs is not None:
+            tau = tau - rows_of(legs, (jump.x, jump.dx, ddx, jump.feet), 12)
+        inputs = getattr(library, f"{self.name}_generalised_input")
+        return rows_of(inputs, (jump.x, jump.dx, tau, jump.feet), 18)
+
+
+def rows_of(function, arrays, width):
+    """(rows, width) results of a function of C, called with the same row of each array."""
+    function.restype = None
+    pointer = ctypes.POINTER(ctypes.c_double)
+    columns = [np.ascontiguousarray(array, dtype=float) for array in arrays]
+    out = np.zeros((len(columns[0]), width))
+    for row in range(len(out)):
+        arguments = [column[row].ctypes.data_as(pointer) for column in columns]
+        function(*arguments, out[row].ctypes.data_as(pointer))
+    return out
 
 
 def smoothed_accelerations(jump):
-    """(rows, 12) joint accelerations, averaged within stretches of equal contact."""
+    """(rows, 18) accelerations, averaged within stretches of equal contact."""
     step_s = jump.time_s[1] - jump.time_s[0]
-    rates = jump.dx[:, :12]
-    ddq = np.vstack([np.diff(rates, axis=0), np.zeros((1, 12))]) / step_s
+    ddq = np.vstack([np.diff(jump.dx, axis=0), np.zeros((1, jump.dx.shape[1]))]) / step_s
     ddq[-1] = ddq[-2]
     down = jump.feet.any(axis=1)
     borders = [0, *(np.flatnonzero(np.diff(down)) + 1), len(down)]

@@ -1,8 +1,8 @@
 //! `romc identify`: gravity, mass and the joints' losses from recordings.
 
 use super::*;
-use crate::identify::{Identification, Legs, identify};
-use crate::robot::Robot;
+use crate::identify::{Identification, identify};
+use crate::robot::{LegMoments, Robot};
 
 pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     Inputs::reading(&arguments.reading)
@@ -50,7 +50,7 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
         .column("hy", "", |(.., [value, error])| pair(value.hy, error.hy))
         .column("kn", "", |(.., [value, error])| pair(value.kn, error.kn))
         .table();
-    let moments: [(&str, &str, fn(&Legs) -> f64); 5] = [
+    let moments: [(&str, &str, fn(&LegMoments) -> f64); 5] = [
         ("first moment beside the hip", "kg m", |l| l.side_kg_m),
         ("first moment of the thigh", "kg m", |l| l.thigh_kg_m),
         ("first moment of the calf", "kg m", |l| l.calf_kg_m),

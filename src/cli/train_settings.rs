@@ -108,7 +108,9 @@ impl TrainSettings {
         let found = match identify(&recorded.first(IDENTIFIED_FROM)?, robot) {
             Err(refused @ IdentifyError::Contradiction { .. }) => return Err(refused.into()),
             _ if self.actuators() != IDENTIFIED => return Ok(()),
-            Ok(found) => found.contradiction().map_or(Ok(found.actuators), Err),
+            Ok(found) => found
+                .contradiction()
+                .map_or(Ok(found.actuators_and_legs()), Err),
             Err(reason) => Err(reason.to_string()),
         };
         let found = found.inspect_err(|reason| {

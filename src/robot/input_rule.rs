@@ -3,15 +3,18 @@
 //!
 //! `tau` are the torques at the links: a motor torque `t` less the joint's losses, `t - b dq - c tanh(dq / v) - I ddq`
 //! ([`Actuators`]): viscous friction, dry friction (smooth around standstill, `v` = [`DRY_SPEED_RAD_S`]) and the
-//! rotor's inertia seen through the gear (armature). `F` and `M` follow through the feet in contact, in a
-//! [`WrenchFrame`].
+//! rotor's inertia seen through the gear (armature); in [`WrenchFrame::Ground`] also less what carries and moves the
+//! links of a leg whose foot is on the ground ([`MovingLeg`]). `F` and `M` follow through the feet in contact.
 
 use nalgebra::{Matrix3, SMatrix, Vector6};
 
 use super::error::RobotError;
 use super::geometry::Robot;
-use super::joints::{BODY_DIM, ContactFlags, FOOT_DIM, JOINT_DIM, LEG_JOINT_DIM, Leg, STATE_DIM};
+use super::joints::{
+    BODY_DIM, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, STATE_DIM,
+};
 use super::leg::{Real, turn_to_world, write_world_axes};
+use super::links::{LegMoments, MovingLeg, TrunkMotion};
 
 /// Axes of the force and moment in an input, and what the ground does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -24,8 +27,8 @@ pub enum WrenchFrame {
     /// is the power of the feet on the body, which is what `W_e^T u_lat` stands for.
     World,
     /// As `World`, and feet only push: one in contact whose torques would need a downward force adds nothing, as at the
-    /// end of a stance. In flight the rotors are part of the legs that the input accelerates, so that their inertia is
-    /// no loss.
+    /// end of a stance. Torques of a leg on the ground are those that reach it, less what carries and moves its links. In
+    /// the air rotors and links are what the input accelerates, so that their inertia is no loss.
     Ground,
 }
 
@@ -95,25 +98,83 @@ impl InputRule {
         self.frame
     }
 
+    /// Moments of the legs, if what carries and moves their links is taken off the torques.
+    pub fn legs(&self) -> Option<&LegMoments> {
+        let known = self
+            .actuators
+            .as_ref()
+            .and_then(|known| known.legs.as_ref());
+        known.filter(|_| self.frame == WrenchFrame::Ground)
+    }
+
     /// Whether the rotors' inertia counts as a loss, with a foot on the ground or without.
     pub fn inertia_is_loss(&self, is_grounded: bool) -> bool {
         is_grounded || self.frame != WrenchFrame::Ground
     }
 
-    /// [`joint_loss`] of every joint in N m at `dq` (rad/s) and `ddq` (rad/s^2); zero without actuators.
+    /// What of the motors' torques does not enter the input, N m: [`joint_loss`] of every joint, and
+    /// [`Self::leg_torques`], at a state `x`, `dx` and `ddx` (rad, m, s); zero without actuators.
     pub fn losses(
         &self,
-        dq: &[f64; JOINT_DIM],
-        ddq: &[f64; JOINT_DIM],
+        [x, dx, ddx]: [&[f64; STATE_DIM]; 3],
         feet: ContactFlags,
     ) -> [f64; JOINT_DIM] {
-        match &self.actuators {
-            None => [0.0; JOINT_DIM],
-            Some(actuators) if self.inertia_is_loss(feet.contains(&true)) => {
-                actuators.losses(dq, ddq)
-            }
-            Some(actuators) => actuators.losses(dq, &[0.0; JOINT_DIM]),
+        let Some(actuators) = &self.actuators else {
+            return [0.0; JOINT_DIM];
+        };
+        let is_loss = self.inertia_is_loss(feet.contains(&true));
+        let inertia = if is_loss { 1.0 } else { 0.0 };
+        let joints = |values: &[f64; STATE_DIM], factor: f64| {
+            std::array::from_fn(|joint| values[joint] * factor)
+        };
+        let mut losses = actuators.losses(&joints(dx, 1.0), &joints(ddx, inertia));
+        let own = self.leg_torques([x, dx, ddx], feet);
+        losses
+            .iter_mut()
+            .zip(own)
+            .for_each(|(loss, own)| *loss += own);
+        losses
+    }
+
+    /// Torques that carry and move the links of the legs on the ground, N m; zero for the others, and where they are not
+    /// taken off.
+    pub fn leg_torques(
+        &self,
+        [x, dx, ddx]: [&[f64; STATE_DIM]; 3],
+        feet: ContactFlags,
+    ) -> [f64; JOINT_DIM] {
+        let mut torques = [0.0; JOINT_DIM];
+        let Some(moments) = self.legs() else {
+            return torques;
+        };
+        let three = |values: &[f64; STATE_DIM], first: usize| -> [f64; 3] {
+            std::array::from_fn(|i| values[first + i])
+        };
+        let turns = |angles: [f64; 3]| [angles.map(f64::sin), angles.map(f64::cos)];
+        let attitude = JOINT_DIM + 3;
+        let mut lift = three(ddx, JOINT_DIM);
+        lift[2] += GRAVITY_M_S2;
+        let trunk = TrunkMotion::of(
+            turns(three(x, attitude)),
+            three(dx, attitude),
+            three(ddx, attitude),
+            lift,
+        );
+        for leg in Leg::down(feet) {
+            let first = LEG_JOINT_DIM * leg.index();
+            let geometry = self.robot.geometry(leg);
+            let links = geometry.links();
+            let [abduction, flexion, knee] = three(x, first);
+            let moving = MovingLeg::of(self.robot, leg, &links, moments);
+            let own = moving.torques(
+                &trunk,
+                turns([abduction, flexion, flexion + geometry.shape.knee * knee]),
+                [three(dx, first), three(ddx, first)],
+                |number| number,
+            );
+            torques[first..first + LEG_JOINT_DIM].copy_from_slice(&own);
         }
+        torques
     }
 
     /// Force and moment on the body `[F; M]` in an input, in N and N m: [`Self::wrench`], in [`WrenchFrame::Ground`] of
@@ -184,7 +245,7 @@ pub fn joint_loss(of: &[Real; 3], dq: Real, ddq: Real) -> Real {
     of[0] * dq + of[1] * (dq / DRY_SPEED_RAD_S).tanh() + of[2] * ddq
 }
 
-/// Losses of the twelve joints, in the order of [`JOINT_NAMES`](super::JOINT_NAMES).
+/// Losses of the twelve joints, in the order of [`JOINT_NAMES`](super::JOINT_NAMES), and the legs' own links.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Actuators {
     /// Viscous friction `b`, in N m s/rad.
@@ -193,6 +254,8 @@ pub struct Actuators {
     pub dry: [f64; JOINT_DIM],
     /// Armature `I`, in kg m^2.
     pub armature: [f64; JOINT_DIM],
+    /// Moments of the links of a leg, if they are known.
+    pub legs: Option<LegMoments>,
 }
 
 impl Actuators {
@@ -204,6 +267,7 @@ impl Actuators {
             viscous: each(viscous),
             dry: each(dry),
             armature: each(armature),
+            legs: None,
         }
     }
 

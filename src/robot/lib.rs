@@ -23,6 +23,7 @@ pub(crate) mod geometry;
 pub(crate) mod input_rule;
 pub(crate) mod joints;
 pub(crate) mod leg;
+pub(crate) mod links;
 pub(crate) mod wrench;
 
 mod error;
@@ -35,6 +36,7 @@ pub use joints::{
     JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM,
 };
 pub use leg::{LEAST_HEIGHT, LEAST_SPAN, LegShape, Posture};
+pub use links::{LegMoments, MovingLeg, Scalar, TrunkMotion};
 pub use wrench::FeetRule;
 
 #[cfg(feature = "serde")]

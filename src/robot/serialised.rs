@@ -6,7 +6,7 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::{Actuators, FeetRule, JOINT_DIM, WrenchFrame};
+use crate::{Actuators, FeetRule, JOINT_DIM, LegMoments, WrenchFrame};
 
 /// `"any"`, `"none"`, or a list of patterns of four flags (0 or 1) in the order fr, fl, rr, rl.
 impl Serialize for FeetRule {
@@ -52,6 +52,30 @@ struct ActuatorsEntry {
     viscous: [f64; JOINT_DIM],
     dry: [f64; JOINT_DIM],
     armature: [f64; JOINT_DIM],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    legs: Option<LegMoments>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "LegMoments", deny_unknown_fields)]
+struct LegMomentsEntry {
+    side_kg_m: f64,
+    thigh_kg_m: f64,
+    calf_kg_m: f64,
+    thigh_kg_m2: f64,
+    calf_kg_m2: f64,
+}
+
+impl Serialize for LegMoments {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        LegMomentsEntry::serialize(self, serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for LegMoments {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        LegMomentsEntry::deserialize(deserializer)
+    }
 }
 
 impl Serialize for Actuators {

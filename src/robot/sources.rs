@@ -8,5 +8,5 @@ macro_rules! sources {
 
 /// File name and text; `lib.rs` declares this module last, and what stands from there on is not for generated crates.
 pub const SOURCES: &[(&str, &str)] = sources! {
-    error geometry input_rule joints leg lib wrench
+    error geometry input_rule joints leg lib links wrench
 };

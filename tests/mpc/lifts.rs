@@ -329,7 +329,7 @@ fn losses_of_a_plan_are_those_at_its_mean_velocity_and_its_acceleration() {
     let plant = romc::mpc::control_model(&model.build().expect("sound")).expect("complete");
     let start = [0.1, -0.05, 0.02, 0.4, -0.3, 0.2];
     let end = [0.104, -0.052, 0.021, 0.43, -0.28, 0.15];
-    let found = plant.planned_losses(0, &start, &end, 0.01);
+    let found = plant.planned_losses((0, [true; 4]), [&start, &end], 0.01);
     let velocity = |state: &[f64; 6]| plant.decode_joint_velocities(&state[..D], &state[D..]);
     let (before, after) = (velocity(&start), velocity(&end));
     for joint in 0..12 {
@@ -341,5 +341,8 @@ fn losses_of_a_plan_are_those_at_its_mean_velocity_and_its_acceleration() {
     }
     assert!(found.iter().any(|loss| loss.abs() > 0.5), "{found:?}");
     let ideal = romc::mpc::control_model(&informed_model()).expect("complete");
-    assert_eq!(ideal.planned_losses(0, &start, &end, 0.01), [0.0; 12]);
+    assert_eq!(
+        ideal.planned_losses((0, [true; 4]), [&start, &end], 0.01),
+        [0.0; 12]
+    );
 }

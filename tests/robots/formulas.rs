@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Rotation3, SVector, Unit, Vector3, Vector6};
 use romc::robot::LEG_JOINT_DIM;
 use romc::robot::rotation;
 use romc::robot::{
-    Actuators, ContactFlags, InputRule, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, Robot,
-    RobotError, STATE_DIM, WrenchFrame,
+    Actuators, ContactFlags, InputRule, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, LegMoments,
+    Robot, RobotError, STATE_DIM, WrenchFrame,
 };
 
 #[test]
@@ -40,11 +40,14 @@ fn losses_oppose_the_motion_and_are_dry_friction_alone_when_slow() {
         viscous: [0.6; JOINT_DIM],
         dry: [0.2; JOINT_DIM],
         armature: [0.01; JOINT_DIM],
+        legs: None,
     };
-    let (fast, still) = ([30.0; JOINT_DIM], [0.0; JOINT_DIM]);
+    let (fast, still) = ([30.0; STATE_DIM], [0.0; STATE_DIM]);
     let [world, ground] = [WrenchFrame::World, WrenchFrame::Ground].map(|frame| {
         let rule = InputRule::new(go1(), Some(actuators.clone()), frame);
-        move |dq: f64, ddq: &[f64; JOINT_DIM], down| rule.losses(&[dq; JOINT_DIM], ddq, [down; 4])
+        move |dx: f64, ddx: &[f64; STATE_DIM], down| {
+            rule.losses([&[0.0; STATE_DIM], &[dx; STATE_DIM], ddx], [down; 4])
+        }
     });
     for down in [true, false] {
         assert!((world(-2.0, &fast, down)[0] - (-1.2 - 0.2 + 0.3)).abs() < 1e-12);
@@ -54,6 +57,108 @@ fn losses_oppose_the_motion_and_are_dry_friction_alone_when_slow() {
     // In flight the rotors belong to the legs.
     assert_eq!(ground(-2.0, &fast, true), world(-2.0, &fast, true));
     assert_eq!(ground(-2.0, &fast, false), world(-2.0, &still, false));
+}
+
+/// A leg of point masses: in the plane of the leg at the hip, on the thigh and on the calf.
+const POINTS: [(f64, f64); 3] = [(0.5, 0.0), (0.9, 0.11), (0.3, 0.15)];
+
+/// Torques of a leg by d'Alembert's principle: of each mass its weight and acceleration, times how its position moves with
+/// each joint. Positions along a motion are differentiated by differences.
+fn torques_of_points(
+    robot: &Robot,
+    leg: Leg,
+    motion: impl Fn(f64) -> [f64; STATE_DIM],
+) -> [f64; 3] {
+    let geometry = robot.geometry(leg);
+    let links = geometry.links();
+    let (first, h) = (3 * leg.index(), 1e-4);
+    let part = |link: Vector3<f64>, length: f64| link * (length / link.norm());
+    let place = |x: &[f64; STATE_DIM], number: usize| {
+        let none = Vector3::zeros();
+        let [thigh, calf] = match number {
+            0 => [none, none],
+            1 => [part(links.thigh, POINTS[1].1), none],
+            _ => [links.thigh, part(links.calf, POINTS[2].1)],
+        };
+        let axes = [links.abduction, links.flexion, links.flexion].map(Into::into);
+        let point = LegGeometry::new(axes, [links.hip, thigh, calf].map(Into::into));
+        let knee = geometry.shape.knee * x[first + 2];
+        let in_trunk =
+            robot.hip_position(leg) + point.foot_position(&[x[first], x[first + 1], knee]);
+        Vector3::new(x[12], x[13], x[14]) + rotation([x[15], x[16], x[17]]) * in_trunk
+    };
+    let now = motion(0.0);
+    let of_joint = |joint: usize| {
+        let each = POINTS.iter().enumerate().map(|(number, (mass, _))| {
+            let at = |time: f64| place(&motion(time), number);
+            let mut acceleration = (at(h) - at(0.0) * 2.0 + at(-h)) / (h * h);
+            acceleration.z += 9.81;
+            let moved = |by: f64| {
+                let mut x = now;
+                x[first + joint] += by;
+                place(&x, number)
+            };
+            mass * acceleration.dot(&((moved(h) - moved(-h)) / (2.0 * h)))
+        });
+        each.sum()
+    };
+    [0, 1, 2].map(of_joint)
+}
+
+#[test]
+fn legs_need_the_torques_that_their_masses_do() {
+    let mut checked = 0;
+    for name in romc::robot_file::known_names() {
+        let robot = romc::robot_file::by_name(name).unwrap();
+        let amplitude = |k: usize| 0.3 + 0.05 * k as f64;
+        let motion = |time: f64| {
+            std::array::from_fn(|k| {
+                let rest = if k % 3 == 2 { -1.5 } else { 0.4 };
+                rest + amplitude(k) * (5.0 * time + k as f64).sin()
+            })
+        };
+        let wave = |k: usize| (k as f64).sin_cos();
+        let dx = std::array::from_fn(|k| amplitude(k) * 5.0 * wave(k).1);
+        let ddx = std::array::from_fn(|k| -amplitude(k) * 25.0 * wave(k).0);
+        for leg in Leg::ALL {
+            let links = robot.geometry(leg).links();
+            let [(hip, _), (thigh, at_thigh), (calf, at_calf)] = POINTS;
+            let length = links.thigh.norm();
+            let moments = LegMoments {
+                side_kg_m: (hip + thigh + calf) * links.hip.norm(),
+                thigh_kg_m: thigh * at_thigh + calf * length,
+                calf_kg_m: calf * at_calf,
+                thigh_kg_m2: thigh * at_thigh * at_thigh + calf * length * length,
+                calf_kg_m2: calf * at_calf * at_calf,
+            };
+            let mut actuators = Actuators::of_leg([0.0; 3], [0.0; 3], [0.0; 3]);
+            actuators.legs = Some(moments);
+            let rule = InputRule::new(robot, Some(actuators.clone()), WrenchFrame::Ground);
+            let mut feet = [false; 4];
+            assert_eq!(rule.leg_torques([&motion(0.0), &dx, &ddx], feet), [0.0; 12]);
+            feet[leg.index()] = true;
+            let found = rule.leg_torques([&motion(0.0), &dx, &ddx], feet);
+            assert_eq!(rule.losses([&motion(0.0), &dx, &ddx], feet), found);
+            let expected = torques_of_points(robot, leg, motion);
+            for (joint, torque) in found.iter().enumerate() {
+                let expected = match joint.checked_sub(3 * leg.index()) {
+                    Some(own @ 0..3) => expected[own],
+                    _ => 0.0,
+                };
+                assert!(
+                    (torque - expected).abs() < 1e-4,
+                    "{name} {leg:?} {joint}: {torque} {expected}"
+                );
+                checked += usize::from(expected.abs() > 0.2);
+            }
+            let world = InputRule::new(robot, Some(actuators), WrenchFrame::World);
+            assert_eq!(
+                world.leg_torques([&motion(0.0), &dx, &ddx], feet),
+                [0.0; 12]
+            );
+        }
+    }
+    assert!(checked > 30, "{checked}");
 }
 
 #[test]

@@ -12,7 +12,7 @@ const MOST_TERMS: usize = 40;
 const WORLD_AXES: &str = "Axes are the world's; the arm p_k of a moment is the foot from the body's origin. The three \
      moments are the generalised forces of roll, pitch and yaw: they do work on the rates of these angles";
 
-pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerError> {
+pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 3], LowerError> {
     let robot = model.robot()?.name;
     let axes = match model.wrench_frame() {
         WrenchFrame::Body => {
@@ -38,7 +38,15 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerE
         ),
     };
     let is_ground = model.wrench_frame() == WrenchFrame::Ground && model.actuators().is_some();
-    let (inertia, in_flight) = if is_ground {
+    let has_legs = model.input_rule().is_ok_and(|rule| rule.legs().is_some());
+    let (inertia, in_flight) = if has_legs {
+        (
+            "With a foot on the ground, subtract the motors' inertia times acceleration from tau before, and \
+             what leg_torque gives; in flight do not.",
+            " In flight give zeros as ddx: the motors' inertia is part of net. With a foot on the ground add \
+             what leg_torque gives.",
+        )
+    } else if is_ground {
         (
             "With a foot on the ground, subtract the motors' inertia times acceleration from tau before; in \
              flight do not.",
@@ -67,9 +75,19 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 2], LowerE
              leg."
         ),
     ];
+    let legs = [
+        format!(
+            "Torques that carry and move the links of each leg of the {robot} with its foot on the ground. \
+             Subtract them from tau before generalised_input, add them to commands."
+        ),
+        "x, dx, ddx: robot coordinates, their velocities and accelerations in SI units. feet: 1 on the \
+         ground, 0 in the air, order fr, fl, rr, rl. own: torques (N m), zero for legs in the air."
+            .to_owned(),
+    ];
     Ok([
         input.map(String::from).into(),
         of_torques(model, losses, in_flight),
+        legs.into(),
     ])
 }
 

@@ -98,11 +98,13 @@ fn input_entries(model: &ReducedModel) -> Result<Vec<FunctionSpec>, LowerError> 
     ) else {
         return Ok(Vec::new());
     };
-    let [of_input, of_torque] = of_inputs(model)?;
-    Ok(vec![
+    let [of_input, of_torque, of_legs] = of_inputs(model)?;
+    let mut entries = vec![
         entry("generalised_input", input, of_input),
         entry("actuator_torque", torque, of_torque),
-    ])
+    ];
+    entries.extend(lower::leg_torque(model)?.map(|legs| entry("leg_torque", legs, of_legs)));
+    Ok(entries)
 }
 
 fn map_entries(

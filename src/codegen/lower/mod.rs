@@ -22,4 +22,4 @@ pub use compiled::CompiledModel;
 pub use dense::Form;
 pub use dynamics::{JacobianPattern, LowerError, dynamics, dynamics_jacobian, rk4_step};
 pub use maps::Map;
-pub use wrench::{actuator_torque, generalised_input};
+pub use wrench::{actuator_torque, generalised_input, leg_torque};

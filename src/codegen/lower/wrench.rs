@@ -5,11 +5,9 @@ use super::dynamics::LowerError;
 use super::number::{Number, Sheet};
 use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
 use crate::model::ReducedModel;
-use crate::robot::DRY_SPEED_RAD_S;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot::Posture;
 use crate::robot::{
-    BODY_DIM, FOOT_DIM, InputRule, JOINT_DIM, Leg, LegShape, STATE_DIM, WrenchFrame,
+    BODY_DIM, DRY_SPEED_RAD_S, FOOT_DIM, GRAVITY_M_S2, InputRule, JOINT_DIM, LEG_JOINT_DIM, Leg,
+    LegShape, MovingLeg, Posture, STATE_DIM, TrunkMotion, WrenchFrame,
 };
 
 /// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the ground, by the
@@ -17,7 +15,7 @@ use crate::robot::{
 /// (motor torques, 12, N m), `feet` (4, order of [`Leg::ALL`]: 1 on the ground, 0 in the air); output `u` (18, N m and
 /// N). `None` for a model that is not over the 18 coordinates of a known robot.
 ///
-/// `net` is `tau` less viscous and dry friction, without the inertia of the motors: accelerations are not measured. A
+/// `net` is `tau` less viscous and dry friction, without the inertia of motors and legs: accelerations are not measured. A
 /// foot's force and moment are multiplied with its element of `feet`; at 0 they are zero in every posture.
 pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
     rule_of(model).map(|rule| input_of(&rule)).transpose()
@@ -28,6 +26,14 @@ pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>, LowerE
 /// `tau` (12, N m). `None` as for [`generalised_input`], of which it is the inverse at the joints for `ddx = 0`.
 pub fn actuator_torque(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
     rule_of(model).map(|rule| torque_of(&rule)).transpose()
+}
+
+/// Torques that carry and move the links of the legs on the ground ([`InputRule::leg_torques`]): inputs `x`, `dx`, `ddx`
+/// (18 robot coordinates, their velocities and accelerations) and `feet` (4, as of [`generalised_input`]); output `own`
+/// (12, N m). `None` as for [`generalised_input`], and for a model whose rule does not take them off.
+pub fn leg_torque(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
+    let rule = rule_of(model).filter(|rule| rule.legs().is_some());
+    rule.map(|rule| leg_torque_of(&rule)).transpose()
 }
 
 fn rule_of(model: &ReducedModel) -> Option<InputRule> {
@@ -51,6 +57,55 @@ fn torque_of(rule: &InputRule) -> Result<Program, LowerError> {
     Ok(builder.finish()?)
 }
 
+fn leg_torque_of(rule: &InputRule) -> Result<Program, LowerError> {
+    let robot = rule.robot();
+    let moments = rule.legs().expect("invariant: the caller has looked");
+    let mut builder = ProgramBuilder::new("leg_torque");
+    let [x, dx, ddx] = ["x", "dx", "ddx"].map(|name| builder.input(name, STATE_DIM));
+    let feet = builder.input("feet", FOOT_DIM);
+    let sheet = &Sheet::new(&mut builder);
+    let number = |id: ValueId| Number::new(sheet, id);
+    let three = |values: &[ValueId], first: usize| [0, 1, 2].map(|i| number(values[first + i]));
+    let (angles, attitude) = (leg_angles(rule, sheet, &x), JOINT_DIM + 3);
+    let angles: Vec<ValueId> = angles
+        .into_iter()
+        .chain(x[attitude..].iter().copied())
+        .collect();
+    let (sines, cosines) = sheet.borrow_mut().sin_cos(&angles);
+    let at = |angles: [usize; 3]| {
+        [&sines, &cosines].map(|values| angles.map(|angle| number(values[angle])))
+    };
+    let [forwards, aside, up] = three(&ddx, JOINT_DIM);
+    let lift = [forwards, aside, up + GRAVITY_M_S2];
+    let turns = at([0, 1, 2].map(|angle| JOINT_DIM + angle));
+    let trunk = TrunkMotion::of(turns, three(&dx, attitude), three(&ddx, attitude), lift);
+    let of_legs = Leg::ALL.map(|leg| {
+        let (k, first) = (leg.index(), LEG_JOINT_DIM * leg.index());
+        let links = robot.geometry(leg).links();
+        let moving = MovingLeg::of(robot, leg, &links, moments);
+        let rates = [three(&dx, first), three(&ddx, first)];
+        let turned = at([k, FOOT_DIM + k, 2 * FOOT_DIM + k]);
+        let own = moving.torques(&trunk, turned, rates, |value| up.constant(value));
+        own.map(|torque| number(feet[k]) * torque)
+    });
+    let own: Vec<ValueId> = of_legs.into_iter().flatten().map(Number::id).collect();
+    builder.output("own", &own);
+    Ok(builder.finish()?)
+}
+
+/// Abductions, then flexions, then the angles of the calves.
+fn leg_angles<'b>(rule: &InputRule, sheet: &'b Sheet<'b>, x: &[ValueId]) -> Vec<ValueId> {
+    let number = |id: ValueId| Number::new(sheet, id);
+    let joint = |kind: usize| (0..FOOT_DIM).map(move |leg| LEG_JOINT_DIM * leg + kind);
+    let mut angles: Vec<ValueId> = joint(0).chain(joint(1)).map(|k| x[k]).collect();
+    for leg in Leg::ALL {
+        let k = LEG_JOINT_DIM * leg.index() + 1;
+        let knee = rule.robot().geometry(leg).shape.knee * number(x[k + 1]);
+        angles.push((number(x[k]) + knee).id());
+    }
+    angles
+}
+
 fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     let robot = rule.robot();
     let mut builder = ProgramBuilder::new("generalised_input");
@@ -62,14 +117,7 @@ fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
     let number = |id: ValueId| Number::new(sheet, id);
     let net: [Number; JOINT_DIM] =
         std::array::from_fn(|joint| number(tau[joint]) - friction(rule, joint, number(dx[joint])));
-    let joint = |kind: usize| (0..FOOT_DIM).map(move |leg| LEG_JOINT_DIM * leg + kind);
-    // Abductions, then flexions, then the angles of the calves.
-    let mut angles: Vec<ValueId> = joint(0).chain(joint(1)).map(|k| x[k]).collect();
-    for leg in Leg::ALL {
-        let k = LEG_JOINT_DIM * leg.index() + 1;
-        let knee = robot.geometry(leg).shape.knee * number(x[k + 1]);
-        angles.push((number(x[k]) + knee).id());
-    }
+    let mut angles = leg_angles(rule, sheet, &x);
     let frame = rule.wrench_frame();
     if frame != WrenchFrame::Body {
         angles.extend(&x[STATE_DIM - 3..]);

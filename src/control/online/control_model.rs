@@ -155,47 +155,79 @@ impl ControlModel {
         }
     }
 
-    pub(crate) fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
+    /// The robot's state, rad and m, of latent positions.
+    fn decode(&self, z: &[f64]) -> [f64; STATE_DIM] {
         if let Some(maps) = &self.nonlinear {
-            let x = maps.decode(z);
-            return std::array::from_fn(|joint| x[joint]);
+            return maps.decode(z);
         }
-        std::array::from_fn(|joint| self.decoder_bias[joint] + row_product(&self.decoder, joint, z))
+        std::array::from_fn(|i| self.decoder_bias[i] + row_product(&self.decoder, i, z))
+    }
+
+    pub(crate) fn decode_joints(&self, z: &[f64]) -> [f64; JOINT_DIM] {
+        let x = self.decode(z);
+        std::array::from_fn(|joint| x[joint])
     }
 
     /// Joint velocities, rad/s, for `dz` with the decoder's Jacobian at `z`.
     pub fn decode_joint_velocities(&self, z: &[f64], dz: &[f64]) -> [f64; JOINT_DIM] {
-        let local = self.nonlinear.as_ref().map(|maps| maps.decoder_jacobian(z));
-        let decoder = local.as_ref().unwrap_or(&self.decoder);
-        std::array::from_fn(|joint| row_product(decoder, joint, dz))
+        let dx = self.decode_velocities(z, dz);
+        std::array::from_fn(|joint| dx[joint])
     }
 
-    /// Losses of the joints, N m, over a time `step_s` of a phase from latent state `start` to `end` (both `(z, dz)`): at
-    /// the mean decoded velocities, with their difference as acceleration, by the rule of the inputs. Zero without
-    /// actuators, at most the torque limit.
+    /// Velocities of the robot's coordinates, rad/s and m/s.
+    fn decode_velocities(&self, z: &[f64], dz: &[f64]) -> [f64; STATE_DIM] {
+        let local = self.nonlinear.as_ref().map(|maps| maps.decoder_jacobian(z));
+        let decoder = local.as_ref().unwrap_or(&self.decoder);
+        std::array::from_fn(|i| row_product(decoder, i, dz))
+    }
+
+    /// The feet that are on the ground in a phase, in one of its patterns at least.
+    pub fn feet_of_phase(&self, phase: usize) -> ContactFlags {
+        let own =
+            (0..self.phase_of_feet.len()).filter(|bits| self.phase_of_feet[*bits] == Some(phase));
+        let bits = own.fold(0, |all, bits| all | bits);
+        std::array::from_fn(|foot| bits >> foot & 1 == 1)
+    }
+
+    /// What of the motors' torques does not enter the input, N m, over a time `step_s` of a phase from latent state
+    /// `start` to `end` (both `(z, dz)`), by the rule of the inputs: losses of the joints at the mean decoded velocities,
+    /// with their difference as acceleration, at most the torque limit; and what takes the links of legs with their
+    /// `feet` on the ground, in the middle. Zero without actuators.
     pub fn planned_losses(
         &self,
-        phase: usize,
-        start: &[f64],
-        end: &[f64],
+        (phase, feet): (usize, ContactFlags),
+        [start, end]: [&[f64]; 2],
         step_s: f64,
     ) -> [f64; JOINT_DIM] {
         let Some(actuators) = self.input_rule.actuators() else {
             return [0.0; JOINT_DIM];
         };
+        let is_grounded = self.phases[phase].is_grounded;
         let [before, after] = [start, end].map(|state| {
             let (z, dz) = state.split_at(self.latent_dim());
-            self.decode_joint_velocities(z, dz)
+            self.decode_velocities(z, dz)
         });
         let limit = self.robot().torque_limit_nm();
-        let has_inertia = (self.input_rule).inertia_is_loss(self.phases[phase].is_grounded);
-        let armature = if has_inertia {
+        let armature = if self.input_rule.inertia_is_loss(is_grounded) {
             actuators.armature
         } else {
             [0.0; JOINT_DIM]
         };
         let of = |joint: usize| [actuators.viscous, actuators.dry, armature].map(|of| of[joint]);
-        std::array::from_fn(|i| planned_loss(&of(i), before[i], after[i], step_s, limit[i]))
+        let mut losses =
+            std::array::from_fn(|i| planned_loss(&of(i), before[i], after[i], step_s, limit[i]));
+        if is_grounded && self.input_rule.legs().is_some() {
+            let middle = (0..self.latent_dim()).map(|i| 0.5 * (start[i] + end[i]));
+            let x = self.decode(&middle.collect::<Vec<f64>>());
+            let dx = std::array::from_fn(|i| 0.5 * (before[i] + after[i]));
+            let ddx = std::array::from_fn(|i| (after[i] - before[i]) / step_s);
+            let own = self.input_rule.leg_torques([&x, &dx, &ddx], feet);
+            losses
+                .iter_mut()
+                .zip(own)
+                .for_each(|(loss, own)| *loss += own);
+        }
+        losses
     }
 
     /// `u_lat = pinv(J_Eᵀ) s_u u` with the encoder's Jacobian at `x` if it is nonlinear and has full row rank there,

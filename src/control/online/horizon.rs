@@ -176,7 +176,9 @@ impl Horizon {
         };
         program.write_dynamics(&stage.model, &stage.defect, &scale);
         let rows = stage.rows.as_ref().unwrap_or(inputs.rows);
-        let losses_nm = plant.planned_losses(stage.phase, &stage.state, &stage.end, step_s);
+        let feet = plant.feet_of_phase(stage.phase);
+        let losses_nm =
+            plant.planned_losses((stage.phase, feet), [&stage.state, &stage.end], step_s);
         program.write_rows(rows, &losses_nm, &stage.end, &scale);
         let (cones, _) = rows.cones.as_chunks::<CONE_ROWS>();
         for (number, [x, y, z]) in cones.iter().enumerate() {

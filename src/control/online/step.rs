@@ -126,9 +126,11 @@ impl Controller {
         }
         let [lower, upper] = self.plant.joint_limits();
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
-        let (start, end) = (plan.start(stage), plan.end(stage));
-        stance.losses_nm =
-            (self.plant).planned_losses(plan.time.phase, start, end, self.settings.step_s);
+        let (ends, phase) = ([plan.start(stage), plan.end(stage)], plan.time.phase);
+        let step_s = self.settings.step_s;
+        stance.losses_nm = self
+            .plant
+            .planned_losses((phase, stance.feet), ends, step_s);
         let stance = *stance;
         let Ok(torque) = self.lift(&command.u_lat, &stance) else {
             return false;

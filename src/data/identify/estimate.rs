@@ -188,7 +188,7 @@ impl State {
         let kinds = |first: usize, of: &dyn Fn(usize) -> f64| {
             PerKind::from_array(std::array::from_fn(|kind| of(first + kind)))
         };
-        let legs = |of: &dyn Fn(usize) -> f64| Legs {
+        let legs = |of: &dyn Fn(usize) -> f64| LegMoments {
             side_kg_m: of(LEG_SIDE),
             thigh_kg_m: of(THIGH),
             calf_kg_m: of(CALF),
@@ -208,6 +208,7 @@ impl State {
                 viscous: joints(VISCOUS),
                 dry: joints(DRY),
                 armature: joints(ARMATURE),
+                legs: None,
             },
             legs: legs(&value),
             standard_error: StandardError {

@@ -31,22 +31,6 @@ impl PerKind {
     }
 }
 
-/// First and second moments of the moving parts of one leg, the same for every leg.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Legs {
-    /// Mass times distance beside the axis of abduction, kg m.
-    pub side_kg_m: f64,
-    /// Mass times distance from the hip along the thigh; the calf's mass counts at the knee, kg m.
-    pub thigh_kg_m: f64,
-    /// Mass times distance from the knee along the calf, kg m.
-    pub calf_kg_m: f64,
-    /// Second moment of the thigh about the hip, the calf's mass at the knee, kg m^2.
-    pub thigh_kg_m2: f64,
-    /// Second moment of the calf about the knee, kg m^2.
-    pub calf_kg_m2: f64,
-}
-
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandardError {
@@ -56,7 +40,7 @@ pub struct StandardError {
     pub viscous_nm_s_rad: PerKind,
     pub dry_nm: PerKind,
     pub armature_kg_m2: PerKind,
-    pub legs: Legs,
+    pub legs: LegMoments,
 }
 
 /// R^2 of the trunk's acceleration in contact along the world's axes, over windows.
@@ -90,7 +74,7 @@ pub struct Identification {
     pub mass_kg: f64,
     pub delay_s: f64, // time from a recorded torque to its effect on the motion, s
     pub actuators: Actuators,
-    pub legs: Legs,
+    pub legs: LegMoments,
     pub standard_error: StandardError,
     pub r2: Fit,
     pub force_alone: ForceAlone,
@@ -147,6 +131,14 @@ impl Identification {
             "R^2 of the trunk's acceleration {axis} is {whole:.2}, and {alone:.2} by the feet's forces alone: \
              signs, order, units or frames of torques, joints or body are not this robot's; do not use these values"
         ))
+    }
+
+    /// Losses of the joints with the moments of the legs, as models have them.
+    pub fn actuators_and_legs(&self) -> Actuators {
+        Actuators {
+            legs: Some(self.legs),
+            ..self.actuators.clone()
+        }
     }
 
     /// By kind of joint viscous friction in N m s/rad, dry friction in N m and armature in kg m^2.
@@ -246,7 +238,7 @@ fn gravity_and_mass(gravity_m_s2: f64, mass_kg: f64) -> [Entry; 2] {
     [("gravity_m_s2", gravity_m_s2), ("mass_kg", mass_kg)]
 }
 
-fn legs(legs: &Legs) -> String {
+fn legs(legs: &LegMoments) -> String {
     entries([
         ("side_kg_m", legs.side_kg_m),
         ("thigh_kg_m", legs.thigh_kg_m),

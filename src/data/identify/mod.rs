@@ -29,7 +29,7 @@ mod parameters;
 mod windows;
 
 pub use estimate::{IdentifyError, identify};
-pub use identification::{Fit, Identification, Legs, PerKind, StandardError};
+pub use identification::{Fit, Identification, PerKind, StandardError};
 
 use std::ops::Range;
 use std::path::Path;
@@ -39,7 +39,7 @@ use nalgebra::DMatrix;
 use crate::files::{Fault, Located};
 use crate::recording::Segment;
 use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, Robot};
+use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, LegMoments, Robot};
 use equations::SampleEquations;
 use parameters::{
     ARMATURE, CALF, CALF_SECOND, DELAY, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,

@@ -215,19 +215,18 @@ impl Segment {
         std::array::from_fn(|i| self.torque_nm[(i, sample)])
     }
 
-    /// Accelerations of the joints, 12 x n, in rad/s^2: [`Self::ddx`] averaged over 20 ms within stretches of equal
-    /// contact (a foot down, or none), so that noise and the spikes of landings do not become torques.
-    fn joint_accelerations(&self) -> DMatrix<f64> {
+    /// Accelerations, 18 x n: [`Self::ddx`] averaged over 20 ms within stretches of equal contact (a foot down, or none),
+    /// so that noise and the spikes of landings do not become torques.
+    fn smoothed_accelerations(&self) -> DMatrix<f64> {
         let half = match self.mean_step_s() {
             step if step > 0.0 => (0.5 * ACCELERATION_WINDOW_S / step).round() as usize,
             _ => 0,
         };
         let window = 2 * half.min(self.len()) + 1;
-        let mut out = DMatrix::zeros(JOINT_DIM, self.len());
+        let mut out = DMatrix::zeros(STATE_DIM, self.len());
         for (stretch, _) in self.contacts() {
-            let (first, count) = (stretch.start, stretch.len());
-            let own = self.ddx.view((0, first), (JOINT_DIM, count)).into_owned();
-            (out.columns_mut(first, count)).copy_from(&moving_average(&own, window));
+            let own = self.ddx.columns_range(stretch.clone()).into_owned();
+            (out.columns_range_mut(stretch)).copy_from(&moving_average(&own, window));
         }
         out
     }
@@ -246,11 +245,11 @@ impl Segment {
         if rule.actuators().is_none() {
             return out;
         }
-        let ddq = self.joint_accelerations();
+        let ddx = self.smoothed_accelerations();
         for (sample, mut column) in out.column_iter_mut().enumerate() {
-            let dq = std::array::from_fn(|i| self.dx[(i, sample)]);
-            let ddq = std::array::from_fn(|i| ddq[(i, sample)]);
-            column.copy_from_slice(&rule.losses(&dq, &ddq, self.feet[sample]));
+            let of = |m: &DMatrix<f64>| std::array::from_fn(|i| m[(i, sample)]);
+            let [x, dx, ddx] = [&self.x, &self.dx, &ddx].map(of);
+            column.copy_from_slice(&rule.losses([&x, &dx, &ddx], self.feet[sample]));
         }
         out
     }

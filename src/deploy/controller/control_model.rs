@@ -24,6 +24,7 @@ pub(crate) struct ControlModelText<'a> {
     robot: String,
     frame: &'static str,
     actuators: Vec<(&'static str, String)>,
+    legs: String,
     plant: &'a ControlModel,
     /// Each phase with its constants' beginning.
     phases: Vec<(String, &'a PhaseInterface, &'a ControlPhase)>,
@@ -72,6 +73,10 @@ impl<'a> ControlModelText<'a> {
                 .flat_map(|actuators| actuators.named())
                 .map(|(name, values)| (name, format!("{values:?}")))
                 .collect(),
+            legs: (rule
+                .actuators()
+                .map(|actuators| format!("{:?}", actuators.legs)))
+            .unwrap_or_default(),
             plant,
             phases: pairs
                 .map(|(entries, phase)| (entries.identifier.to_ascii_uppercase(), entries, phase))

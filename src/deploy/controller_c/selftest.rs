@@ -136,13 +136,11 @@ fn inputs(rule: &InputRule, jump: &PlannedJump) -> Result<Vec<f64>, EmitError> {
     for k in 0..jump.time_s.len() {
         let torque = jump.torque_nm.column(k);
         let x: [f64; STATE_DIM] = std::array::from_fn(|i| jump.x[(i, k)]);
-        let dq = std::array::from_fn(|joint| jump.dx[(joint, k)]);
+        let dx = std::array::from_fn(|i| jump.dx[(i, k)]);
         let (before, after) = (k.saturating_sub(1), (k + 1).min(jump.time_s.len() - 1));
         let passed_s = jump.time_s[after] - jump.time_s[before];
-        let ddq = std::array::from_fn(|joint| {
-            (jump.dx[(joint, after)] - jump.dx[(joint, before)]) / passed_s
-        });
-        let losses = rule.losses(&dq, &ddq, jump.feet[k]);
+        let ddx = std::array::from_fn(|i| (jump.dx[(i, after)] - jump.dx[(i, before)]) / passed_s);
+        let losses = rule.losses([&x, &dx, &ddx], jump.feet[k]);
         let limits = rule.robot().torque_limit_nm();
         let within = |joint: usize| torque[joint].clamp(-limits[joint], limits[joint]);
         let net: [f64; JOINT_DIM] = std::array::from_fn(|joint| within(joint) - losses[joint]);

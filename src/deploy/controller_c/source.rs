@@ -16,7 +16,7 @@ use crate::mpc::{
     ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings, NO_PHASE,
     torque_deviation,
 };
-use crate::robot::{GRAVITY_M_S2, Leg, LegShape, WrenchFrame};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, STATE_DIM, WrenchFrame};
 
 #[derive(Template)]
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
@@ -30,6 +30,8 @@ pub(super) struct Source<'a> {
     /// Of a phase, whether the rotors' inertia is a loss; and without a foot on the ground.
     inertia_is_loss: String,
     inertia_is_always_loss: bool,
+    has_legs: bool,
+    feet_of_phase: String,
     given_state: String,
     given_covariance: String,
     acceleration_error: String,
@@ -98,6 +100,8 @@ impl<'a> Source<'a> {
             has_actuators: plant.input_rule().actuators().is_some(),
             inertia_is_loss: inertia_is_loss(plant),
             inertia_is_always_loss: plant.input_rule().inertia_is_loss(false),
+            has_legs: plant.input_rule().legs().is_some(),
+            feet_of_phase: feet_of_phase(plant, numbers),
             is_body_frame: plant.input_rule().wrench_frame() == WrenchFrame::Body,
             solver: solver_numbers(precision, mpc.qp.accepted_residual),
             functions: for_controller(FUNCTIONS, facts.name),
@@ -123,10 +127,27 @@ impl<'a> Source<'a> {
     }
 }
 
+impl Source<'_> {
+    /// Rows of the decoder that the controller uses.
+    fn decoded_rows(&self) -> usize {
+        if self.has_legs { STATE_DIM } else { JOINT_DIM }
+    }
+}
+
 /// Of each phase, whether the rotors' inertia is a loss.
 fn inertia_is_loss(plant: &ControlModel) -> String {
     let is_loss = |phase: &ControlPhase| plant.input_rule().inertia_is_loss(phase.is_grounded);
     integers(plant.phases().iter().map(|phase| i64::from(is_loss(phase))))
+}
+
+/// Of each phase, 1 for each foot on the ground.
+fn feet_of_phase(plant: &ControlModel, numbers: Numbers) -> String {
+    let feet = |phase| {
+        plant
+            .feet_of_phase(phase)
+            .map(|down| f64::from(u8::from(down)))
+    };
+    numbers.matrix((0..plant.phases().len()).map(feet))
 }
 
 /// Where iterations end. In single precision rounding ends the progress earlier; torques of a lift would be off by 0.1 N m

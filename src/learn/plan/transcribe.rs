@@ -152,16 +152,18 @@ impl<'a> Task<'a> {
     pub(crate) fn losses(&self, part: usize, node: usize, y: &[f64]) -> [f64; JOINT_DIM] {
         let d = self.seed.latent_dim;
         let of = &self.seed.parts[part];
-        let rates = &self.seed.decode * self.values(part, node, y).dz;
+        let at = self.values(part, node, y);
+        let (decode, bias) = (&self.seed.decode, &self.seed.decode_bias);
+        let [x, rates] = [decode * at.z + bias, decode * at.dz];
         let last = of.intervals() - 1;
         let around = [node.saturating_sub(1).min(last), node.min(last)];
         let mean = DVector::from_fn(d, |i, _| {
             let both = around.map(|interval| self.acceleration(part, interval, i).at(y));
             0.5 * (both[0] + both[1])
         });
-        let accelerations = &self.seed.decode * mean;
-        let first = |v: &DVector<f64>| std::array::from_fn(|i| v[i]);
-        (self.seed.rule).losses(&first(&rates), &first(&accelerations), of.landmark.feet)
+        let array = |v: DVector<f64>| std::array::from_fn(|i| v[i]);
+        let [x, dx, ddx] = [x, rates, decode * mean].map(array);
+        (self.seed.rule).losses([&x, &dx, &ddx], of.landmark.feet)
     }
 
     pub(crate) fn program(&self, y: &[f64]) -> ConeProgram {

@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::dataset::{Dataset, Jump, centred, mean};
+use super::latent::input_projection;
 use super::options::Coordinates;
 use crate::model::complement;
 use crate::recording::stretches;
@@ -28,6 +29,7 @@ const RIDGE: f64 = 1e-2; // relative to the mean square of all joints' accelerat
 
 const SETTLING_S: f64 = 0.05; // after a touchdown, in which feet still slip
 const LEAST_STANDING: usize = 100; // samples on standing feet that identify their rows
+const ABDUCTION_ROUNDS: usize = 3;
 const STANDING_RIDGE: f64 = 1e-3; // of standardised columns
 const PAIRS: [[Leg; 2]; 2] = [
     [Leg::FrontRight, Leg::FrontLeft],
@@ -243,8 +245,8 @@ fn flight_accelerations(training: &Dataset, jump: &Jump, all: &mut Vec<DVector<f
 /// Rows of the legs as columns, forwards and upwards of the front pair, then of the rear pair; none if a pair has fewer
 /// than [`LEAST_STANDING`] samples of stance. While a pair stands, `x + arm pitch + w^T q` over its flexions and knees
 /// `q` is constant, and so is the same sum with `z`. Ridge regression of the deviations from the mean of each stance
-/// gives `arm` and `w`. A row is this sum less the momentum rows. Weights of abductions are such that the lift returns
-/// their torques, by [`abduction_torques`].
+/// gives `arm` and `w`. A row is this sum less the momentum rows, and with weights of the abductions by
+/// [`add_abductions`].
 fn leg_rows(
     training: &Dataset,
     momentum: &DMatrix<f64>,
@@ -252,26 +254,20 @@ fn leg_rows(
 ) -> Vec<(DVector<f64>, LegRow)> {
     let mut rows = Vec::new();
     for legs in PAIRS {
-        let [abduction, flexion, knee] = std::array::from_fn(|joint| mirrored(legs, joint, robot));
+        let [_, flexion, knee] = std::array::from_fn(|joint| mirrored(legs, joint, robot));
         let stances = stances(training, legs);
         if stances.iter().map(|(_, range)| range.len()).sum::<usize>() < LEAST_STANDING {
             return Vec::new();
         }
         let moving = DMatrix::from_columns(&[unit(PITCH), flexion.clone(), knee.clone()]);
         let deviations = deviations(training, &stances);
-        let follows = abduction_torques(training, [&abduction, &flexion, &knee]);
         for (body, &row) in MOMENTUM[..2].iter().enumerate() {
             let weights = standardised_fit(
                 &moving.tr_mul(&deviations),
                 &deviations.row(row).transpose(),
             );
             let (arm, of_flexion, of_knee) = (-weights[0], -weights[1], -weights[2]);
-            let turned = of_flexion * follows[0] + of_knee * follows[1];
-            let feet = unit(row)
-                + unit(PITCH) * arm
-                + &flexion * of_flexion
-                + &knee * of_knee
-                + &abduction * turned;
+            let feet = unit(row) + unit(PITCH) * arm + &flexion * of_flexion + &knee * of_knee;
             let rest = mean_over(training, &stances, &feet);
             rows.push((
                 feet - momentum.column(body) - momentum.column(TURN) * arm,
@@ -279,6 +275,7 @@ fn leg_rows(
             ));
         }
     }
+    add_abductions(training, momentum, &mut rows, robot);
     rows
 }
 
@@ -328,15 +325,33 @@ fn mean_over(training: &Dataset, stances: &[(usize, Range<usize>)], row: &DVecto
     sum / count - row.dot(&mean(&training.states(None)))
 }
 
-/// Coefficients of the regression of a pair's torques at abductions on those at flexions and knees, over all inputs.
-fn abduction_torques(
+/// Gives each pair's rows the weights of its abductions with which the lift `W_e^T u_lat` returns their torques best, by
+/// regression on `u_lat = pinv(W_e^T) u`, which depends on these weights in turn: [`ABDUCTION_ROUNDS`] times.
+fn add_abductions(
     training: &Dataset,
-    [abduction, flexion, knee]: [&DVector<f64>; 3],
-) -> [f64; 2] {
+    momentum: &DMatrix<f64>,
+    rows: &mut [(DVector<f64>, LegRow)],
+    robot: &Robot,
+) {
     let inputs = training.inputs(None);
-    let others = DMatrix::from_columns(&[flexion.clone(), knee.clone()]).tr_mul(&inputs);
-    let fitted = standardised_fit(&others, &inputs.tr_mul(abduction));
-    [fitted[0], fitted[1]]
+    for _ in 0..ABDUCTION_ROUNDS {
+        let legs = rows.iter().map(|(row, _)| row.clone());
+        let momentum = momentum.column_iter().map(|row| row.into_owned());
+        let columns: Vec<DVector<f64>> = momentum.chain(legs).collect();
+        let first = columns.len() - rows.len();
+        let weights = DMatrix::from_columns(&columns).transpose();
+        let u_lat = input_projection(&weights) * &inputs;
+        let missed = &inputs - weights.tr_mul(&u_lat);
+        for (pair, rows) in rows.chunks_mut(2).enumerate() {
+            let abduction = mirrored(PAIRS[pair], 0, robot);
+            let torque = missed.tr_mul(&abduction) / abduction.norm_squared();
+            let own = u_lat.rows(first + 2 * pair, 2).into_owned();
+            let changes = standardised_fit(&own, &torque);
+            for ((row, _), change) in rows.iter_mut().zip(&changes) {
+                *row += &abduction * *change;
+            }
+        }
+    }
 }
 
 /// Weights `w` that minimise `|w^T regressors - target|^2` (`k x n`, `n`) with a ridge on standardised rows.

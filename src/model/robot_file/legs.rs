@@ -11,7 +11,7 @@ use super::read::{RobotFileError, from_toml_text, keep, text_of, word};
 use crate::files::is_invisible;
 use crate::robot::LEG_JOINT_DIM;
 use crate::robot::{
-    Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, Robot,
+    Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, LegMoments, Robot,
 };
 
 const MAX_NAME_LEN: usize = 80;
@@ -299,6 +299,7 @@ struct File {
     robot: Option<String>,
     gravity_m_s2: Option<f64>,
     actuators: ActuatorsEntry,
+    legs: Option<LegMoments>,
 }
 
 const GRAVITY_SHARE: f64 = 0.25; // by which gravity identified with the losses may differ from the earth's
@@ -345,6 +346,7 @@ impl ActuatorsEntry {
             viscous: joints("viscous", &self.viscous)?,
             dry: joints("dry", &self.dry)?,
             armature: joints("armature", &self.armature)?,
+            legs: None,
         };
         match actuators.unusable() {
             None => Ok(actuators),
@@ -357,13 +359,15 @@ impl ActuatorsEntry {
     }
 }
 
-/// Reads the table `[actuators]` of a TOML file, such as one of `romc identify`, for a robot if one is known.
+/// Reads the tables `[actuators]` and, if there is one, `[legs]` of a TOML file, such as one of `romc identify`, for a
+/// robot if one is known.
 pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, RobotFileError> {
     let file = path.display().to_string();
     let File {
         robot: of,
         gravity_m_s2: gravity,
         actuators,
+        legs,
     } = from_toml_text(&file, &text_of(path)?)?;
     let is_off = |gravity: &f64| (gravity / GRAVITY_M_S2 - 1.0).abs() > GRAVITY_SHARE;
     if let Some(gravity) = gravity.filter(is_off) {
@@ -382,6 +386,9 @@ pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, R
             let expected = format!("{expected}, whose recordings these are, or no such line");
             Err(RobotFileError::at(&file, "robot", found, expected))
         }
-        _ => actuators.actuators(&file),
+        _ => Ok(Actuators {
+            legs,
+            ..actuators.actuators(&file)?
+        }),
     }
 }
