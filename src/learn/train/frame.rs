@@ -4,27 +4,24 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::body::{BodyRows, PITCH, is_lateral};
 use super::dataset::{Dataset, Jump, centred, mean};
 use super::options::Coordinates;
 use crate::model::complement;
 use crate::recording::stretches;
 use crate::robot::{
-    BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot, STATE_DIM,
+    BODY_DIM, BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot,
+    STATE_DIM, WrenchFrame,
 };
 
-const PITCH: usize = JOINT_DIM + 4;
-/// Body coordinates of the momentum rows: the centre of mass forwards and upwards, and the rotation about it.
-const MOMENTUM: [usize; 3] = [BODY_X, BODY_Z, PITCH];
-pub(super) const TURN: usize = 2;
-/// Latent coordinates from which on the rotation about the centre of mass is a row. With fewer, torques of the legs are
-/// lost when there is one.
-const TURNING_DIM: usize = 5;
-/// Latent coordinates from which on the rows are those of the whole body in its plane: three of momentum, four of legs.
-pub(super) const WHOLE_BODY_DIM: usize = 7;
+pub(super) const TURN: usize = 2; // the row of pitch, where there is one
+/// Rows of the legs: feet forwards and upwards, of the front pair and of the rear pair.
+const LEG_ROWS: usize = 4;
 const WINDOW_S: f64 = 0.05; // over which accelerations in flight are averaged
 const TRIM: usize = 4; // samples left out at both ends of a flight, where feet still slip or already touch
 const LEAST_WINDOWS: usize = 50; // averaged accelerations in flight that identify the centre of mass
 const RIDGE: f64 = 1e-2; // relative to the mean square of all joints' accelerations
+const LOAD_RIDGE: f64 = 1e-5; // on forces and moments, relative to the mean square of each
 
 const SETTLING_S: f64 = 0.05; // after a touchdown, in which feet still slip
 const LEAST_STANDING: usize = 100; // samples on standing feet that identify their rows
@@ -38,8 +35,8 @@ const PAIRS: [[Leg; 2]; 2] = [
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub(super) held: DMatrix<f64>, // rows of every encoder, as columns, 18 x h: momentum, then legs
-    pub(super) momentum: usize, // how many of them are of the momentum, in the order of `MOMENTUM`
-    pub(super) legs: Vec<LegRow>, // of the others
+    pub(super) body: Vec<usize>,   // body coordinates of the first of them, those of the momentum
+    pub(super) legs: Vec<LegRow>,  // of the others
     pub(super) free: DMatrix<f64>, // orthonormal directions that the other rows combine, 18 x k
 }
 
@@ -56,49 +53,56 @@ impl Frame {
     pub(super) fn plain(active: &[usize]) -> Self {
         Self {
             held: DMatrix::zeros(STATE_DIM, 0),
-            momentum: 0,
+            body: Vec::new(),
             legs: Vec::new(),
             free: DMatrix::identity(STATE_DIM, STATE_DIM).select_columns(active),
         }
     }
 
-    /// With [`Coordinates::Named`] and two or more latent coordinates, the first two rows are the centre of mass. With
-    /// five or more the third is the rotation about it, with seven or more the next four are foot positions relative to
-    /// it. The others combine mirror-symmetric sums of `active` coordinates: neither `y`, roll and yaw, nor left and
-    /// right; nor pitch where a row contains it.
+    /// With [`Coordinates::Named`] the first rows are the momentum of the coordinates in `body`. With pitch among them and
+    /// four or more rows beside, the next four are foot positions relative to the centre of mass. The others combine
+    /// `active` coordinates. In the plane these are mirror-symmetric sums of joints, and pitch where it has no row. With
+    /// a row that changes sign in a mirror image also differences of left and right, and all of the body without a row.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],
         latent_dim: usize,
-        coordinates: Coordinates,
+        (coordinates, body): (Coordinates, &BodyRows),
         robot: &Robot,
     ) -> Self {
         if coordinates == Coordinates::Free {
             return Self::plain(active);
         }
-        let (body, count): (&[usize], usize) = match latent_dim {
-            0 | 1 => (&[BODY_X, BODY_Z, PITCH], 0),
-            2..TURNING_DIM => (&[PITCH], 2),
-            _ => (&[], MOMENTUM.len()),
-        };
-        let momentum = momentum_rows(training, count, robot);
-        let joints = mirrored_joints(active, robot);
+        let spatial = body.is_spatial();
+        let rows = body.coordinates().to_vec();
+        let momentum = momentum_rows(training, &rows, robot);
         let mut held: Vec<DVector<f64>> =
             momentum.column_iter().map(|row| row.into_owned()).collect();
         let mut legs = Vec::new();
-        if latent_dim >= WHOLE_BODY_DIM {
+        if has_leg_rows(body, latent_dim) {
             for (row, leg) in leg_rows(training, &momentum, robot) {
                 held.push(row);
                 legs.push(leg);
             }
         }
-        let single = body.iter().filter(|i| active.contains(i)).map(|&i| unit(i));
-        let free: Vec<_> = single.chain(joints).collect();
+        let others: &[usize] = match (rows.is_empty(), spatial) {
+            (true, _) => &[BODY_X, BODY_Z, PITCH],
+            (false, false) => &[PITCH],
+            (false, true) => &[PITCH, BODY_X + 1, BODY_X + 3, BODY_X + 5],
+        };
+        let others = others
+            .iter()
+            .filter(|i| !rows.contains(i) && active.contains(i));
+        let mut free: Vec<_> = others.map(|&i| unit(i)).collect();
+        free.extend(joints_of_pairs(active, robot, 1.0));
+        if spatial {
+            free.extend(joints_of_pairs(active, robot, -1.0));
+        }
         let free = DMatrix::from_fn(STATE_DIM, free.len(), |row, k| free[k][row]);
         Self {
-            free: without(free, &held[count..]),
+            free: without(free, &held[rows.len()..]),
             held: DMatrix::from_fn(STATE_DIM, held.len(), |row, k| held[k][row]),
-            momentum: count,
+            body: rows,
             legs,
         }
     }
@@ -106,7 +110,7 @@ impl Frame {
     /// How many of `latent_dim` coordinates predictions of whole jumps are judged by: of the whole body the first two, the
     /// centre of mass. Errors of rotation and legs there grow with the least difference at take-off.
     pub(super) fn judged_over_jumps(&self, latent_dim: usize) -> usize {
-        if self.legs.is_empty() {
+        if self.legs.is_empty() && !self.body.iter().copied().any(is_lateral) {
             latent_dim
         } else {
             TURN
@@ -116,8 +120,8 @@ impl Frame {
     /// How many momentum rows have their own equations for deviations from the mean jump: all, if the rotation is one.
     /// Without it their equations miss what the pitch does, and regressions find some of that.
     pub(super) fn known_in_deviations(&self) -> usize {
-        if self.momentum > TURN {
-            self.momentum
+        if self.body.contains(&PITCH) {
+            self.body.len()
         } else {
             0
         }
@@ -155,8 +159,14 @@ fn without(free: DMatrix<f64>, rows: &[DVector<f64>]) -> DMatrix<f64> {
         .select_columns(&outside.collect::<Vec<_>>())
 }
 
-/// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`.
-fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
+/// Whether the rows of the legs are among those that are held, as far as the recordings identify them.
+pub(super) fn has_leg_rows(body: &BodyRows, latent_dim: usize) -> bool {
+    body.has_pitch() && latent_dim >= body.coordinates().len() + LEG_ROWS
+}
+
+/// Orthonormal directions of the pairs of a left and a right joint with one among `active`: with `parity` 1 those that a
+/// mirror leaves alone, with -1 those that it turns around.
+fn joints_of_pairs(active: &[usize], robot: &Robot, parity: f64) -> Vec<DVector<f64>> {
     let joints = PAIRS
         .into_iter()
         .flat_map(|legs| (0..LEG_JOINT_DIM).map(move |joint| (legs, joint)));
@@ -164,59 +174,135 @@ fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
         legs.iter()
             .any(|&leg| active.contains(&joint_of(leg, joint)))
     };
-    let direction = |(legs, joint)| mirrored(legs, joint, robot) * std::f64::consts::SQRT_2;
+    let direction = |(legs, joint)| mirrored(legs, joint, robot, parity) * std::f64::consts::SQRT_2;
     joints.filter(is_active).map(direction).collect()
 }
 
-/// The mean of a joint of two legs that mirror each other.
-fn mirrored([right, left]: [Leg; 2], joint: usize, robot: &Robot) -> DVector<f64> {
+/// The mean (`parity` 1) of a joint of two legs that mirror each other, or half their difference (-1).
+fn mirrored([right, left]: [Leg; 2], joint: usize, robot: &Robot, parity: f64) -> DVector<f64> {
     let [right, left] = [joint_of(right, joint), joint_of(left, joint)];
-    (unit(right) + unit(left) * robot.mirror_sign(left)) * 0.5
+    (unit(right) + unit(left) * (parity * robot.mirror_sign(left))) * 0.5
 }
 
 fn joint_of(leg: Leg, joint: usize) -> usize {
     LEG_JOINT_DIM * leg.index() + joint
 }
 
-/// The first `count` momentum rows, as columns, `18 x count`: `x + c_x^T q`, `z + c_z^T q` and `pitch + c_t^T q` over
-/// the joints `q`, of the body alone where the recordings have no flight. In flight the centre of mass falls freely and
-/// the angular momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz + c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The
-/// regression of the body's accelerations on those of the joints (mirrored, ridge) gives `c`, to first order in `q`.
-fn momentum_rows(training: &Dataset, count: usize, robot: &Robot) -> DMatrix<f64> {
-    let all: Vec<usize> = (0..JOINT_DIM).collect();
-    let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));
-    let mut body = DMatrix::from_fn(STATE_DIM, count, |row, k| {
-        f64::from(u8::from(row == MOMENTUM[k]))
-    });
+/// The momentum rows of these body coordinates, as columns: `x + c_x^T q`, `pitch + c_t^T q` and so on over the joints `q`;
+/// with fewer than [`LEAST_WINDOWS`] of flight by [`loaded_row`]. In flight the centre of mass falls freely and the angular
+/// momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz + c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The regression of
+/// the body's accelerations on those of the joints (ridge) gives `c`, to first order in `q`. By symmetry a row in the plane
+/// has sums of left and right joints only, and one that changes sign in a mirror image differences.
+fn momentum_rows(training: &Dataset, coordinates: &[usize], robot: &Robot) -> DMatrix<f64> {
     let mut accelerations = Vec::new();
     for jump in &training.jumps {
         flight_accelerations(training, jump, &mut accelerations);
     }
-    if accelerations.len() < LEAST_WINDOWS {
-        return body;
+    let flies = accelerations.len() >= LEAST_WINDOWS && std::env::var("ROMC_LOADED").is_err();
+    let (samples, inputs) = match flies {
+        true => (DMatrix::from_columns(&accelerations), DMatrix::zeros(0, 0)),
+        false => loaded_samples(training),
+    };
+    let all: Vec<usize> = (0..JOINT_DIM).collect();
+    let mut rows = DMatrix::zeros(STATE_DIM, coordinates.len());
+    for (mut row, &coordinate) in rows.column_iter_mut().zip(coordinates) {
+        row[coordinate] = 1.0;
+        let parity = if is_lateral(coordinate) { -1.0 } else { 1.0 };
+        let joints = DMatrix::from_columns(&joints_of_pairs(&all, robot, parity));
+        let of_joints = joints.tr_mul(&samples);
+        let part = match flies {
+            true => flight_row(training, coordinate, &samples, &of_joints),
+            false => loaded_row(training, coordinate, (&samples, &inputs), &of_joints),
+        };
+        if let Some(part) = part {
+            row -= &joints * part;
+        }
     }
-    let samples = DMatrix::from_columns(&accelerations);
-    let (of_joints, n) = (joints.tr_mul(&samples), samples.ncols() as f64);
+    rows
+}
+
+/// Weights of the joints' accelerations (`k x n`) in that of a body coordinate in flight; none where joints rest.
+fn flight_row(
+    training: &Dataset,
+    coordinate: usize,
+    samples: &DMatrix<f64>,
+    of_joints: &DMatrix<f64>,
+) -> Option<DVector<f64>> {
+    let n = samples.ncols() as f64;
     let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
     if mean_square <= 0.0 {
-        return body;
+        return None;
     }
-    let gram = &of_joints * of_joints.transpose() / n
-        + DMatrix::identity(joints.ncols(), joints.ncols()) * (RIDGE * mean_square);
+    let (k, _) = of_joints.shape();
+    let gram =
+        of_joints * of_joints.transpose() / n + DMatrix::identity(k, k) * (RIDGE * mean_square);
     let factor = gram
         .cholesky()
         .expect("invariant: a Gram matrix plus a ridge");
-    for (mut column, row) in body.column_iter_mut().zip(MOMENTUM) {
-        let fall = if row == BODY_Z {
-            GRAVITY_M_S2 * training.scaling.state[BODY_Z]
-        } else {
-            0.0
-        };
-        let target = samples.row(row).transpose().add_scalar(fall);
-        let part = factor.solve(&(&of_joints * target / n));
-        column -= &joints * part;
+    let fall = match coordinate {
+        BODY_Z => GRAVITY_M_S2 * training.scaling.state[BODY_Z],
+        _ => 0.0,
+    };
+    let target = samples.row(coordinate).transpose().add_scalar(fall);
+    Some(factor.solve(&(of_joints * target / n)))
+}
+
+/// Accelerations and inputs of all samples but those just after a touchdown, where a part of the force passes no joint.
+fn loaded_samples(training: &Dataset) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (mut accelerations, mut inputs) = (Vec::new(), Vec::new());
+    for jump in &training.jumps {
+        let mut touched_s = f64::NEG_INFINITY;
+        for sample in 0..jump.samples() {
+            let touches =
+                |foot: usize| jump.feet[sample][foot] && sample > 0 && !jump.feet[sample - 1][foot];
+            if (0..4).any(touches) {
+                touched_s = jump.time_s[sample];
+            }
+            if jump.time_s[sample] - touched_s >= SETTLING_S {
+                accelerations.push(jump.ddx.column(sample));
+                inputs.push(jump.u.column(sample));
+            }
+        }
     }
-    body
+    (
+        DMatrix::from_columns(&accelerations),
+        DMatrix::from_columns(&inputs),
+    )
+}
+
+/// As [`flight_row`] over all samples of all phases, where forces and moments on the body change the momentum:
+/// `dd(b + c^T q) = B [F; M] + a`. By symmetry this is the regression over the samples and their mirror images. None if
+/// force and moment are in the body's axes.
+fn loaded_row(
+    training: &Dataset,
+    coordinate: usize,
+    (samples, inputs): (&DMatrix<f64>, &DMatrix<f64>),
+    of_joints: &DMatrix<f64>,
+) -> Option<DVector<f64>> {
+    if training.rule.wrench_frame() == WrenchFrame::Body {
+        return None;
+    }
+    let lateral = is_lateral(coordinate);
+    let (k, n) = of_joints.shape();
+    let loads = (JOINT_DIM..STATE_DIM).filter(|&load| is_lateral(load) == lateral);
+    let one = usize::from(!lateral);
+    let mut regressors = DMatrix::zeros(k + BODY_DIM / 2 + one, n);
+    regressors.rows_mut(0, k).copy_from(of_joints);
+    for (to, load) in (k..).zip(loads) {
+        let load = inputs.row(load);
+        let rms = load.norm() / (n as f64).sqrt();
+        (regressors.row_mut(to)).copy_from(&(load / rms.max(f64::MIN_POSITIVE)));
+    }
+    regressors.rows_mut(k + BODY_DIM / 2, one).fill(1.0);
+    let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
+    let ridge = RIDGE * mean_square;
+    let gram = &regressors * regressors.transpose() / n as f64;
+    let p = gram.nrows();
+    let ridge = DVector::from_fn(p, |i, _| if i < k { ridge } else { LOAD_RIDGE });
+    let factor = (gram + DMatrix::from_diagonal(&ridge)).cholesky()?;
+    let target = samples.row(coordinate).transpose();
+    let weights = factor.solve(&(regressors * target / n as f64));
+    Some(weights.rows(0, k).into_owned())
 }
 
 /// Appends the accelerations over every window in the flights of a jump, scaled units.
@@ -252,7 +338,8 @@ fn leg_rows(
 ) -> Vec<(DVector<f64>, LegRow)> {
     let mut rows = Vec::new();
     for legs in PAIRS {
-        let [abduction, flexion, knee] = std::array::from_fn(|joint| mirrored(legs, joint, robot));
+        let [abduction, flexion, knee] =
+            std::array::from_fn(|joint| mirrored(legs, joint, robot, 1.0));
         let stances = stances(training, legs);
         if stances.iter().map(|(_, range)| range.len()).sum::<usize>() < LEAST_STANDING {
             return Vec::new();
@@ -260,7 +347,7 @@ fn leg_rows(
         let moving = DMatrix::from_columns(&[unit(PITCH), flexion.clone(), knee.clone()]);
         let deviations = deviations(training, &stances);
         let follows = abduction_torques(training, [&abduction, &flexion, &knee]);
-        for (body, &row) in MOMENTUM[..2].iter().enumerate() {
+        for (body, row) in [BODY_X, BODY_Z].into_iter().enumerate() {
             let weights = standardised_fit(
                 &moving.tr_mul(&deviations),
                 &deviations.row(row).transpose(),
@@ -362,3 +449,7 @@ fn standardised_fit(regressors: &DMatrix<f64>, target: &DVector<f64>) -> DVector
 fn unit(index: usize) -> DVector<f64> {
     DVector::from_fn(STATE_DIM, |i, _| if i == index { 1.0 } else { 0.0 })
 }
+
+#[cfg(test)]
+#[path = "../../../tests/units/learn_train_frame.rs"]
+mod tests;

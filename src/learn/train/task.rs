@@ -16,7 +16,7 @@ use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
 use super::metrics::{PLACE, PhaseTerms, SeedReport, SetMetrics, TrainReport, measure};
-use super::options::{EncoderOptions, TrainOptions};
+use super::options::{EncoderOptions, MirrorImages, TrainOptions};
 use super::progress::Monitor;
 use super::rollout::{Candidate, Xi};
 use super::select::{Choice, select};
@@ -71,14 +71,18 @@ impl<'a> Task<'a> {
         let rule = options.input_rule(robot);
         let read =
             |set: &[Recording]| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
-        let training = read(recordings.training)?;
+        let mut training = read(recordings.training)?;
+        if options.mirror_images() == MirrorImages::Added {
+            training.add_mirror_images(recordings.training)?;
+        }
         training.check_for_training()?;
         let validation = read(recordings.validation)?;
         let moments = training.moments();
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
-        let (coordinates, requested) = (options.coordinates(), options.latent_dim);
-        let frame = Frame::new(&training, &active, requested, coordinates, robot);
+        let (requested, body) = (options.latent_dim, options.body());
+        let rows = (options.coordinates(), &body);
+        let frame = Frame::new(&training, &active, requested, rows, robot);
         if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested,
@@ -87,8 +91,9 @@ impl<'a> Task<'a> {
         }
         let library = options.library()?;
         let features = Features::new(&library);
+        let equations = options.regression.body_equations;
         Ok(Self {
-            knowledge: Knowledge::of_phases(&training, &features, &frame),
+            knowledge: Knowledge::of_phases(&training, &features, &frame, equations),
             training,
             validation,
             moments,
