@@ -270,3 +270,47 @@ fn mass_and_rotation_do_not_come_from_the_file_of_the_robot() {
     assert_eq!(found[0], found[1]);
     assert!((found[0].0 / 12.74 - 1.0).abs() < 0.1, "{found:?}");
 }
+
+/// The recordings up to the first take-off.
+fn launches(recordings: &[Recording]) -> Vec<Recording> {
+    let launch = |recording: &Recording| {
+        let segment = &recording.segments[0];
+        let grounded = |sample: &usize| segment.feet[*sample].contains(&true);
+        let count = (0..segment.len()).take_while(grounded).count();
+        Recording::from(segment.slice(0..count))
+    };
+    recordings.iter().map(launch).collect()
+}
+
+/// Without flights the rows come from forces and moments: mass and rotation are those of the simulated robot, and all of the
+/// body is predicted.
+#[test]
+fn robot_that_does_not_fly_is_learned_from_forces_and_moments() {
+    let (training, validation) = (
+        launches(&jumps("train", 14)),
+        launches(&jumps("validation", 3)),
+    );
+    let mut options = options_of_all(10);
+    let contact = PhaseRule::two_phase().patterns.swap_remove(0);
+    options.phases = PhaseRule::new(vec![contact]);
+    let model = train_with(&training, &validation, &options)
+        .expect("trains")
+        .model;
+    let found = Invariance::of(&model).expect("finite").expect("complete");
+    let mass = found.mass_kg.expect("a mass") / 12.74;
+    let rotation = found.rotation_rad_s2_per_nm.expect("a rotation") / 2.60;
+    assert!(
+        (mass - 1.0).abs() < 0.1 && (rotation - 1.0).abs() < 0.2,
+        "{mass} {rotation}"
+    );
+    let predicted = fits(&model, &launches(&jumps("test", 3)));
+    for coordinate in JOINT_DIM..STATE_DIM {
+        let r2 = predicted[coordinate].r2.expect("moves");
+        assert!(r2 > 0.93, "{coordinate} {predicted:?}");
+    }
+    let turned_back = fits(&negated(&model, "u3", 2), &launches(&jumps("test", 3)));
+    assert!(
+        turned_back[JOINT_DIM + 4].r2.expect("moves") < 0.9,
+        "{turned_back:?}"
+    );
+}

@@ -124,3 +124,29 @@ fn rows_of_all_of_the_body_leave_room_for_all_joints() {
     assert_eq!(dim("all"), 18);
     assert_eq!(dim("x,z,yaw"), 18);
 }
+
+/// Whatever basis a search finds, its rows end as those that a mirror leaves alone and those that it turns around.
+#[test]
+fn space_that_a_mirror_leaves_alone_has_rows_that_stay_or_change_sign() {
+    let joints: Vec<usize> = (0..JOINT_DIM).collect();
+    let [even, odd] = [1.0, -1.0].map(|parity| {
+        let all = joints_of_pairs(&joints, robot(), parity);
+        DMatrix::from_columns(&all[..3 - usize::from(parity < 0.0)])
+    });
+    let both: Vec<_> = even.column_iter().chain(odd.column_iter()).collect();
+    let both = DMatrix::from_columns(&both);
+    let turn = Random::new(9).matrix(5, 5, 1.0).qr().q();
+    let mixed = &both * turn;
+    let classes = symmetry_classes(&mixed, robot());
+    assert_eq!(classes.each_ref().map(DMatrix::ncols), [3, 2]);
+    for (rows, parity) in classes.iter().zip([1.0, -1.0]) {
+        assert!((image(rows, robot()) - rows * parity).amax() < 1e-12);
+        let inside = &both * both.tr_mul(rows);
+        assert!((inside - rows).amax() < 1e-12);
+        assert_eq!(
+            parities(&rows.transpose(), robot()),
+            vec![parity; rows.ncols()]
+        );
+    }
+    assert!((image(&mixed, robot()).abs() - mixed.abs()).amax() > 1e-3);
+}

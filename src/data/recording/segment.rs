@@ -8,7 +8,7 @@ use nalgebra::DMatrix;
 use super::error::{Outcome, RecordingError, RecordingFault, unexpected};
 use super::preprocess::{differences, moving_average};
 use super::reader::Column;
-use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, LEG_JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
 
 const ACCELERATION_WINDOW_S: f64 = 0.02; // joint accelerations are averaged over it before motor inertia counts
 
@@ -298,25 +298,15 @@ impl Segment {
         torque_nm
     }
 
-    /// The mirror image at the plane `y = 0` of a robot that is symmetric: right and left legs exchange, y, roll and yaw
-    /// change sign, and so do the joints that turn against each other.
+    /// The mirror image at the plane `y = 0` of a robot that is symmetric, see [`Robot::mirrored`].
     pub fn mirrored(&self, robot: &Robot) -> Segment {
-        let other = |leg: usize| leg ^ 1;
-        let joint = |m: &DMatrix<f64>, i: usize| {
-            let from = LEG_JOINT_DIM * other(i / LEG_JOINT_DIM) + i % LEG_JOINT_DIM;
-            m.row(from) * robot.mirror_sign(i)
-        };
-        let body = |m: &DMatrix<f64>, first: usize, i: usize| {
-            let sign = if [1, 3, 5].contains(&i) { -1.0 } else { 1.0 };
-            m.row(first + i) * sign
-        };
         let feet = self.feet.iter();
-        let feet = feet.map(|feet| std::array::from_fn(|foot| feet[other(foot)]));
+        let feet = feet.map(|feet| std::array::from_fn(|foot| feet[foot ^ 1]));
         self.remade(self.time_s.clone(), feet.collect(), |m| {
-            let rows = (0..m.nrows()).map(|i| match m.nrows() {
-                BODY_DIM => body(m, 0, i),
-                _ if i < JOINT_DIM => joint(m, i),
-                _ => body(m, JOINT_DIM, i - JOINT_DIM),
+            let first = if m.nrows() == BODY_DIM { JOINT_DIM } else { 0 };
+            let rows = (0..m.nrows()).map(|i| {
+                let (from, sign) = robot.mirrored(first + i);
+                m.row(from - first) * sign
             });
             DMatrix::from_rows(&rows.collect::<Vec<_>>())
         })

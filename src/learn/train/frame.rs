@@ -110,7 +110,7 @@ impl Frame {
     /// How many of `latent_dim` coordinates predictions of whole jumps are judged by: of the whole body the first two, the
     /// centre of mass. Errors of rotation and legs there grow with the least difference at take-off.
     pub(super) fn judged_over_jumps(&self, latent_dim: usize) -> usize {
-        if self.legs.is_empty() && !self.body.iter().copied().any(is_lateral) {
+        if self.legs.is_empty() && !self.is_spatial() {
             latent_dim
         } else {
             TURN
@@ -125,6 +125,11 @@ impl Frame {
         } else {
             0
         }
+    }
+
+    /// Whether a momentum row changes sign in a mirror image.
+    pub(super) fn is_spatial(&self) -> bool {
+        self.body.iter().copied().any(is_lateral)
     }
 
     pub(super) fn dim(&self) -> usize {
@@ -143,6 +148,38 @@ impl Frame {
         order.sort_by(|&a, &b| inside.singular_values[b].total_cmp(&inside.singular_values[a]));
         &self.free * left.select_columns(&order[..count])
     }
+}
+
+/// The mirror image of state rows in columns, `18 x n`.
+fn image(rows: &DMatrix<f64>, robot: &Robot) -> DMatrix<f64> {
+    let from = |i: usize| robot.mirrored(i);
+    DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, k| {
+        let (from, sign) = from(i);
+        rows[(from, k)] * sign
+    })
+}
+
+/// A basis of the space of orthonormal columns, as far as a mirror leaves this space alone, of rows that it leaves alone and
+/// of rows that it turns around.
+pub(super) fn symmetry_classes(basis: &DMatrix<f64>, robot: &Robot) -> [DMatrix<f64>; 2] {
+    let eigen = basis.tr_mul(&image(basis, robot)).symmetric_eigen();
+    [1.0, -1.0].map(|parity| {
+        let own = (0..basis.ncols()).filter(|&k| (eigen.eigenvalues[k] > 0.0) == (parity > 0.0));
+        let rows = basis * (eigen.eigenvectors).select_columns(&own.collect::<Vec<_>>());
+        let mut pure = (&rows + image(&rows, robot) * parity) * 0.5;
+        for mut row in pure.column_iter_mut() {
+            row.normalize_mut();
+        }
+        pure
+    })
+}
+
+/// 1 for each row of an encoder that a mirror leaves alone, -1 for others.
+pub(super) fn parities(weights: &DMatrix<f64>, robot: &Robot) -> Vec<f64> {
+    let rows = weights.transpose();
+    let images = image(&rows, robot);
+    let each = rows.column_iter().zip(images.column_iter());
+    each.map(|(row, image)| row.dot(&image).signum()).collect()
 }
 
 /// Orthonormal basis of the span of `free` orthogonal to the projections of `rows` onto it.

@@ -15,6 +15,7 @@ use super::sparse::Regression;
 use super::weak_form::flight_samples;
 use crate::robot::{BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2};
 
+const Y: usize = BODY_X + 1;
 const HEIGHT: usize = 1; // the momentum row upwards
 const STANDING_DAMPING_PER_S: f64 = 70.0; // of feet that slip
 const STANDING_STIFFNESS_PER_S2: f64 = 400.0; // of the ground
@@ -192,8 +193,8 @@ impl Knowledge {
     /// what the ground carries of the legs' weight). `ddz3` depends on velocities, on force and moment, and on products
     /// of these with the height. The equations of the legs are affine, start from [`Standing`] and keep all terms. In
     /// flight `ddz1 = 0`, `ddz2 = -g`, `ddz3 = 0`, no term depends on force or moment, and the legs depend on their own
-    /// inputs only. Rows that change sign in a mirror image depend on the forces and moments that do so (`y` on its own
-    /// alone), and no row in the plane on any of these; no term depends on place or heading.
+    /// inputs only. Momentum rows that change sign in a mirror image depend on forces and moments (`y` on its own force
+    /// alone). No term depends on place or heading.
     pub(super) fn of_phases(
         training: &Dataset,
         features: &Features,
@@ -226,7 +227,7 @@ impl Knowledge {
                     knowledge.share_body(features, frame);
                 }
             }
-            knowledge.mirror(features, frame);
+            knowledge.push_sideways(features, frame);
             let inputs = (0..d).map(|k| (2 * d + k, k));
             for (variable, k) in inputs.chain((0..2).map(|k| (d + k, k))) {
                 if let Some(term) = features.variable_term(variable) {
@@ -279,25 +280,38 @@ impl Knowledge {
         }
     }
 
-    /// The rows that change sign in a mirror image, and what of them the others may depend on.
-    fn mirror(&mut self, features: &Features, frame: &Frame) {
-        let d = features.latent_dim;
-        let lateral = |row: usize| frame.body.get(row).copied().is_some_and(is_lateral);
+    /// The momentum rows that change sign in a mirror image: forces and moments, of `y` its own force.
+    fn push_sideways(&mut self, features: &Features, frame: &Frame) {
+        let inputs = 2 * features.latent_dim;
         for (k, &coordinate) in frame.body.iter().enumerate() {
-            if !lateral(k) {
-                self.forbid(k..k + 1, features, |variables| {
-                    variables.iter().any(|v| lateral(v % d))
-                });
+            if !is_lateral(coordinate) {
                 continue;
             }
+            let loads = match coordinate {
+                Y => k..k + 1,
+                _ => 0..frame.body.len(),
+            };
             self.forbid(k..k + 1, features, |variables| match *variables {
-                [v] if v >= 2 * d => {
-                    !lateral(v - 2 * d) || (coordinate == BODY_X + 1 && v != 2 * d + k)
-                }
+                [v] => v < inputs || !loads.contains(&(v - inputs)),
                 _ => true,
             });
             self.keep(k, features, &(0..0));
         }
+    }
+
+    /// Without the terms that a mirror image contradicts: each latent coordinate stays or changes sign in it (`parity` 1 or
+    /// -1), and so do the terms of its equation. Terms of one variable that are not affine are left.
+    pub(super) fn with_parity(&self, features: &Features, parity: &[f64]) -> Self {
+        let (mut allowed, d) = (self.clone(), features.latent_dim);
+        for (term, variables) in features.variables() {
+            let sign: f64 = variables.iter().map(|v| parity[v % d]).product();
+            let has_sign = features.affine[term] || variables.len() == 2;
+            for k in (0..d).filter(|&k| has_sign && parity[k] != sign) {
+                allowed.free[(term, k)] = false;
+                allowed.kept[(term, k)] = false;
+            }
+        }
+        allowed
     }
 
     /// The legs with feet on the ground, including a pair in the air while the other stands: its predictions of
