@@ -10,7 +10,7 @@ use super::options::Coordinates;
 use crate::model::complement;
 use crate::recording::stretches;
 use crate::robot::{
-    BODY_DIM, BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot,
+    BODY_X, BODY_Z, FOOT_DIM, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot,
     STATE_DIM, WrenchFrame,
 };
 
@@ -225,74 +225,103 @@ fn joint_of(leg: Leg, joint: usize) -> usize {
     LEG_JOINT_DIM * leg.index() + joint
 }
 
-/// The momentum rows of these body coordinates, as columns: `x + c_x^T q`, `pitch + c_t^T q` and so on over the joints `q`;
-/// with fewer than [`LEAST_WINDOWS`] of flight by [`loaded_row`]. In flight the centre of mass falls freely and the angular
-/// momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz + c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The regression of
-/// the body's accelerations on those of the joints (ridge) gives `c`, to first order in `q`. By symmetry a row in the plane
-/// has sums of left and right joints only, and one that changes sign in a mirror image differences.
+/// The momentum rows of these body coordinates, as columns: `x + c_x^T q`, `pitch + c_t^T q` and so on over the joints `q`.
+/// In flight the centre of mass falls freely and the angular momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz +
+/// c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The regression of the body's accelerations on those of the joints (ridge) gives
+/// `c`, to first order in `q`. With fewer than [`LEAST_WINDOWS`] of flight it is that of all samples, where forces and
+/// moments on the body change the momentum: `dd(b + c_b^T q) = B [F; M] + a`; of the body alone if these are in its axes. By
+/// symmetry a row in the plane has sums of left and right joints only, and one that changes sign in a mirror image
+/// differences: this is the regression over the samples and their mirror images.
 fn momentum_rows(training: &Dataset, coordinates: &[usize], robot: &Robot) -> DMatrix<f64> {
+    let mut rows = DMatrix::zeros(STATE_DIM, coordinates.len());
+    for (mut row, &coordinate) in rows.column_iter_mut().zip(coordinates) {
+        row[coordinate] = 1.0;
+    }
     let mut accelerations = Vec::new();
     for jump in &training.jumps {
         flight_accelerations(training, jump, &mut accelerations);
     }
-    let flies = accelerations.len() >= LEAST_WINDOWS && std::env::var("ROMC_LOADED").is_err();
+    let flies = accelerations.len() >= LEAST_WINDOWS;
+    if !flies && training.rule.wrench_frame() == WrenchFrame::Body {
+        return rows;
+    }
     let (samples, inputs) = match flies {
-        true => (DMatrix::from_columns(&accelerations), DMatrix::zeros(0, 0)),
+        true => (DMatrix::from_columns(&accelerations), None),
         false => loaded_samples(training),
     };
     let all: Vec<usize> = (0..JOINT_DIM).collect();
-    let mut rows = DMatrix::zeros(STATE_DIM, coordinates.len());
     for (mut row, &coordinate) in rows.column_iter_mut().zip(coordinates) {
-        row[coordinate] = 1.0;
         let parity = if is_lateral(coordinate) { -1.0 } else { 1.0 };
         let joints = DMatrix::from_columns(&joints_of_pairs(&all, robot, parity));
         let of_joints = joints.tr_mul(&samples);
-        let part = match flies {
-            true => flight_row(training, coordinate, &samples, &of_joints),
-            false => loaded_row(training, coordinate, (&samples, &inputs), &of_joints),
+        let loads = inputs.as_ref().map(|inputs| loads_on(coordinate, inputs));
+        let fall = match coordinate {
+            BODY_Z => GRAVITY_M_S2 * training.scaling.state[BODY_Z],
+            _ => 0.0,
         };
-        if let Some(part) = part {
+        let target = samples.row(coordinate).transpose().add_scalar(fall);
+        if let Some(part) = joint_weights(of_joints, loads, &target) {
             row -= &joints * part;
         }
     }
     rows
 }
 
-/// Weights of the joints' accelerations (`k x n`) in that of a body coordinate in flight; none where joints rest.
-fn flight_row(
-    training: &Dataset,
-    coordinate: usize,
-    samples: &DMatrix<f64>,
-    of_joints: &DMatrix<f64>,
+/// What changes the momentum of a body coordinate, in rows of mean square 1: forces and moments that a mirror changes as
+/// it does this coordinate, and in the plane a constant.
+fn loads_on(coordinate: usize, inputs: &DMatrix<f64>) -> DMatrix<f64> {
+    let lateral = is_lateral(coordinate);
+    let own = (JOINT_DIM..STATE_DIM).filter(|&load| is_lateral(load) == lateral);
+    let mut loads = inputs.select_rows(&own.collect::<Vec<_>>());
+    for mut load in loads.row_iter_mut() {
+        let rms = load.norm() / (load.len() as f64).sqrt();
+        load /= rms.max(f64::MIN_POSITIVE);
+    }
+    let constant = usize::from(!lateral);
+    let count = loads.nrows();
+    loads.resize_vertically(count + constant, 1.0)
+}
+
+/// Ridge regression of `target` on the accelerations of joints (`k x n`) and on loads: the weights of the joints. None where
+/// joints rest.
+fn joint_weights(
+    of_joints: DMatrix<f64>,
+    loads: Option<DMatrix<f64>>,
+    target: &DVector<f64>,
 ) -> Option<DVector<f64>> {
-    let n = samples.ncols() as f64;
-    let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
+    let ((k, n), mean_square) = (
+        of_joints.shape(),
+        of_joints.norm_squared() / of_joints.len() as f64,
+    );
     if mean_square <= 0.0 {
         return None;
     }
-    let (k, _) = of_joints.shape();
-    let gram =
-        of_joints * of_joints.transpose() / n + DMatrix::identity(k, k) * (RIDGE * mean_square);
+    let mut regressors = of_joints;
+    if let Some(loads) = loads {
+        regressors = regressors.resize_vertically(k + loads.nrows(), 0.0);
+        regressors.rows_mut(k, loads.nrows()).copy_from(&loads);
+    }
+    let ridge = DVector::from_fn(regressors.nrows(), |i, _| match i < k {
+        true => RIDGE * mean_square,
+        false => LOAD_RIDGE,
+    });
+    let gram = &regressors * regressors.transpose() / n as f64 + DMatrix::from_diagonal(&ridge);
     let factor = gram
         .cholesky()
         .expect("invariant: a Gram matrix plus a ridge");
-    let fall = match coordinate {
-        BODY_Z => GRAVITY_M_S2 * training.scaling.state[BODY_Z],
-        _ => 0.0,
-    };
-    let target = samples.row(coordinate).transpose().add_scalar(fall);
-    Some(factor.solve(&(of_joints * target / n)))
+    let weights = factor.solve(&(regressors * target / n as f64));
+    Some(weights.rows(0, k).into_owned())
 }
 
 /// Accelerations and inputs of all samples but those just after a touchdown, where a part of the force passes no joint.
-fn loaded_samples(training: &Dataset) -> (DMatrix<f64>, DMatrix<f64>) {
+fn loaded_samples(training: &Dataset) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
     let (mut accelerations, mut inputs) = (Vec::new(), Vec::new());
     for jump in &training.jumps {
         let mut touched_s = f64::NEG_INFINITY;
         for sample in 0..jump.samples() {
             let touches =
                 |foot: usize| jump.feet[sample][foot] && sample > 0 && !jump.feet[sample - 1][foot];
-            if (0..4).any(touches) {
+            if (0..FOOT_DIM).any(touches) {
                 touched_s = jump.time_s[sample];
             }
             if jump.time_s[sample] - touched_s >= SETTLING_S {
@@ -303,43 +332,8 @@ fn loaded_samples(training: &Dataset) -> (DMatrix<f64>, DMatrix<f64>) {
     }
     (
         DMatrix::from_columns(&accelerations),
-        DMatrix::from_columns(&inputs),
+        Some(DMatrix::from_columns(&inputs)),
     )
-}
-
-/// As [`flight_row`] over all samples of all phases, where forces and moments on the body change the momentum:
-/// `dd(b + c^T q) = B [F; M] + a`. By symmetry this is the regression over the samples and their mirror images. None if
-/// force and moment are in the body's axes.
-fn loaded_row(
-    training: &Dataset,
-    coordinate: usize,
-    (samples, inputs): (&DMatrix<f64>, &DMatrix<f64>),
-    of_joints: &DMatrix<f64>,
-) -> Option<DVector<f64>> {
-    if training.rule.wrench_frame() == WrenchFrame::Body {
-        return None;
-    }
-    let lateral = is_lateral(coordinate);
-    let (k, n) = of_joints.shape();
-    let loads = (JOINT_DIM..STATE_DIM).filter(|&load| is_lateral(load) == lateral);
-    let one = usize::from(!lateral);
-    let mut regressors = DMatrix::zeros(k + BODY_DIM / 2 + one, n);
-    regressors.rows_mut(0, k).copy_from(of_joints);
-    for (to, load) in (k..).zip(loads) {
-        let load = inputs.row(load);
-        let rms = load.norm() / (n as f64).sqrt();
-        (regressors.row_mut(to)).copy_from(&(load / rms.max(f64::MIN_POSITIVE)));
-    }
-    regressors.rows_mut(k + BODY_DIM / 2, one).fill(1.0);
-    let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
-    let ridge = RIDGE * mean_square;
-    let gram = &regressors * regressors.transpose() / n as f64;
-    let p = gram.nrows();
-    let ridge = DVector::from_fn(p, |i, _| if i < k { ridge } else { LOAD_RIDGE });
-    let factor = (gram + DMatrix::from_diagonal(&ridge)).cholesky()?;
-    let target = samples.row(coordinate).transpose();
-    let weights = factor.solve(&(regressors * target / n as f64));
-    Some(weights.rows(0, k).into_owned())
 }
 
 /// Appends the accelerations over every window in the flights of a jump, scaled units.
