@@ -131,11 +131,8 @@ impl Knowledge {
             return fitted;
         }
         let stacked = |of: fn(&(DMatrix<f64>, DMatrix<f64>)) -> &DMatrix<f64>| {
-            let rows: Vec<_> = samples
-                .iter()
-                .flat_map(|each| of(each).row_iter())
-                .collect();
-            DMatrix::from_rows(&rows)
+            let rows = samples.iter().flat_map(|each| of(each).row_iter());
+            DMatrix::from_rows(&rows.collect::<Vec<_>>())
         };
         let (theta, target) = (stacked(|(theta, _)| theta), stacked(|(_, target)| target));
         let (p, d) = self.known.shape();
@@ -151,24 +148,16 @@ impl Knowledge {
     /// The momentum columns become known, the same in all phases with feet on the ground: a constant upwards and of pitch,
     /// forces and moments. Contact is in these, so that one equation holds in every phase; in flight it is free fall.
     fn share_body(&mut self, features: &Features, frame: &Frame) {
-        let d = features.latent_dim;
-        let lateral = |k: usize| is_lateral(frame.body[k]);
+        let inputs = 2 * features.latent_dim;
         for (k, &coordinate) in frame.body.iter().enumerate() {
-            let is_force = (BODY_X..=BODY_Z).contains(&coordinate);
-            let loads = (0..frame.body.len()).filter(|&load| match is_force {
-                true => load == k,
-                false => lateral(load) == lateral(k),
-            });
-            let loads: Vec<usize> = loads.map(|load| 2 * d + load).collect();
-            let has_constant = coordinate != BODY_X && !lateral(k);
-            let is_arm = |variables: &[usize]| match *variables {
-                [HEIGHT, load] => !is_force && !lateral(k) && loads.contains(&load),
-                _ => false,
+            let load = |v: &usize| frame.body.get(v.wrapping_sub(inputs));
+            let suits = |v: &usize| {
+                let is_like = |&of: &usize| is_lateral(of) == is_lateral(coordinate);
+                *v == HEIGHT || load(v).is_some_and(is_like)
             };
             let terms = features.variables().filter(|(term, variables)| {
-                (has_constant && features.constant_term() == Some(*term))
-                    || matches!(variables[..], [load] if features.affine[*term] && loads.contains(&load))
-                    || is_arm(variables)
+                let is_own = k > 0 || variables[..] == [inputs];
+                self.free[(*term, k)] && variables.iter().all(suits) && is_own
             });
             self.shared.push(terms.map(|(term, _)| term).collect());
             self.free.column_mut(k).fill(false);
@@ -223,11 +212,11 @@ impl Knowledge {
                     .for_each(|one| knowledge.kept[(one, 1)] = true);
                 knowledge.turn(features, frame);
                 knowledge.stand(features, frame);
-                if equations == BodyEquations::AllPhases {
-                    knowledge.share_body(features, frame);
-                }
             }
             knowledge.push_sideways(features, frame);
+            if equations == BodyEquations::AllPhases && phase.feet != FeetRule::None {
+                knowledge.share_body(features, frame);
+            }
             let inputs = (0..d).map(|k| (2 * d + k, k));
             for (variable, k) in inputs.chain((0..2).map(|k| (d + k, k))) {
                 if let Some(term) = features.variable_term(variable) {

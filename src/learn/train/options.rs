@@ -215,11 +215,10 @@ impl TrainOptions {
     /// Whether mirror images count: by default those of models that contain y, roll or yaw as rows.
     pub(super) fn mirror_images(&self) -> MirrorImages {
         let spatial = self.coordinates() == Coordinates::Named && self.body().is_spatial();
-        let default = match spatial {
-            true => MirrorImages::Added,
-            false => MirrorImages::None,
-        };
-        self.encoder.mirror_images.unwrap_or(default)
+        match self.encoder.mirror_images {
+            None if spatial => MirrorImages::Added,
+            given => given.unwrap_or(MirrorImages::None),
+        }
     }
 
     pub fn input_rule(&self, robot: &'static Robot) -> InputRule {
