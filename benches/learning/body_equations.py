@@ -3,8 +3,8 @@
     cargo build --release && python3 benches/learning/body_equations.py
 
 Every row is a training on the jumps of a robot in `examples/recordings` and the errors of `romc simulate --verbose` along
-its test jumps, of the Go1 then along `go1-other`. The last rows of a set are baselines. About five minutes on two cores,
-most of it for d = 10, whose controller has no structured solver; needs Python alone.
+its test jumps, of the Go1 then along `go1-other`. The last rows are baselines. About seven minutes on two cores,
+most of it for d = 9 and 10, whose controllers have no structured solver; needs Python alone.
 """
 
 import argparse
@@ -24,6 +24,7 @@ ROWS = [
     (GO1, "d = 4", "--latent-dim 4"),
     (GO1, "d = 6", "--latent-dim 6"),
     (GO1, "d = 7", "--latent-dim 7"),
+    (GO1, "d = 9", "--latent-dim 9"),
     (GO1, "d = 6, body alone", "--latent-dim 6 --body all"),
     (GO1, "d = 10, body and feet", "--latent-dim 10 --body all"),
     (GO2, "Go2, d = 5", "--latent-dim 5"),
