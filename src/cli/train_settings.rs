@@ -73,6 +73,11 @@ impl TrainSettings {
         set(&mut encoder.least_input_share, self.mask_input_share);
         set(&mut encoder.coordinates, self.coordinates);
         encoder.rotate &= !self.no_rotation;
+        encoder.mirror_images = self.mirror_images;
+        if let Some(body) = &self.body {
+            options.set_body(body.clone());
+        }
+        set(&mut options.regression.body_equations, self.body_equations);
         set(&mut options.regression.slack, self.slack);
         set(&mut options.regression.refinements, self.refinements);
         let growth = self.growth.map(|rate| Some(f64::from(rate)));
@@ -231,6 +236,7 @@ impl TrainSettings {
         let given = |names, when: bool| self.first(names).filter(|_| when);
         let has_weight = (self.bptt_weight).is_some_and(|weight| f64::from(weight) != 0.0);
         let is_named = self.coordinates == Some(Coordinates::Named);
+        let is_free = self.coordinates == Some(Coordinates::Free);
         let is_published = self.paper && method == Method::Joint;
         let activation = self.activation.unwrap_or(Activation::Elu);
         let of_choice = "slack refinements growth no-rotation";
@@ -259,6 +265,11 @@ impl TrainSettings {
                 given("coordinates", is_named && is_published),
                 "named with the published joint training",
                 "free, or a training without `--paper`",
+            ),
+            (
+                given("body body-equations", !is_linear || self.paper || is_free),
+                "set with free coordinates",
+                "named coordinates, which have rows of the body",
             ),
             (
                 given(of_choice, self.paper),

@@ -209,6 +209,20 @@ impl Robot {
         if along < 0.0 { -1.0 } else { 1.0 }
     }
 
+    /// Where a state coordinate, or the input along it, of the mirror image at the plane `y = 0` comes from: that
+    /// coordinate, and the sign. Right and left legs exchange; y, roll and yaw change sign.
+    pub fn mirrored(&self, coordinate: usize) -> (usize, f64) {
+        match coordinate.checked_sub(JOINT_DIM) {
+            None => {
+                let (leg, joint) = (coordinate / LEG_JOINT_DIM, coordinate % LEG_JOINT_DIM);
+                let other = LEG_JOINT_DIM * (leg ^ 1) + joint;
+                (other, self.mirror_sign(coordinate))
+            }
+            Some(1 | 3 | 5) => (coordinate, -1.0),
+            Some(_) => (coordinate, 1.0),
+        }
+    }
+
     /// Origin of a leg's hip frame in the body frame, in m.
     pub fn hip_position(&self, leg: Leg) -> Vector3<f64> {
         Vector3::from(self.hip_position_m[leg.index()])

@@ -24,13 +24,13 @@ static WHOLE_BODY: LazyLock<ReducedModel> = LazyLock::new(|| {
     trained.expect("trains").model
 });
 
-fn weights(model: &ReducedModel) -> DMatrix<f64> {
+pub(super) fn weights(model: &ReducedModel) -> DMatrix<f64> {
     let encoder = model.encoder_map().expect("trained");
     encoder.as_affine().expect("linear").weights().clone()
 }
 
 /// Predictions over 0.1 s, one fit per coordinate.
-fn fits(model: &ReducedModel, recordings: &[Recording]) -> Vec<Fit> {
+pub(super) fn fits(model: &ReducedModel, recordings: &[Recording]) -> Vec<Fit> {
     let compiled = CompiledModel::new(model).expect("compiles");
     let mut sums = CoordinateSums::new(model).expect("has a decoder");
     for segment in recordings.iter().flat_map(|recording| &recording.segments) {
@@ -50,7 +50,7 @@ fn r2(fits: &[Fit], coordinate: usize) -> f64 {
 }
 
 /// The model with a coefficient of its first phase negated.
-fn negated(model: &ReducedModel, term: &str, latent: usize) -> ReducedModel {
+pub(super) fn negated(model: &ReducedModel, term: &str, latent: usize) -> ReducedModel {
     let mut file: serde_json::Value =
         serde_json::from_str(&artifact::to_text(model)).expect("a model file");
     let terms = model.library().terms();

@@ -62,3 +62,19 @@ fn equations_of_a_stance_need_their_terms() {
     let row = LegRow { body: 0, ..row };
     assert!(Standing::of(row, 4, &features(&speeds)).is_some());
 }
+
+#[test]
+fn terms_that_a_mirror_contradicts_are_not_free() {
+    let terms: Vec<String> = ["1", "z1", "z2", "z1*z2", "z2^2"]
+        .map(str::to_owned)
+        .to_vec();
+    let features = Features::new(&Library::from_terms(2, &terms).expect("a library"));
+    let knowledge = Knowledge::nothing(5, 2).with_parity(&features, &[1.0, -1.0]);
+    let free = |k: usize| -> Vec<&str> {
+        let free = (0..5).filter(|&term| knowledge.free[(term, k)]);
+        free.map(|term| &terms[term][..]).collect()
+    };
+    // Of a square alone it is not known which of its variable's powers it has.
+    assert_eq!(free(0), ["1", "z1", "z2^2"]);
+    assert_eq!(free(1), ["z2", "z1*z2", "z2^2"]);
+}

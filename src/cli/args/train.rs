@@ -14,7 +14,7 @@ use crate::recording::preprocess::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
 use crate::robot::{STATE_DIM, WrenchFrame};
 use crate::study::Shard;
-use crate::train::{Coordinates, Integrator, Method, Split};
+use crate::train::{BodyEquations, BodyRows, Coordinates, Integrator, Method, MirrorImages, Split};
 
 /// Widths of hidden layers in their order: `32,16`, or `linear` for none; a list of numbers in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -217,6 +217,18 @@ pub(crate) struct TrainSettings {
     /// free with --paper or hidden layers]
     #[arg(long, value_name = "KIND")]
     pub coordinates: Option<Coordinates>,
+    /// Body coordinates whose momentum is a coordinate of its own, by flights or else by forces: a list with x and z of x,
+    /// y, z, roll, pitch and yaw, or all. With y, roll or yaw left and right may differ [default: x,z; from 5 coordinates
+    /// on x,z,pitch]
+    #[arg(long, value_name = "LIST")]
+    pub body: Option<BodyRows>,
+    /// Whether equations of these coordinates are one for all phases [default: per-phase]
+    #[arg(long, value_enum)]
+    pub body_equations: Option<BodyEquations>,
+    /// Whether mirror images of the training recordings count as recordings, legs exchanged [default: added with y, roll
+    /// or yaw in --body, otherwise none]
+    #[arg(long, value_enum)]
+    pub mirror_images: Option<MirrorImages>,
     /// Keep the latent basis as trained, without varimax rotation
     #[arg(long)]
     pub no_rotation: bool,

@@ -297,6 +297,20 @@ impl Segment {
         torque_nm
     }
 
+    /// The mirror image at the plane `y = 0` of a robot that is symmetric, see [`Robot::mirrored`].
+    pub fn mirrored(&self, robot: &Robot) -> Segment {
+        let feet = self.feet.iter();
+        let feet = feet.map(|feet| std::array::from_fn(|foot| feet[foot ^ 1]));
+        self.remade(self.time_s.clone(), feet.collect(), |m| {
+            let first = if m.nrows() == BODY_DIM { JOINT_DIM } else { 0 };
+            let rows = (0..m.nrows()).map(|i| {
+                let (from, sign) = robot.mirrored(first + i);
+                m.row(from - first) * sign
+            });
+            DMatrix::from_rows(&rows.collect::<Vec<_>>())
+        })
+    }
+
     /// The samples of a range as a segment of their own.
     pub fn slice(&self, range: Range<usize>) -> Segment {
         let (time_s, feet) = (&self.time_s[range.clone()], &self.feet[range.clone()]);

@@ -39,7 +39,7 @@ pub struct Assessment<'a> {
 #[derive(Debug, Clone)]
 pub struct Horizon {
     pub name: String,
-    /// The model, then baselines; errors in SI units. The rigid body has errors of body x, z and pitch alone.
+    /// The model, then baselines; errors in SI units. The rigid body has errors of the body alone.
     pub predictors: Vec<(&'static str, CoordinateSums)>,
 }
 

@@ -7,7 +7,7 @@ use super::coordinates::coasted;
 use super::*;
 use crate::model::JumpPart;
 use crate::recording::{CHATTER_SAMPLES, PhaseRule, Stance, between};
-use crate::robot::{GRAVITY_M_S2, InputRule, WrenchFrame};
+use crate::robot::{BODY_DIM, GRAVITY_M_S2, InputRule, WrenchFrame};
 use crate::sim::{restart_windows, rollout_over};
 
 /// Times between restarts, s.
@@ -156,13 +156,20 @@ impl MeanJump {
     }
 }
 
-/// State rows of the rigid body: x, z and pitch.
-const BODY: [usize; 3] = [BODY_X, BODY_Z, JOINT_DIM + 4];
+/// State rows of the rigid body.
+const BODY: [usize; BODY_DIM] = [
+    BODY_X,
+    BODY_X + 1,
+    BODY_Z,
+    BODY_X + 3,
+    BODY_X + 4,
+    BODY_X + 5,
+];
 
-/// `ddx = F_x / m`, `ddz = F_z / m - g` and `ddpitch = M_y / I`, with `1 / m` and `1 / I` by least squares of the recorded
-/// accelerations.
+/// `ddx = F_x / m` and likewise `y`, `ddz = F_z / m - g`, `ddpitch = M_y / I_y` and likewise roll and yaw, with `1 / m` and
+/// `1 / I` by least squares of the recorded accelerations.
 struct RigidBody {
-    accelerations: Vec<DMatrix<f64>>, // of every segment, 3 x n
+    accelerations: Vec<DMatrix<f64>>, // of every segment, 6 x n
 }
 
 impl RigidBody {
@@ -171,14 +178,15 @@ impl RigidBody {
         let rule = model.input_rule()?;
         let rule = InputRule::new(rule.robot(), rule.actuators().cloned(), WrenchFrame::Ground);
         let mut loads = Vec::new();
-        let mut sums = [[0.0; 2]; 2]; // load times acceleration and load squared; of mass and of inertia
+        // Load times acceleration and load squared; of the mass, then of the inertias.
+        let mut sums = [[0.0; 2]; 4];
+        let inertia = |i: usize| i.saturating_sub(2);
         for segment in segments {
-            let input = segment.input(&rule)?;
-            let load = input.select_rows(&[JOINT_DIM, JOINT_DIM + 2, JOINT_DIM + 4]);
+            let load = segment.input(&rule)?.rows(JOINT_DIM, BODY_DIM).into_owned();
             for (sample, load) in load.column_iter().enumerate() {
                 for (i, row) in BODY.into_iter().enumerate() {
                     let fall = if row == BODY_Z { GRAVITY_M_S2 } else { 0.0 };
-                    let of = &mut sums[usize::from(i == 2)];
+                    let of = &mut sums[inertia(i)];
                     of[0] += load[i] * (segment.ddx[(row, sample)] + fall);
                     of[1] += load[i] * load[i];
                 }
@@ -188,11 +196,12 @@ impl RigidBody {
         if sums.iter().any(|of| of[1] <= 0.0) {
             return Ok(None);
         }
-        let [by_mass, by_inertia] = sums.map(|of| of[0] / of[1]);
+        let by = sums.map(|of| of[0] / of[1]);
         let accelerations = loads.into_iter().map(|mut load| {
-            load.rows_mut(0, 2).scale_mut(by_mass);
-            load.row_mut(1).add_scalar_mut(-GRAVITY_M_S2);
-            load.row_mut(2).scale_mut(by_inertia);
+            for (i, mut row) in load.row_iter_mut().enumerate() {
+                row *= by[inertia(i)];
+            }
+            load.row_mut(2).add_scalar_mut(-GRAVITY_M_S2);
             load
         });
         let accelerations = accelerations.collect();
@@ -200,7 +209,7 @@ impl RigidBody {
     }
 
     /// Where a body is after the samples of a range, from its state at the first.
-    fn moved(&self, segment: &Segment, place: usize, range: Range<usize>) -> [f64; 3] {
+    fn moved(&self, segment: &Segment, place: usize, range: Range<usize>) -> [f64; BODY_DIM] {
         let accelerations = &self.accelerations[place];
         std::array::from_fn(|i| {
             let state = |m: &DMatrix<f64>| m[(BODY[i], range.start)];

@@ -85,6 +85,7 @@ pub(super) struct Jump {
     pub feet: Vec<ContactFlags>,
     pub phase: Vec<usize>,
     pub spans: Vec<(usize, Range<usize>)>, // maximal runs of one phase
+    pub is_image: bool,                    // a mirror image of a recorded jump
     /// Samples whose recorded torques are no torques of the robot, see [`is_plausible`].
     pub implausible: Vec<usize>,
 }
@@ -127,6 +128,19 @@ impl Dataset {
             dataset.jumps.push(dataset.jump(segment)?);
         }
         Ok(dataset)
+    }
+
+    /// Adds the mirror images of recordings, after all other jumps.
+    pub(super) fn add_mirror_images(&mut self, recordings: &[Recording]) -> Result<(), TrainError> {
+        let robot = self.rule.robot();
+        for segment in recordings.iter().flat_map(|recording| &recording.segments) {
+            let image = self.jump(&segment.mirrored(robot))?;
+            self.jumps.push(Jump {
+                is_image: true,
+                ..image
+            });
+        }
+        Ok(())
     }
 
     /// One phase or all side by side, `18 x samples`; likewise the inputs.
@@ -246,6 +260,7 @@ impl Dataset {
             feet: segment.feet.clone(),
             phase,
             spans,
+            is_image: false,
             implausible: (0..n)
                 .filter(|&sample| !is_plausible(rule.robot(), &segment.torque(sample)))
                 .collect(),

@@ -35,7 +35,7 @@ pub enum TrainError {
         needed: &'static str,
     },
     #[error(
-        "latent dimension {requested}, expected 1 to {active} (the rows that an encoder can have of the coordinates that move or are actuated; `--coordinates free` and `--mask-std 0` allow more)"
+        "latent dimension {requested}, expected 1 to {active} (the rows that an encoder can have of the coordinates that move or are actuated; `--body all`, `--coordinates free` and `--mask-std 0` allow more)"
     )]
     LatentDim { requested: usize, active: usize },
     #[error("{option} is {found}, expected {expected}")]

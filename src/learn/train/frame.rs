@@ -4,28 +4,25 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::body::{BodyRows, PITCH, is_lateral};
 use super::dataset::{Dataset, Jump, centred, mean};
 use super::latent::input_projection;
 use super::options::Coordinates;
 use crate::model::complement;
 use crate::recording::stretches;
 use crate::robot::{
-    BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot, STATE_DIM,
+    BODY_X, BODY_Z, FOOT_DIM, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot,
+    STATE_DIM, WrenchFrame,
 };
 
-const PITCH: usize = JOINT_DIM + 4;
-/// Body coordinates of the momentum rows: the centre of mass forwards and upwards, and the rotation about it.
-const MOMENTUM: [usize; 3] = [BODY_X, BODY_Z, PITCH];
-pub(super) const TURN: usize = 2;
-/// Latent coordinates from which on the rotation about the centre of mass is a row. With fewer, torques of the legs are
-/// lost when there is one.
-const TURNING_DIM: usize = 5;
-/// Latent coordinates from which on the rows are those of the whole body in its plane: three of momentum, four of legs.
-pub(super) const WHOLE_BODY_DIM: usize = 7;
+pub(super) const TURN: usize = 2; // the row of pitch, where there is one
+/// Rows of the legs: feet forwards and upwards, of the front pair and of the rear pair.
+const LEG_ROWS: usize = 4;
 const WINDOW_S: f64 = 0.05; // over which accelerations in flight are averaged
 const TRIM: usize = 4; // samples left out at both ends of a flight, where feet still slip or already touch
 const LEAST_WINDOWS: usize = 50; // averaged accelerations in flight that identify the centre of mass
 const RIDGE: f64 = 1e-2; // relative to the mean square of all joints' accelerations
+const LOAD_RIDGE: f64 = 1e-5; // on forces and moments, relative to the mean square of each
 
 const SETTLING_S: f64 = 0.05; // after a touchdown, in which feet still slip
 const LEAST_STANDING: usize = 100; // samples on standing feet that identify their rows
@@ -40,8 +37,8 @@ const PAIRS: [[Leg; 2]; 2] = [
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
     pub(super) held: DMatrix<f64>, // rows of every encoder, as columns, 18 x h: momentum, then legs
-    pub(super) momentum: usize, // how many of them are of the momentum, in the order of `MOMENTUM`
-    pub(super) legs: Vec<LegRow>, // of the others
+    pub(super) body: Vec<usize>,   // body coordinates of the first of them, those of the momentum
+    pub(super) legs: Vec<LegRow>,  // of the others
     pub(super) free: DMatrix<f64>, // orthonormal directions that the other rows combine, 18 x k
 }
 
@@ -58,49 +55,56 @@ impl Frame {
     pub(super) fn plain(active: &[usize]) -> Self {
         Self {
             held: DMatrix::zeros(STATE_DIM, 0),
-            momentum: 0,
+            body: Vec::new(),
             legs: Vec::new(),
             free: DMatrix::identity(STATE_DIM, STATE_DIM).select_columns(active),
         }
     }
 
-    /// With [`Coordinates::Named`] and two or more latent coordinates, the first two rows are the centre of mass. With
-    /// five or more the third is the rotation about it, with seven or more the next four are foot positions relative to
-    /// it. The others combine mirror-symmetric sums of `active` coordinates: neither `y`, roll and yaw, nor left and
-    /// right; nor pitch where a row contains it.
+    /// With [`Coordinates::Named`] the first rows are the momentum of the coordinates in `body`. With pitch among them and
+    /// four or more rows beside, the next four are foot positions relative to the centre of mass. The others combine
+    /// `active` coordinates. In the plane these are mirror-symmetric sums of joints, and pitch where it has no row. With
+    /// a row that changes sign in a mirror image also differences of left and right, and all of the body without a row.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],
         latent_dim: usize,
-        coordinates: Coordinates,
+        (coordinates, body): (Coordinates, &BodyRows),
         robot: &Robot,
     ) -> Self {
         if coordinates == Coordinates::Free {
             return Self::plain(active);
         }
-        let (body, count): (&[usize], usize) = match latent_dim {
-            0 | 1 => (&[BODY_X, BODY_Z, PITCH], 0),
-            2..TURNING_DIM => (&[PITCH], 2),
-            _ => (&[], MOMENTUM.len()),
-        };
-        let momentum = momentum_rows(training, count, robot);
-        let joints = mirrored_joints(active, robot);
+        let spatial = body.is_spatial();
+        let rows = body.coordinates().to_vec();
+        let momentum = momentum_rows(training, &rows, robot);
         let mut held: Vec<DVector<f64>> =
             momentum.column_iter().map(|row| row.into_owned()).collect();
         let mut legs = Vec::new();
-        if latent_dim >= WHOLE_BODY_DIM {
+        if has_leg_rows(body, latent_dim) {
             for (row, leg) in leg_rows(training, &momentum, robot) {
                 held.push(row);
                 legs.push(leg);
             }
         }
-        let single = body.iter().filter(|i| active.contains(i)).map(|&i| unit(i));
-        let free: Vec<_> = single.chain(joints).collect();
+        let others: &[usize] = match (rows.is_empty(), spatial) {
+            (true, _) => &[BODY_X, BODY_Z, PITCH],
+            (false, false) => &[PITCH],
+            (false, true) => &[PITCH, BODY_X + 1, BODY_X + 3, BODY_X + 5],
+        };
+        let others = others
+            .iter()
+            .filter(|i| !rows.contains(i) && active.contains(i));
+        let mut free: Vec<_> = others.map(|&i| unit(i)).collect();
+        free.extend(joints_of_pairs(active, robot, 1.0));
+        if spatial {
+            free.extend(joints_of_pairs(active, robot, -1.0));
+        }
         let free = DMatrix::from_fn(STATE_DIM, free.len(), |row, k| free[k][row]);
         Self {
-            free: without(free, &held[count..]),
+            free: without(free, &held[rows.len()..]),
             held: DMatrix::from_fn(STATE_DIM, held.len(), |row, k| held[k][row]),
-            momentum: count,
+            body: rows,
             legs,
         }
     }
@@ -108,7 +112,7 @@ impl Frame {
     /// How many of `latent_dim` coordinates predictions of whole jumps are judged by: of the whole body the first two, the
     /// centre of mass. Errors of rotation and legs there grow with the least difference at take-off.
     pub(super) fn judged_over_jumps(&self, latent_dim: usize) -> usize {
-        if self.legs.is_empty() {
+        if self.legs.is_empty() && !self.is_spatial() {
             latent_dim
         } else {
             TURN
@@ -118,11 +122,16 @@ impl Frame {
     /// How many momentum rows have their own equations for deviations from the mean jump: all, if the rotation is one.
     /// Without it their equations miss what the pitch does, and regressions find some of that.
     pub(super) fn known_in_deviations(&self) -> usize {
-        if self.momentum > TURN {
-            self.momentum
+        if self.body.contains(&PITCH) {
+            self.body.len()
         } else {
             0
         }
+    }
+
+    /// Whether a momentum row changes sign in a mirror image.
+    pub(super) fn is_spatial(&self) -> bool {
+        self.body.iter().copied().any(is_lateral)
     }
 
     pub(super) fn dim(&self) -> usize {
@@ -143,6 +152,38 @@ impl Frame {
     }
 }
 
+/// The mirror image of state rows in columns, `18 x n`.
+fn image(rows: &DMatrix<f64>, robot: &Robot) -> DMatrix<f64> {
+    let from = |i: usize| robot.mirrored(i);
+    DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, k| {
+        let (from, sign) = from(i);
+        rows[(from, k)] * sign
+    })
+}
+
+/// A basis of the space of orthonormal columns, as far as a mirror leaves this space alone, of rows that it leaves alone and
+/// of rows that it turns around.
+pub(super) fn symmetry_classes(basis: &DMatrix<f64>, robot: &Robot) -> [DMatrix<f64>; 2] {
+    let eigen = basis.tr_mul(&image(basis, robot)).symmetric_eigen();
+    [1.0, -1.0].map(|parity| {
+        let own = (0..basis.ncols()).filter(|&k| (eigen.eigenvalues[k] > 0.0) == (parity > 0.0));
+        let rows = basis * (eigen.eigenvectors).select_columns(&own.collect::<Vec<_>>());
+        let mut pure = (&rows + image(&rows, robot) * parity) * 0.5;
+        for mut row in pure.column_iter_mut() {
+            row.normalize_mut();
+        }
+        pure
+    })
+}
+
+/// 1 for each row of an encoder that a mirror leaves alone, -1 for others.
+pub(super) fn parities(weights: &DMatrix<f64>, robot: &Robot) -> Vec<f64> {
+    let rows = weights.transpose();
+    let images = image(&rows, robot);
+    let each = rows.column_iter().zip(images.column_iter());
+    each.map(|(row, image)| row.dot(&image).signum()).collect()
+}
+
 /// Orthonormal basis of the span of `free` orthogonal to the projections of `rows` onto it.
 fn without(free: DMatrix<f64>, rows: &[DVector<f64>]) -> DMatrix<f64> {
     if rows.is_empty() || free.ncols() == 0 {
@@ -157,8 +198,14 @@ fn without(free: DMatrix<f64>, rows: &[DVector<f64>]) -> DMatrix<f64> {
         .select_columns(&outside.collect::<Vec<_>>())
 }
 
-/// Directions of left and right joints that a mirror leaves alone, of the pairs with a joint among `active`.
-fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
+/// Whether the rows of the legs are among those that are held, as far as the recordings identify them.
+pub(super) fn has_leg_rows(body: &BodyRows, latent_dim: usize) -> bool {
+    body.has_pitch() && latent_dim >= body.coordinates().len() + LEG_ROWS
+}
+
+/// Orthonormal directions of the pairs of a left and a right joint with one among `active`: with `parity` 1 those that a
+/// mirror leaves alone, with -1 those that it turns around.
+fn joints_of_pairs(active: &[usize], robot: &Robot, parity: f64) -> Vec<DVector<f64>> {
     let joints = PAIRS
         .into_iter()
         .flat_map(|legs| (0..LEG_JOINT_DIM).map(move |joint| (legs, joint)));
@@ -166,59 +213,129 @@ fn mirrored_joints(active: &[usize], robot: &Robot) -> Vec<DVector<f64>> {
         legs.iter()
             .any(|&leg| active.contains(&joint_of(leg, joint)))
     };
-    let direction = |(legs, joint)| mirrored(legs, joint, robot) * std::f64::consts::SQRT_2;
+    let direction = |(legs, joint)| mirrored(legs, joint, robot, parity) * std::f64::consts::SQRT_2;
     joints.filter(is_active).map(direction).collect()
 }
 
-/// The mean of a joint of two legs that mirror each other.
-fn mirrored([right, left]: [Leg; 2], joint: usize, robot: &Robot) -> DVector<f64> {
+/// The mean (`parity` 1) of a joint of two legs that mirror each other, or half their difference (-1).
+fn mirrored([right, left]: [Leg; 2], joint: usize, robot: &Robot, parity: f64) -> DVector<f64> {
     let [right, left] = [joint_of(right, joint), joint_of(left, joint)];
-    (unit(right) + unit(left) * robot.mirror_sign(left)) * 0.5
+    (unit(right) + unit(left) * (parity * robot.mirror_sign(left))) * 0.5
 }
 
 fn joint_of(leg: Leg, joint: usize) -> usize {
     LEG_JOINT_DIM * leg.index() + joint
 }
 
-/// The first `count` momentum rows, as columns, `18 x count`: `x + c_x^T q`, `z + c_z^T q` and `pitch + c_t^T q` over
-/// the joints `q`, of the body alone where the recordings have no flight. In flight the centre of mass falls freely and
-/// the angular momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz + c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The
-/// regression of the body's accelerations on those of the joints (mirrored, ridge) gives `c`, to first order in `q`.
-fn momentum_rows(training: &Dataset, count: usize, robot: &Robot) -> DMatrix<f64> {
-    let all: Vec<usize> = (0..JOINT_DIM).collect();
-    let joints = DMatrix::from_columns(&mirrored_joints(&all, robot));
-    let mut body = DMatrix::from_fn(STATE_DIM, count, |row, k| {
-        f64::from(u8::from(row == MOMENTUM[k]))
-    });
+/// The momentum rows of these body coordinates, as columns: `x + c_x^T q`, `pitch + c_t^T q` and so on over the joints `q`.
+/// In flight the centre of mass falls freely and the angular momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz +
+/// c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The regression of the body's accelerations on those of the joints (ridge) gives
+/// `c`, to first order in `q`. With fewer than [`LEAST_WINDOWS`] of flight it is that of all samples, where forces and
+/// moments on the body change the momentum: `dd(b + c_b^T q) = B [F; M] + a`; of the body alone if these are in its axes. By
+/// symmetry a row in the plane has sums of left and right joints only, and one that changes sign in a mirror image
+/// differences: this is the regression over the samples and their mirror images.
+fn momentum_rows(training: &Dataset, coordinates: &[usize], robot: &Robot) -> DMatrix<f64> {
+    let mut rows = DMatrix::zeros(STATE_DIM, coordinates.len());
+    for (mut row, &coordinate) in rows.column_iter_mut().zip(coordinates) {
+        row[coordinate] = 1.0;
+    }
     let mut accelerations = Vec::new();
     for jump in &training.jumps {
         flight_accelerations(training, jump, &mut accelerations);
     }
-    if accelerations.len() < LEAST_WINDOWS {
-        return body;
+    let flies = accelerations.len() >= LEAST_WINDOWS;
+    if !flies && training.rule.wrench_frame() == WrenchFrame::Body {
+        return rows;
     }
-    let samples = DMatrix::from_columns(&accelerations);
-    let (of_joints, n) = (joints.tr_mul(&samples), samples.ncols() as f64);
-    let mean_square = of_joints.norm_squared() / of_joints.len() as f64;
+    let (samples, inputs) = match flies {
+        true => (DMatrix::from_columns(&accelerations), None),
+        false => loaded_samples(training),
+    };
+    let all: Vec<usize> = (0..JOINT_DIM).collect();
+    for (mut row, &coordinate) in rows.column_iter_mut().zip(coordinates) {
+        let parity = if is_lateral(coordinate) { -1.0 } else { 1.0 };
+        let joints = DMatrix::from_columns(&joints_of_pairs(&all, robot, parity));
+        let of_joints = joints.tr_mul(&samples);
+        let loads = inputs.as_ref().map(|inputs| loads_on(coordinate, inputs));
+        let fall = match coordinate {
+            BODY_Z => GRAVITY_M_S2 * training.scaling.state[BODY_Z],
+            _ => 0.0,
+        };
+        let target = samples.row(coordinate).transpose().add_scalar(fall);
+        if let Some(part) = joint_weights(of_joints, loads, &target) {
+            row -= &joints * part;
+        }
+    }
+    rows
+}
+
+/// What changes the momentum of a body coordinate, in rows of mean square 1: forces and moments that a mirror changes as
+/// it does this coordinate, and in the plane a constant.
+fn loads_on(coordinate: usize, inputs: &DMatrix<f64>) -> DMatrix<f64> {
+    let lateral = is_lateral(coordinate);
+    let own = (JOINT_DIM..STATE_DIM).filter(|&load| is_lateral(load) == lateral);
+    let mut loads = inputs.select_rows(&own.collect::<Vec<_>>());
+    for mut load in loads.row_iter_mut() {
+        let rms = load.norm() / (load.len() as f64).sqrt();
+        load /= rms.max(f64::MIN_POSITIVE);
+    }
+    let constant = usize::from(!lateral);
+    let count = loads.nrows();
+    loads.resize_vertically(count + constant, 1.0)
+}
+
+/// Ridge regression of `target` on the accelerations of joints (`k x n`) and on loads: the weights of the joints. None where
+/// joints rest.
+fn joint_weights(
+    of_joints: DMatrix<f64>,
+    loads: Option<DMatrix<f64>>,
+    target: &DVector<f64>,
+) -> Option<DVector<f64>> {
+    let ((k, n), mean_square) = (
+        of_joints.shape(),
+        of_joints.norm_squared() / of_joints.len() as f64,
+    );
     if mean_square <= 0.0 {
-        return body;
+        return None;
     }
-    let gram = &of_joints * of_joints.transpose() / n
-        + DMatrix::identity(joints.ncols(), joints.ncols()) * (RIDGE * mean_square);
+    let mut regressors = of_joints;
+    if let Some(loads) = loads {
+        regressors = regressors.resize_vertically(k + loads.nrows(), 0.0);
+        regressors.rows_mut(k, loads.nrows()).copy_from(&loads);
+    }
+    let ridge = DVector::from_fn(regressors.nrows(), |i, _| match i < k {
+        true => RIDGE * mean_square,
+        false => LOAD_RIDGE,
+    });
+    let gram = &regressors * regressors.transpose() / n as f64 + DMatrix::from_diagonal(&ridge);
     let factor = gram
         .cholesky()
         .expect("invariant: a Gram matrix plus a ridge");
-    for (mut column, row) in body.column_iter_mut().zip(MOMENTUM) {
-        let fall = if row == BODY_Z {
-            GRAVITY_M_S2 * training.scaling.state[BODY_Z]
-        } else {
-            0.0
-        };
-        let target = samples.row(row).transpose().add_scalar(fall);
-        let part = factor.solve(&(&of_joints * target / n));
-        column -= &joints * part;
+    let weights = factor.solve(&(regressors * target / n as f64));
+    Some(weights.rows(0, k).into_owned())
+}
+
+/// Accelerations and inputs of all samples but those just after a touchdown, where a part of the force passes no joint.
+fn loaded_samples(training: &Dataset) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
+    let (mut accelerations, mut inputs) = (Vec::new(), Vec::new());
+    for jump in &training.jumps {
+        let mut touched_s = f64::NEG_INFINITY;
+        for sample in 0..jump.samples() {
+            let touches =
+                |foot: usize| jump.feet[sample][foot] && sample > 0 && !jump.feet[sample - 1][foot];
+            if (0..FOOT_DIM).any(touches) {
+                touched_s = jump.time_s[sample];
+            }
+            if jump.time_s[sample] - touched_s >= SETTLING_S {
+                accelerations.push(jump.ddx.column(sample));
+                inputs.push(jump.u.column(sample));
+            }
+        }
     }
-    body
+    (
+        DMatrix::from_columns(&accelerations),
+        Some(DMatrix::from_columns(&inputs)),
+    )
 }
 
 /// Appends the accelerations over every window in the flights of a jump, scaled units.
@@ -254,14 +371,14 @@ fn leg_rows(
 ) -> Vec<(DVector<f64>, LegRow)> {
     let mut rows = Vec::new();
     for legs in PAIRS {
-        let [_, flexion, knee] = std::array::from_fn(|joint| mirrored(legs, joint, robot));
+        let [_, flexion, knee] = std::array::from_fn(|joint| mirrored(legs, joint, robot, 1.0));
         let stances = stances(training, legs);
         if stances.iter().map(|(_, range)| range.len()).sum::<usize>() < LEAST_STANDING {
             return Vec::new();
         }
         let moving = DMatrix::from_columns(&[unit(PITCH), flexion.clone(), knee.clone()]);
         let deviations = deviations(training, &stances);
-        for (body, &row) in MOMENTUM[..2].iter().enumerate() {
+        for (body, row) in [BODY_X, BODY_Z].into_iter().enumerate() {
             let weights = standardised_fit(
                 &moving.tr_mul(&deviations),
                 &deviations.row(row).transpose(),
@@ -343,7 +460,7 @@ fn add_abductions(
         let u_lat = input_projection(&weights) * &inputs;
         let missed = &inputs - weights.tr_mul(&u_lat);
         for (pair, rows) in rows.chunks_mut(2).enumerate() {
-            let abduction = mirrored(PAIRS[pair], 0, robot);
+            let abduction = mirrored(PAIRS[pair], 0, robot, 1.0);
             let torque = missed.tr_mul(&abduction) / abduction.norm_squared();
             let own = u_lat.rows(first + 2 * pair, 2).into_owned();
             let changes = standardised_fit(&own, &torque);
@@ -377,3 +494,7 @@ fn standardised_fit(regressors: &DMatrix<f64>, target: &DVector<f64>) -> DVector
 fn unit(index: usize) -> DVector<f64> {
     DVector::from_fn(STATE_DIM, |i, _| if i == index { 1.0 } else { 0.0 })
 }
+
+#[cfg(test)]
+#[path = "../../../tests/units/learn_train_frame.rs"]
+mod tests;

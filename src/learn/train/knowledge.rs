@@ -4,18 +4,23 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::body::is_lateral;
 use super::dataset::Dataset;
 use super::features::Features;
 use super::frame::{Frame, LegRow, TURN};
 use super::latent::EncodedSet;
+use super::metrics::PLACE;
+use super::options::BodyEquations;
 use super::sparse::Regression;
 use super::weak_form::flight_samples;
-use crate::robot::{BODY_Z, FeetRule, GRAVITY_M_S2};
+use crate::robot::{BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2};
 
+const Y: usize = BODY_X + 1;
 const HEIGHT: usize = 1; // the momentum row upwards
 const STANDING_DAMPING_PER_S: f64 = 70.0; // of feet that slip
 const STANDING_STIFFNESS_PER_S2: f64 = 400.0; // of the ground
 const FLIGHT_RIDGE: f64 = 1e-4; // on the normalised columns
+const SHARED_RIDGE: f64 = 1e-5; // the same
 
 /// Known coefficients of one phase, and those left to a regression; all `library_dim x latent_dim`.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +29,7 @@ pub(super) struct Knowledge {
     pub free: DMatrix<bool>,    // to be chosen by a regression
     pub kept: DMatrix<bool>,    // free, and stay whatever they explain
     pub braking: DMatrix<bool>, // free, and at most 0 once refined
+    shared: Vec<Vec<usize>>,    // terms of each momentum column that is the same in all phases
     standing: Vec<Standing>,    // equations of the legs, if they stand in this phase
     swinging: Range<usize>,     // columns of the legs, if this phase is flight
 }
@@ -84,6 +90,7 @@ impl Knowledge {
             free: DMatrix::from_element(library_dim, latent_dim, true),
             kept: DMatrix::from_element(library_dim, latent_dim, false),
             braking: DMatrix::from_element(library_dim, latent_dim, false),
+            shared: Vec::new(),
             standing: Vec::new(),
             swinging: 0..0,
         }
@@ -112,6 +119,52 @@ impl Knowledge {
         fitted
     }
 
+    pub(super) fn shares_body(&self) -> bool {
+        !self.shared.is_empty()
+    }
+
+    /// With the momentum columns of [`Self::share_body`] known: ridge regression over the samples of all phases that share
+    /// them, `theta` (`n x library_dim`) and `target` (`n x latent_dim`) of each.
+    pub(super) fn with_shared_body(&self, samples: &[&(DMatrix<f64>, DMatrix<f64>)]) -> Self {
+        let mut fitted = self.clone();
+        if !self.shares_body() {
+            return fitted;
+        }
+        let stacked = |of: fn(&(DMatrix<f64>, DMatrix<f64>)) -> &DMatrix<f64>| {
+            let rows = samples.iter().flat_map(|each| of(each).row_iter());
+            DMatrix::from_rows(&rows.collect::<Vec<_>>())
+        };
+        let (theta, target) = (stacked(|(theta, _)| theta), stacked(|(_, target)| target));
+        let (p, d) = self.known.shape();
+        let regression = Regression::new(&theta, &target, Self::nothing(p, d));
+        for (column, terms) in self.shared.iter().enumerate() {
+            let support = DMatrix::from_fn(p, d, |term, k| k == column && terms.contains(&term));
+            let coefficients = regression.fit_column(column, &support, SHARED_RIDGE);
+            fitted.known.set_column(column, &coefficients);
+        }
+        fitted
+    }
+
+    /// The momentum columns become known, the same in all phases with feet on the ground: a constant upwards and of pitch,
+    /// forces and moments. Contact is in these, so that one equation holds in every phase; in flight it is free fall.
+    fn share_body(&mut self, features: &Features, frame: &Frame) {
+        let inputs = 2 * features.latent_dim;
+        for (k, &coordinate) in frame.body.iter().enumerate() {
+            let load = |v: &usize| frame.body.get(v.wrapping_sub(inputs));
+            let suits = |v: &usize| {
+                let is_like = |&of: &usize| is_lateral(of) == is_lateral(coordinate);
+                *v == HEIGHT || load(v).is_some_and(is_like)
+            };
+            let terms = features.variables().filter(|(term, variables)| {
+                let is_own = k > 0 || variables[..] == [inputs];
+                self.free[(*term, k)] && variables.iter().all(suits) && is_own
+            });
+            self.shared.push(terms.map(|(term, _)| term).collect());
+            self.free.column_mut(k).fill(false);
+            self.kept.column_mut(k).fill(false);
+        }
+    }
+
     pub(super) fn standing(&self, column: usize) -> Option<&Standing> {
         self.standing.iter().find(|of| of.column == column)
     }
@@ -129,17 +182,24 @@ impl Knowledge {
     /// what the ground carries of the legs' weight). `ddz3` depends on velocities, on force and moment, and on products
     /// of these with the height. The equations of the legs are affine, start from [`Standing`] and keep all terms. In
     /// flight `ddz1 = 0`, `ddz2 = -g`, `ddz3 = 0`, no term depends on force or moment, and the legs depend on their own
-    /// inputs only.
-    pub(super) fn of_phases(training: &Dataset, features: &Features, frame: &Frame) -> Vec<Self> {
+    /// inputs only. Momentum rows that change sign in a mirror image depend on forces and moments (`y` on its own force
+    /// alone). No term depends on place or heading.
+    pub(super) fn of_phases(
+        training: &Dataset,
+        features: &Features,
+        frame: &Frame,
+        equations: BodyEquations,
+    ) -> Vec<Self> {
         let (p, d) = (features.library_dim(), features.latent_dim);
         let each = training.phases.patterns.iter();
-        if frame.momentum == 0 {
+        if frame.body.is_empty() {
             return each.map(|_| Self::nothing(p, d)).collect();
         }
         let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
         each.map(|phase| {
             let mut knowledge = Self::nothing(p, d);
-            knowledge.forbid(0..d, features, |variables| variables.contains(&0));
+            let place = |v: &usize| frame.body.get(*v).is_some_and(|row| PLACE.contains(row));
+            knowledge.forbid(0..d, features, |variables| variables.iter().any(place));
             knowledge.forbid(0..2, features, |variables| variables.iter().any(|v| *v < d));
             let one = features.constant_term();
             if phase.feet == FeetRule::None {
@@ -152,6 +212,10 @@ impl Knowledge {
                     .for_each(|one| knowledge.kept[(one, 1)] = true);
                 knowledge.turn(features, frame);
                 knowledge.stand(features, frame);
+            }
+            knowledge.push_sideways(features, frame);
+            if equations == BodyEquations::AllPhases && phase.feet != FeetRule::None {
+                knowledge.share_body(features, frame);
             }
             let inputs = (0..d).map(|k| (2 * d + k, k));
             for (variable, k) in inputs.chain((0..2).map(|k| (d + k, k))) {
@@ -190,11 +254,11 @@ impl Knowledge {
         }
     }
 
-    /// The rotation with feet on the ground.
+    /// The rotation in the plane with feet on the ground.
     fn turn(&mut self, features: &Features, frame: &Frame) {
         let d = features.latent_dim;
-        let loads = 2 * d..2 * d + frame.momentum;
-        for k in TURN..frame.momentum {
+        let loads = 2 * d..2 * d + frame.body.len();
+        for k in (TURN..frame.body.len()).filter(|&k| !is_lateral(frame.body[k])) {
             self.forbid(k..k + 1, features, |variables| {
                 let is_load = |v: &usize| loads.contains(v);
                 let is_known = |v: &usize| *v == HEIGHT || (d..2 * d).contains(v) || is_load(v);
@@ -205,10 +269,44 @@ impl Knowledge {
         }
     }
 
+    /// The momentum rows that change sign in a mirror image: forces and moments, of `y` its own force.
+    fn push_sideways(&mut self, features: &Features, frame: &Frame) {
+        let inputs = 2 * features.latent_dim;
+        for (k, &coordinate) in frame.body.iter().enumerate() {
+            if !is_lateral(coordinate) {
+                continue;
+            }
+            let loads = match coordinate {
+                Y => k..k + 1,
+                _ => 0..frame.body.len(),
+            };
+            self.forbid(k..k + 1, features, |variables| match *variables {
+                [v] => v < inputs || !loads.contains(&(v - inputs)),
+                _ => true,
+            });
+            self.keep(k, features, &(0..0));
+        }
+    }
+
+    /// Without the terms that a mirror image contradicts: each latent coordinate stays or changes sign in it (`parity` 1 or
+    /// -1), and so do the terms of its equation. Terms of one variable that are not affine are left.
+    pub(super) fn with_parity(&self, features: &Features, parity: &[f64]) -> Self {
+        let (mut allowed, d) = (self.clone(), features.latent_dim);
+        for (term, variables) in features.variables() {
+            let sign: f64 = variables.iter().map(|v| parity[v % d]).product();
+            let has_sign = features.affine[term] || variables.len() == 2;
+            for k in (0..d).filter(|&k| has_sign && parity[k] != sign) {
+                allowed.free[(term, k)] = false;
+                allowed.kept[(term, k)] = false;
+            }
+        }
+        allowed
+    }
+
     /// The legs with feet on the ground, including a pair in the air while the other stands: its predictions of
     /// validation jumps are better with the prior than without.
     fn stand(&mut self, features: &Features, frame: &Frame) {
-        let rows = frame.legs.iter().zip(frame.momentum..);
+        let rows = frame.legs.iter().zip(frame.body.len()..);
         let standing = rows.filter_map(|(&row, k)| Standing::of(row, k, features));
         self.standing = standing.collect();
         for k in self.standing.iter().map(|standing| standing.column) {
@@ -221,7 +319,7 @@ impl Knowledge {
 
     /// All coordinates in flight.
     fn fly(&mut self, features: &Features, frame: &Frame, gravity: f64) {
-        let (d, momentum) = (features.latent_dim, frame.momentum);
+        let (d, momentum) = (features.latent_dim, frame.body.len());
         let (loads, legs) = (
             2 * d..2 * d + momentum,
             momentum..momentum + frame.legs.len(),

@@ -6,6 +6,7 @@
 
 #![allow(missing_docs, reason = "names say it all where there is no comment")]
 
+mod body;
 mod closed_form;
 mod dataset;
 mod error;
@@ -31,6 +32,7 @@ mod subspace;
 mod task;
 mod weak_form;
 
+pub use body::BodyRows;
 pub use closed_form::closed_form;
 pub use dataset::{MIN_SAMPLES, ScaleOptions, Split};
 pub use error::TrainError;
@@ -41,8 +43,8 @@ pub use joint::{
 };
 pub use metrics::{PartScore, PhaseTerms, SeedReport, SetMetrics, TrainReport, Trained, assess};
 pub use options::{
-    Coordinates, EncoderOptions, JointOptions, MapOptions, Method, RegressionOptions, TrainOptions,
-    Transfer,
+    BodyEquations, Coordinates, EncoderOptions, JointOptions, MapOptions, Method, MirrorImages,
+    RegressionOptions, TrainOptions, Transfer,
 };
 pub use progress::{Monitor, Progress};
 pub use task::{Origin, Recordings, SourceFile, sha256};

@@ -6,10 +6,11 @@ use clap::ValueEnum;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
+use super::body::BodyRows;
 use super::closed_form::closed_form;
 use super::dataset::ScaleOptions;
 use super::error::TrainError;
-use super::frame::WHOLE_BODY_DIM;
+use super::frame::has_leg_rows;
 use super::joint::{LossWeights, Schedule, run::joint, unroll::Integrator, unroll::Unroll};
 use super::metrics::Trained;
 use super::progress::Monitor;
@@ -114,7 +115,31 @@ pub struct EncoderOptions {
     pub least_input_share: f64,
     pub rotate: bool,
     pub coordinates: Coordinates,
+    /// Body coordinates with a row of their own, if coordinates are named.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyRows>,
+    /// Whether mirror images of the training recordings count as recordings.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mirror_images: Option<MirrorImages>,
     pub restarts: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum MirrorImages {
+    /// Every training recording once more, legs exchanged, abductions, y, roll and yaw negated
+    Added,
+    /// The recordings alone
+    None,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum BodyEquations {
+    /// Those of each phase by itself; in flight free fall
+    PerPhase,
+    /// One for all phases with feet on the ground, of forces, moments and constants; in flight free fall
+    AllPhases,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
@@ -131,6 +156,8 @@ pub enum Coordinates {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegressionOptions {
     pub smoothing: usize,
+    /// Equations of the momentum rows.
+    pub body_equations: BodyEquations,
     /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
     pub slack: f64,
     /// Steps by which rollouts of the training jumps refine the coefficients chosen; 0 leaves the regression's.
@@ -158,20 +185,39 @@ impl TrainOptions {
                 least_input_share: 0.005,
                 rotate: true,
                 coordinates: Coordinates::Named,
+                body: None,
+                mirror_images: None,
                 restarts: 4,
             },
             regression: RegressionOptions {
                 smoothing: 11,
-                // Smaller, because the score includes legs, whose terms are not dropped.
-                slack: if latent_dim < WHOLE_BODY_DIM {
-                    0.1
-                } else {
-                    0.04
-                },
+                body_equations: BodyEquations::PerPhase,
+                slack: slack(&BodyRows::of_dim(latent_dim), latent_dim),
                 refinements: 10,
                 growth_per_s: Some(3.0),
             },
             joint: JointOptions::by_the_author(),
+        }
+    }
+
+    /// Sets the body coordinates with a row of their own.
+    pub fn set_body(&mut self, body: BodyRows) {
+        self.regression.slack = slack(&body, self.latent_dim);
+        self.encoder.body = Some(body);
+    }
+
+    /// The body coordinates with a row of their own, if coordinates are named.
+    pub(super) fn body(&self) -> BodyRows {
+        let given = self.encoder.body.clone();
+        given.unwrap_or_else(|| BodyRows::of_dim(self.latent_dim))
+    }
+
+    /// Whether mirror images count: by default those of models that contain y, roll or yaw as rows.
+    pub(super) fn mirror_images(&self) -> MirrorImages {
+        let spatial = self.coordinates() == Coordinates::Named && self.body().is_spatial();
+        match self.encoder.mirror_images {
+            None if spatial => MirrorImages::Added,
+            given => given.unwrap_or(MirrorImages::None),
         }
     }
 
@@ -213,7 +259,7 @@ impl TrainOptions {
     /// Library of the given or default terms. Products with the height model the lever arm of the ground forces.
     pub(crate) fn library(&self) -> Result<Library, TrainError> {
         let is_whole =
-            self.coordinates() == Coordinates::Named && self.latent_dim >= WHOLE_BODY_DIM;
+            self.coordinates() == Coordinates::Named && has_leg_rows(&self.body(), self.latent_dim);
         let choice = match &self.library {
             Some(given) => given.clone(),
             None if is_whole => {
@@ -245,6 +291,14 @@ impl TrainOptions {
         table::MASK_STD.check(encoder.least_std)?;
         table::MASK_INPUT_SHARE.check(encoder.least_input_share)?;
         table::SEEDS.check_count(self.n_seeds.max(1))?;
+        let rows = self.body().coordinates().len();
+        if rows > self.latent_dim {
+            return Err(TrainError::Option {
+                option: "body",
+                found: format!("{rows} rows with {} latent coordinates", self.latent_dim),
+                expected: "at least as many latent coordinates as rows",
+            });
+        }
         table::MOVING_AVERAGE.check_count(regression.smoothing)?;
         self.joint.maps.check(self.latent_dim)?;
         self.joint.check_predictions()?;
@@ -264,6 +318,15 @@ impl TrainOptions {
             });
         }
         Ok(())
+    }
+}
+
+/// Smaller with rows of the legs, because the score includes them and their terms are not dropped.
+fn slack(body: &BodyRows, latent_dim: usize) -> f64 {
+    if has_leg_rows(body, latent_dim) {
+        0.04
+    } else {
+        0.1
     }
 }
 

@@ -64,11 +64,17 @@ pub(super) fn select(
 ) -> Result<(Vec<Xi>, Choice, usize), TrainError> {
     let features = judge.features;
     let regressions = &WINDOWS.map(|window| {
-        let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
-            let (theta, ddz) = windowed_samples(set, features, phase, window);
-            Regression::new(&theta, &ddz, knowledge.clone())
+        let phases = 0..knowledge.len();
+        let samples: Vec<_> = phases
+            .map(|phase| windowed_samples(set, features, phase, window))
+            .collect();
+        let sharing = knowledge.iter().zip(&samples);
+        let sharing = sharing.filter(|(knowledge, _)| knowledge.shares_body());
+        let sharing: Vec<_> = sharing.map(|(_, samples)| samples).collect();
+        let of_phase = |(knowledge, (theta, ddz)): (&Knowledge, &(Xi, Xi))| {
+            Regression::new(theta, ddz, knowledge.with_shared_body(&sharing))
         };
-        knowledge.iter().enumerate().map(of_phase).collect()
+        knowledge.iter().zip(&samples).map(of_phase).collect()
     });
     let growth = &Growth::of_jumps(options.growth_per_s, set, features);
     let refiner = Refiner {

@@ -10,13 +10,13 @@ use sha2::{Digest, Sha256};
 use super::dataset::{Dataset, mean};
 use super::error::TrainError;
 use super::features::{FeatureValues, Features};
-use super::frame::Frame;
+use super::frame::{Frame, parities, symmetry_classes};
 use super::joint::Losses;
 use super::judge::Judge;
 use super::knowledge::Knowledge;
 use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
 use super::metrics::{PLACE, PhaseTerms, SeedReport, SetMetrics, TrainReport, measure};
-use super::options::{EncoderOptions, TrainOptions};
+use super::options::{EncoderOptions, MirrorImages, TrainOptions};
 use super::progress::Monitor;
 use super::rollout::{Candidate, Xi};
 use super::select::{Choice, select};
@@ -71,14 +71,18 @@ impl<'a> Task<'a> {
         let rule = options.input_rule(robot);
         let read =
             |set: &[Recording]| Dataset::new(set, &rule, &options.phases, &scaling, smoothing);
-        let training = read(recordings.training)?;
+        let mut training = read(recordings.training)?;
+        if options.mirror_images() == MirrorImages::Added {
+            training.add_mirror_images(recordings.training)?;
+        }
         training.check_for_training()?;
         let validation = read(recordings.validation)?;
         let moments = training.moments();
         let least_std = options.encoder.least_std * options.scaling.state;
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
-        let (coordinates, requested) = (options.coordinates(), options.latent_dim);
-        let frame = Frame::new(&training, &active, requested, coordinates, robot);
+        let (requested, body) = (options.latent_dim, options.body());
+        let rows = (options.coordinates(), &body);
+        let frame = Frame::new(&training, &active, requested, rows, robot);
         if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested,
@@ -87,8 +91,9 @@ impl<'a> Task<'a> {
         }
         let library = options.library()?;
         let features = Features::new(&library);
+        let equations = options.regression.body_equations;
         Ok(Self {
-            knowledge: Knowledge::of_phases(&training, &features, &frame),
+            knowledge: Knowledge::of_phases(&training, &features, &frame, equations),
             training,
             validation,
             moments,
@@ -274,9 +279,16 @@ impl Fitted {
 impl Task<'_> {
     /// The encoder of the held rows and, in its canonical basis, of a space with orthonormal `basis` (`18 x (d - h)`).
     pub(super) fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap, TrainError> {
+        let classes = match self.frame.is_spatial() && basis.ncols() > 0 {
+            true => symmetry_classes(basis, self.robot).to_vec(),
+            false => vec![basis.clone()],
+        };
+        let learned: Vec<_> = (classes.iter().filter(|class| class.ncols() > 0))
+            .map(|class| self.canonical_basis(class).0)
+            .collect();
         let held = self.frame.held.column_iter();
-        let learned = self.canonical_basis(basis).0;
-        let rows: Vec<_> = held.chain(learned.column_iter()).collect();
+        let learned = learned.iter().flat_map(|class| class.column_iter());
+        let rows: Vec<_> = held.chain(learned).collect();
         let weights = DMatrix::from_columns(&rows).transpose();
         let bias = -(&weights * mean(&self.training.states(None)));
         Ok(AffineMap::new("encoder", weights, bias)?)
@@ -324,7 +336,14 @@ impl Task<'_> {
         check_terms(set, features, &self.library)?;
         let long = self.frame.judged_over_jumps(set.latent_dim());
         let judge = Judge::new(features, maps.judged_set(self), long);
-        let knowledge = self.knowledge.iter().enumerate();
+        let mut knowledge = self.knowledge.clone();
+        if self.frame.is_spatial() {
+            let parity = parities(&maps.weights, self.robot);
+            knowledge = (knowledge.iter())
+                .map(|known| known.with_parity(features, &parity))
+                .collect();
+        }
+        let knowledge = knowledge.iter().enumerate();
         let knowledge = knowledge.map(|(phase, known)| known.with_flights(set, features, phase));
         let knowledge: Vec<Knowledge> = knowledge.collect();
         let (xi, choice, candidates) = select(set, &knowledge, &judge, options, monitor)?;

@@ -66,7 +66,7 @@ pub(super) fn learn_jumps(
     let Some(affine) = encoder.as_affine() else {
         return nothing;
     };
-    let cuts = training.jumps.iter();
+    let cuts = training.jumps.iter().filter(|jump| !jump.is_image);
     let cuts: Vec<_> = cuts.map(|jump| landmarks::cut(training, jump)).collect();
     let chosen = of_commonest_kind(&cuts);
     if chosen.len() < LEAST_JUMPS {
