@@ -18,6 +18,7 @@ use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 use crate::robot_file;
 pub use stance::Balance;
 use stance::{Slip, best_other_place, best_other_reading};
+pub(crate) use stance::{falls_of, foot_slip_m};
 pub(super) use stance::{foot_place, hip_torque, median_place, stances};
 
 const SLIP_M: f64 = 0.025; // largest root mean square of the places of feet on the ground about their medians, m

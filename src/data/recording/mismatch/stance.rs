@@ -150,6 +150,21 @@ impl Slip {
     }
 }
 
+/// Geometric mean over the stances of the feet of how far each moves, a root mean square in m; none without stances. A
+/// landing in which feet slide then weighs no more than a stance in which they stay.
+pub(crate) fn foot_slip_m(segment: &Segment, robot: &Robot) -> Option<f64> {
+    let all = stances(segment).into_iter().map(|(leg, samples)| {
+        let place = |sample| foot_place(robot, leg, &segment.state(sample), true);
+        let places: Vec<Vector3<f64>> = samples.map(place).collect();
+        let stands = median_place(&places);
+        let squares = places.iter().map(|place| (place - stands).norm_squared());
+        squares.sum::<f64>() / places.len() as f64
+    });
+    let logarithms: Vec<f64> = all.map(|square| 0.5 * square.max(1e-12).ln()).collect();
+    let sum: f64 = logarithms.iter().sum();
+    (!logarithms.is_empty()).then(|| (sum / logarithms.len() as f64).exp())
+}
+
 /// Sample, leg, leg whose columns are read, place of the foot about the median of the stance, m.
 struct Stances(Vec<(usize, Leg, Leg, Vector3<f64>)>);
 
@@ -339,7 +354,7 @@ pub(crate) fn hip_torque(robot: &Robot, leg: Leg, q: &[f64; 3], force: &Vector3<
 }
 
 /// Vertical acceleration of each flight by a parabola through its heights.
-fn falls_of(segment: &Segment) -> Vec<f64> {
+pub(crate) fn falls_of(segment: &Segment) -> Vec<f64> {
     let flights = (segment.contacts().into_iter()).filter(|(_, is_grounded)| !is_grounded);
     let fall = |(run, _): (Range<usize>, bool)| {
         let (start, end) = (segment.time_s[run.start], segment.time_s[run.end - 1]);
