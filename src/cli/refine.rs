@@ -112,14 +112,19 @@ fn answer(arguments: &TrainArguments, from: &Path, refined: &Refined) -> Answer 
         .table();
     let output = arguments.output.display().to_string();
     let mut text = format!("{output}: {} refined\n\n{table}\n", from.display());
-    for of in &refined.unchanged {
+    let notes = &refined.notes;
+    for of in &notes.shares {
+        let _ = writeln!(text, "multiplied as a whole: {of}");
+    }
+    for of in &notes.unchanged {
         let _ = writeln!(text, "unchanged: {of}");
     }
     let json = json!({
         "from": from.display().to_string(),
         "output": output,
         "coefficients": refined.coefficients,
-        "unchanged": refined.unchanged,
+        "multiplied": notes.shares,
+        "unchanged": notes.unchanged,
     });
     Answer::new(text, json)
 }

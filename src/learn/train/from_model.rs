@@ -2,8 +2,9 @@
 //!
 //! Encoder and decoder stay. In each equation of each phase the coefficients that the model uses, and a constant, change
 //! by the least that predicts left-out recordings better: `xi + argmin |Y - Theta (xi + delta)|^2 / n + ridge |delta
-//! rms(Theta)|^2`, with the largest ridge whose error on left-out parts is within a standard error of the best. Equations
-//! without a variable (free fall, a rotation that nothing changes) are physics and stay.
+//! rms(Theta)|^2`, with the largest ridge whose error on left-out parts is within a standard error of the best. Where it
+//! predicts left-out parts better, the equation is multiplied by one number instead: recorded torques are not always what
+//! the motors gave. Equations without a variable (free fall, a rotation that nothing changes) are physics and stay.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -26,6 +27,7 @@ const SMOOTHING: usize = 11;
 const LEAST_PARTS: usize = 4; // fewer jumps than that are cut
 const PART_S: f64 = 0.2;
 const LEAST_ROWS: usize = 20;
+const LEAST_GAIN: f64 = 0.05; // of the left-out squared error, below which an equation's share stays 1
 
 /// A coefficient that recordings changed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -44,8 +46,16 @@ pub struct RefinedCoefficient {
 pub struct Refined {
     pub model: ReducedModel,
     pub coefficients: Vec<RefinedCoefficient>,
+    pub notes: Notes,
+}
+
+/// What became of equations, in words.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Notes {
     /// Equations that stay as they were, and why.
     pub unchanged: Vec<String>,
+    /// Equations all of whose coefficients are multiplied by one number, and that number.
+    pub shares: Vec<String>,
 }
 
 const NO_SAMPLES: &str = "too few samples of the phase";
@@ -78,9 +88,11 @@ pub fn refine_from(
     let stays_finite = |xi: &[DMatrix<f64>]| whole.score_within(xi, f64::MAX).is_finite();
     let before = model.phases().iter().map(|phase| phase.xi.clone());
     let mut xi: Vec<DMatrix<f64>> = before.collect();
-    let (mut coefficients, mut unchanged) = (Vec::new(), Vec::new());
+    let (mut coefficients, mut notes) = (Vec::new(), Notes::default());
     for phase in 0..xi.len() {
-        let found = data.refined_phase(phase, &mut unchanged);
+        let mut of_phase = Notes::default();
+        let found = data.refined_phase(phase, &mut of_phase);
+        notes.unchanged.append(&mut of_phase.unchanged);
         let mut tried = xi.clone();
         for (term, of) in &found {
             tried[phase][(*term, of.coordinate - 1)] = of.after;
@@ -89,12 +101,15 @@ pub fn refine_from(
         if score(&tried) < score(&xi) && !diverges {
             xi = tried;
             coefficients.extend(found.into_iter().map(|(_, of)| of));
+            notes.shares.append(&mut of_phase.shares);
         } else if !found.is_empty() {
-            unchanged.push(format!("{}: {ROLLOUTS}", model.phases()[phase].name));
+            notes
+                .unchanged
+                .push(format!("{}: {ROLLOUTS}", model.phases()[phase].name));
         }
     }
     if coefficients.is_empty() {
-        let reasons = unchanged.join("; ");
+        let reasons = notes.unchanged.join("; ");
         return Err(TrainError::NothingToRefine { reasons });
     }
     let phases = model.phases().iter().cloned().zip(xi);
@@ -115,7 +130,7 @@ pub fn refine_from(
     Ok(Refined {
         model,
         coefficients,
-        unchanged,
+        notes,
     })
 }
 
@@ -206,12 +221,8 @@ impl Data<'_> {
         each.collect()
     }
 
-    /// Changed coefficients of a phase with the number of their term; reasons for its other equations are added.
-    fn refined_phase(
-        &self,
-        phase: usize,
-        unchanged: &mut Vec<String>,
-    ) -> Vec<(usize, RefinedCoefficient)> {
+    /// Changed coefficients of a phase with the number of their term; reasons for its other equations are noted.
+    fn refined_phase(&self, phase: usize, notes: &mut Notes) -> Vec<(usize, RefinedCoefficient)> {
         let own = &self.model.phases()[phase];
         let is_flight = own.feet == FeetRule::None;
         let sums = |of: &Encoded| {
@@ -219,7 +230,7 @@ impl Data<'_> {
                 true => flight_samples(of.set(), &self.features, phase),
                 false => windowed_samples(of.set(), &self.features, phase, WINDOW),
             };
-            Sums::of(&theta, &(target - &theta * &own.xi))
+            Sums::of(&theta, &target)
         };
         let all = sums(&self.whole);
         let parts: Vec<Sums> = self
@@ -229,42 +240,71 @@ impl Data<'_> {
             .filter(|sums| sums.rows > 0)
             .collect();
         let is_enough = all.rows >= LEAST_ROWS && parts.len() > 1;
-        let (mut found, d) = (Vec::new(), self.model.latent_dim());
-        for k in 0..d {
+        let mut found = Vec::new();
+        for k in 0..self.model.latent_dim() {
             let mut support = support(&own.xi, &self.features, k, is_flight);
             // A term that is zero throughout has no part in a change.
             support.retain(|&term| !is_enough || all.gram[(term, term)] > 0.0);
             if support.is_empty() {
                 continue;
             }
-            let Some(changed) = is_enough.then(|| change(&all, &parts, k, &support)) else {
-                unchanged.push(format!("ddz{} in {}: {NO_SAMPLES}", k + 1, own.name));
+            let place = format!("ddz{} in {}", k + 1, own.name);
+            if !is_enough {
+                notes.unchanged.push(format!("{place}: {NO_SAMPLES}"));
                 continue;
-            };
-            let Some((change, deviation)) = changed else {
-                unchanged.push(format!("ddz{} in {}: {NO_BETTER}", k + 1, own.name));
-                continue;
-            };
-            for ((term, change), deviation) in support.into_iter().zip(&change).zip(&deviation) {
-                let before = own.xi[(term, k)];
-                let mut after = before + change;
-                // What brakes the momentum does not drive it.
-                let is_braking = self.features.variable_term(d + k) == Some(term);
-                if k < 2 && is_braking && before <= 0.0 {
-                    after = after.min(0.0);
-                }
-                let coefficient = RefinedCoefficient {
-                    phase: own.name.clone(),
-                    coordinate: k + 1,
-                    term: self.model.library().terms()[term].text.clone(),
-                    before,
-                    after,
-                    standard_errors: (change / deviation).abs(),
-                };
-                found.push((term, coefficient));
             }
+            let xi = own.xi.column(k).into_owned();
+            let mut families = vec![Family::terms(&support, xi.len())];
+            // Pieces of one flight do not judge how another goes.
+            if !is_flight || self.whole.dataset.jumps.len() >= LEAST_PARTS {
+                let offset = self.features.constant_term().filter(|_| is_flight);
+                families.push(Family::share(&xi, offset));
+            }
+            let changes = families
+                .iter()
+                .filter_map(|family| Some((family, family.change(&all, &parts, k, &xi)?)));
+            let best = changes.max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain));
+            let Some((family, change)) = best else {
+                notes.unchanged.push(format!("{place}: {NO_BETTER}"));
+                continue;
+            };
+            if family.kind == Kind::Share {
+                let share = 1.0 + change.change[0];
+                notes.shares.push(format!("{place}: {share:.2}"));
+            }
+            found.extend(self.changed_coefficients(own, k, &change));
         }
         found
+    }
+
+    /// Coefficients of an equation that a change moves, with the number of their term.
+    fn changed_coefficients(
+        &self,
+        own: &Phase,
+        k: usize,
+        change: &Change,
+    ) -> Vec<(usize, RefinedCoefficient)> {
+        let d = self.model.latent_dim();
+        let terms = (0..own.xi.nrows()).filter(|&term| change.after[term] != own.xi[(term, k)]);
+        let coefficient = |term: usize| {
+            let (before, mut after) = (own.xi[(term, k)], change.after[term]);
+            let errors = (after - before).abs() / change.deviations[term];
+            // What brakes the momentum does not drive it.
+            let is_braking = self.features.variable_term(d + k) == Some(term);
+            if k < 2 && is_braking && before <= 0.0 {
+                after = after.min(0.0);
+            }
+            let coefficient = RefinedCoefficient {
+                phase: own.name.clone(),
+                coordinate: k + 1,
+                term: self.model.library().terms()[term].text.clone(),
+                before,
+                after,
+                standard_errors: if errors.is_finite() { errors } else { 0.0 },
+            };
+            (term, coefficient)
+        };
+        terms.map(coefficient).collect()
     }
 }
 
@@ -303,99 +343,170 @@ fn support(xi: &DMatrix<f64>, features: &Features, k: usize, is_flight: bool) ->
     active.into_iter().chain(offset).collect()
 }
 
-/// Normal equations of one left-out part: the residuals of the model as targets.
+/// Normal equations of one left-out part.
+#[derive(Clone)]
 struct Sums {
     rows: usize,
     gram: DMatrix<f64>,
     product: DMatrix<f64>,
+    squares: Vec<f64>, // of the targets
 }
 
 impl Sums {
-    fn of(theta: &DMatrix<f64>, residual: &DMatrix<f64>) -> Self {
+    fn of(theta: &DMatrix<f64>, target: &DMatrix<f64>) -> Self {
         Self {
             rows: theta.nrows(),
             gram: theta.tr_mul(theta),
-            product: theta.tr_mul(residual),
+            product: theta.tr_mul(target),
+            squares: target.column_iter().map(|of| of.norm_squared()).collect(),
         }
     }
 
-    /// Gram matrix and product of the terms of an equation.
-    fn of_terms(&self, k: usize, support: &[usize]) -> (DMatrix<f64>, DVector<f64>) {
-        let gram = self.gram.select_rows(support).select_columns(support);
-        let product = support.iter().map(|&term| self.product[(term, k)]);
-        (gram, DVector::from_iterator(support.len(), product))
-    }
-}
-
-/// The least change of an equation that predicts left-out parts better, with its standard deviation; none if no change
-/// does.
-fn change(
-    all: &Sums,
-    parts: &[Sums],
-    k: usize,
-    support: &[usize],
-) -> Option<(DVector<f64>, DVector<f64>)> {
-    let each: Vec<_> = parts.iter().map(|part| part.of_terms(k, support)).collect();
-    let m = support.len();
-    let total = |left_out: usize| {
-        let kept = each
+    /// The sums of the other parts.
+    fn without(parts: &[Self], left_out: usize) -> Self {
+        let mut others = parts
             .iter()
             .enumerate()
             .filter(|(part, _)| *part != left_out);
-        let zero = (DMatrix::zeros(m, m), DVector::zeros(m));
-        kept.fold(zero, |(gram, product), (_, of)| {
-            (gram + &of.0, product + &of.1)
+        let (_, first) = others.next().expect("invariant: two parts or more");
+        others.fold(first.clone(), |sum, (_, part)| Self {
+            rows: sum.rows + part.rows,
+            gram: sum.gram + &part.gram,
+            product: sum.product + &part.product,
+            squares: sum
+                .squares
+                .iter()
+                .zip(&part.squares)
+                .map(|(a, b)| a + b)
+                .collect(),
         })
-    };
-    let gains: Vec<Vec<f64>> = (RIDGES.iter())
-        .map(|ridge| {
-            let gain = |part: usize| {
-                let (gram, product) = total(part);
-                let change = solved(&gram, &product, *ridge).unwrap_or_else(|| DVector::zeros(m));
-                let (gram, product) = &each[part];
-                let rows = parts[part].rows as f64;
-                (2.0 * change.dot(product) - change.dot(&(gram * &change))) / rows
-            };
-            (0..parts.len()).map(gain).collect()
-        })
-        .collect();
-    let mean = |gains: &[f64]| gains.iter().sum::<f64>() / gains.len() as f64;
-    let error = |gains: &[f64]| {
-        let own = mean(gains);
-        let square: f64 = gains.iter().map(|gain| (gain - own).powi(2)).sum();
-        (square / (gains.len() * (gains.len() - 1).max(1)) as f64).sqrt()
-    };
-    let best = gains.iter().max_by(|a, b| mean(a).total_cmp(&mean(b)))?;
-    if mean(best) <= error(best) {
-        return None;
     }
-    let least = mean(best) - error(best);
-    let chosen = gains.iter().position(|gains| mean(gains) >= least)?;
-    let (gram, product) = all.of_terms(k, support);
-    let change = solved(&gram, &product, RIDGES[chosen])?;
-    // Of parts as a whole: errors within one are correlated.
-    let inverse = ridged(&gram, RIDGES[chosen]).try_inverse()?;
-    let scores = each.iter().map(|(gram, product)| product - gram * &change);
-    let scores = scores.fold(DMatrix::zeros(m, m), |sum, score| {
-        sum + &score * score.transpose()
-    });
-    let covariance = &inverse * scores * &inverse;
-    Some((
-        change,
-        covariance
-            .diagonal()
-            .map(|square| square.max(f64::MIN_POSITIVE).sqrt()),
-    ))
+
+    /// Squared error of an equation.
+    fn error(&self, k: usize, xi: &DVector<f64>) -> f64 {
+        self.squares[k] - 2.0 * xi.dot(&self.product.column(k)) + xi.dot(&(&self.gram * xi))
+    }
 }
 
-fn ridged(gram: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Terms,
+    Share,
+}
+
+/// Changes of an equation: coefficients change along these directions, `library_dim x m`.
+struct Family {
+    kind: Kind,
+    directions: DMatrix<f64>,
+}
+
+/// The change of a family that predicts left-out parts best.
+struct Change {
+    change: DVector<f64>,     // along the directions
+    after: DVector<f64>,      // coefficients
+    deviations: DVector<f64>, // standard deviations of these
+    gain: f64,                // of the squared error of left-out parts, per row
+}
+
+impl Family {
+    /// Each term for itself.
+    fn terms(support: &[usize], library_dim: usize) -> Self {
+        let unit = |i: usize, m: usize| f64::from(u8::from(support[m] == i));
+        Self {
+            kind: Kind::Terms,
+            directions: DMatrix::from_fn(library_dim, support.len(), unit),
+        }
+    }
+
+    /// The equation as a whole, multiplied by a number that is not negative, and perhaps a constant.
+    fn share(xi: &DVector<f64>, offset: Option<usize>) -> Self {
+        let unit = |term: usize| DVector::from_fn(xi.len(), |i, _| f64::from(u8::from(i == term)));
+        let whole = std::iter::once(xi.clone());
+        let directions: Vec<DVector<f64>> = whole.chain(offset.map(unit)).collect();
+        Self {
+            kind: Kind::Share,
+            directions: DMatrix::from_columns(&directions),
+        }
+    }
+
+    fn gram(&self, sums: &Sums, ridge: f64) -> DMatrix<f64> {
+        let gram = self.directions.tr_mul(&sums.gram) * &self.directions;
+        ridged(gram, ridge)
+    }
+
+    /// Slopes of half the squared error at `xi` along the directions, downwards.
+    fn slopes(&self, sums: &Sums, k: usize, xi: &DVector<f64>) -> DVector<f64> {
+        let slopes = sums.product.column(k) - &sums.gram * xi;
+        self.directions.tr_mul(&slopes)
+    }
+
+    fn solved(&self, sums: &Sums, k: usize, xi: &DVector<f64>, ridge: f64) -> Option<DVector<f64>> {
+        let factor = self.gram(sums, ridge).cholesky()?;
+        let mut change = factor.solve(&self.slopes(sums, k, xi));
+        if self.kind == Kind::Share {
+            change[0] = change[0].max(-1.0);
+        }
+        Some(change)
+    }
+
+    /// The change that predicts left-out parts better than `xi`; none if none does. Of single terms the least change
+    /// within a standard error of the best; of the equation as a whole the best that gains [`LEAST_GAIN`].
+    fn change(&self, all: &Sums, parts: &[Sums], k: usize, xi: &DVector<f64>) -> Option<Change> {
+        let after = |change: &DVector<f64>| xi + &self.directions * change;
+        let others: Vec<Sums> = (0..parts.len())
+            .map(|left_out| Sums::without(parts, left_out))
+            .collect();
+        let gain = |ridge: f64, part: usize| {
+            let change = self.solved(&others[part], k, xi, ridge);
+            let own = &parts[part];
+            let gained = change.map(|change| own.error(k, xi) - own.error(k, &after(&change)));
+            gained.unwrap_or(0.0) / own.rows as f64
+        };
+        let of_ridge = |ridge: &f64| (0..parts.len()).map(|part| gain(*ridge, part)).collect();
+        let gains: Vec<Vec<f64>> = RIDGES.iter().map(of_ridge).collect();
+        let mean = |gains: &[f64]| gains.iter().sum::<f64>() / gains.len() as f64;
+        let error = |gains: &[f64]| {
+            let own = mean(gains);
+            let square: f64 = gains.iter().map(|gain| (gain - own).powi(2)).sum();
+            (square / (gains.len() * (gains.len() - 1).max(1)) as f64).sqrt()
+        };
+        let best = gains.iter().max_by(|a, b| mean(a).total_cmp(&mean(b)))?;
+        let (needed, least) = match self.kind {
+            Kind::Terms => (error(best), mean(best) - error(best)),
+            Kind::Share => {
+                let now = parts.iter().map(|of| of.error(k, xi) / of.rows as f64);
+                let now = now.sum::<f64>() / parts.len() as f64;
+                (LEAST_GAIN * now, mean(best))
+            }
+        };
+        if mean(best) <= needed {
+            return None;
+        }
+        let chosen = gains.iter().position(|gains| mean(gains) >= least)?;
+        let change = self.solved(all, k, xi, RIDGES[chosen])?;
+        let after = after(&change);
+        // Of parts as a whole: errors within one are correlated.
+        let inverse = self.gram(all, RIDGES[chosen]).try_inverse()?;
+        let slopes = parts.iter().map(|part| self.slopes(part, k, &after));
+        let squares = slopes.fold(DMatrix::zeros(change.len(), change.len()), |sum, slope| {
+            sum + &slope * slope.transpose()
+        });
+        let covariance = &inverse * squares * &inverse;
+        let of_terms = &self.directions * covariance * self.directions.transpose();
+        let deviations = of_terms.diagonal().map(|square| square.max(0.0).sqrt());
+        Some(Change {
+            gain: mean(&gains[chosen]),
+            change,
+            after,
+            deviations,
+        })
+    }
+}
+
+fn ridged(gram: DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
     let largest = gram.diagonal().amax().max(f64::MIN_POSITIVE);
     let scales = gram
         .diagonal()
         .map(|square| ridge * square.max(1e-12 * largest));
     gram + DMatrix::from_diagonal(&scales)
-}
-
-fn solved(gram: &DMatrix<f64>, product: &DVector<f64>, ridge: f64) -> Option<DVector<f64>> {
-    Some(ridged(gram, ridge).cholesky()?.solve(product))
 }
