@@ -114,12 +114,14 @@ def windows(time_s, interval_s):
 
 
 def errors(bench, model, rows, recording, restart_s):
-    """Root mean squares of model, constant velocity and rest, and the deviation of each coordinate; SI."""
+    """Root mean squares of model, constant velocity, rest and the decoded state, and each deviation; SI."""
     found, time_s = {}, column(rows, "Time")
     predicted = bench.trajectories(model, recording, restart_s)
+    decoded = reconstruction(model, predicted)
     for name in SHOWN:
         place, rate = (column(rows, of) for of in place_and_rate(name))
         of = {"model": [], "velocity": [], "rest": []}
+        of["decoded"] = [a - b for a, b in zip(decoded[name], place)]
         for start, end in windows(time_s, restart_s):
             for i in range(start, end):
                 of["model"].append(predicted[f"{name}_restarted"][i] - place[i])
@@ -128,6 +130,17 @@ def errors(bench, model, rows, recording, restart_s):
         mean = sum(place) / len(place)
         found[name] = {key: rms(values) for key, values in of.items()}
         found[name]["std"] = rms([value - mean for value in place])
+    return found
+
+
+def reconstruction(model, trajectories):
+    """What decoder and encoder make of the recorded states, without any dynamics."""
+    file = json.loads(pathlib.Path(model).read_text())
+    z = [trajectories[f"z_{k + 1}"] for k in range(file["latent_dim"])]
+    found = {}
+    for name, weights, bias in zip(file["state"]["names"], file["decoder"]["weights"], file["decoder"]["bias"]):
+        sums = ((bias + sum(w * value for w, value in zip(weights, column))) for column in zip(*z))
+        found[name] = [value / file["scaling"]["state"] for value in sums]
     return found
 
 
@@ -154,7 +167,7 @@ def jump(bench, data):
             for kind, of in kinds:
                 found = errors(bench, of, judged, files[judged_on], restart_s)
                 print(f"| {restart_s} s | {kind} | " + " | ".join(worse(found[name]) for name in SHOWN) + " |")
-            for kind in ("velocity", "rest"):
+            for kind in ("velocity", "rest", "decoded"):
                 print(f"| {restart_s} s | {kind} | " + " | ".join(f"{1e3 * found[name][kind]:.1f}" for name in SHOWN) + " |")
         small = [name for name in LEGS if found[name]["std"] <= LEAST_STD_RAD]
         print(f"\nstandard deviation up to {LEAST_STD_RAD} rad: {', '.join(small) or 'none'}\n")

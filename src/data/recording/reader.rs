@@ -26,8 +26,8 @@ pub enum Clocks {
     /// Times, steps and angular rates stay as recorded
     #[default]
     Recorded,
-    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, angular rates that disagree
-    /// with the angles become their differences
+    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, rates that the angles
+    /// contradict become their slopes; lost decimal points and a late place of the body are mended
     Repaired,
 }
 

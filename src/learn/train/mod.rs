@@ -8,6 +8,7 @@
 
 mod closed_form;
 mod dataset;
+mod equation_change;
 mod error;
 mod features;
 mod frame;

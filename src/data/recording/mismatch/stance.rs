@@ -340,6 +340,49 @@ impl Sums {
     }
 }
 
+const CARRYING_S: f64 = 0.04; // window over which forces are compared with what the motion needs, s
+const CARRIED: f64 = 0.25; // share of it below which torques do not carry the robot
+const NEEDED: f64 = 1.0; // share of the weight from which a window needs forces
+
+/// Times, s, of a segment in which feet are on the ground and forces by the torques are less than [`CARRIED`] of what
+/// weight and change of velocity need.
+pub(super) fn uncarried(segment: &Segment, robot: &Robot) -> Vec<Range<f64>> {
+    let (time_s, n) = (&segment.time_s, segment.len());
+    let (weight, mass) = (weight_n(robot.mass_kg()), robot.mass_kg());
+    let mut sums = Sums::default();
+    let upwards = (0..n).map(|sample| sums.add_forces(segment, robot, sample).z);
+    let mut impulse = vec![0.0];
+    for (pair, h) in upwards
+        .collect::<Vec<_>>()
+        .windows(2)
+        .zip(time_s.windows(2))
+    {
+        let last = impulse[impulse.len() - 1];
+        impulse.push(last + 0.5 * (h[1] - h[0]) * (pair[0] + pair[1]));
+    }
+    let mut out: Vec<Range<f64>> = Vec::new();
+    for (stretch, _) in segment.contacts().into_iter().filter(|(_, down)| *down) {
+        for start in stretch.clone() {
+            let end = time_s.partition_point(|time| *time < time_s[start] + CARRYING_S - 1e-9);
+            if end >= stretch.end {
+                break;
+            }
+            let duration_s = time_s[end] - time_s[start];
+            let dv = segment.dx[(BODY_Z, end)] - segment.dx[(BODY_Z, start)];
+            let needed = weight * duration_s + mass * dv;
+            let is_needed = needed > NEEDED * weight * duration_s;
+            if !is_needed || impulse[end] - impulse[start] >= CARRIED * needed {
+                continue;
+            }
+            match out.last_mut() {
+                Some(open) if open.end >= time_s[start] => open.end = time_s[end],
+                _ => out.push(time_s[start]..time_s[end]),
+            }
+        }
+    }
+    out
+}
+
 /// Torque of a hip's abduction that holds the part of a foot's force (body axes, N) in the plane of the leg.
 pub(crate) fn hip_torque(robot: &Robot, leg: Leg, q: &[f64; 3], force: &Vector3<f64>) -> f64 {
     let links = robot.geometry(leg).links();
