@@ -112,19 +112,18 @@ fn answer(arguments: &TrainArguments, from: &Path, refined: &Refined) -> Answer 
         .table();
     let output = arguments.output.display().to_string();
     let mut text = format!("{output}: {} refined\n\n{table}\n", from.display());
-    let notes = &refined.notes;
-    for of in &notes.shares {
+    for of in &refined.multiplied {
         let _ = writeln!(text, "multiplied as a whole: {of}");
     }
-    for of in &notes.unchanged {
+    for of in &refined.unchanged {
         let _ = writeln!(text, "unchanged: {of}");
     }
     let json = json!({
         "from": from.display().to_string(),
         "output": output,
         "coefficients": refined.coefficients,
-        "multiplied": notes.shares,
-        "unchanged": notes.unchanged,
+        "multiplied": refined.multiplied,
+        "unchanged": refined.unchanged,
     });
     Answer::new(text, json)
 }

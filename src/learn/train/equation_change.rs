@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 const RIDGES: [f64; 5] = [1.0, 0.1, 1e-2, 1e-3, 1e-4]; // strongest first
+const LEAST_SHARE: f64 = 0.1; // from 1, by which an equation is multiplied
 const LEAST_GAIN: f64 = 0.25; // of the left-out squared error, below which an equation's share stays 1
 
 /// Normal equations of one left-out part.
@@ -153,6 +154,9 @@ impl Family {
         }
         let chosen = gains.iter().position(|gains| mean(gains) >= least)?;
         let change = self.solved(all, k, xi, RIDGES[chosen])?;
+        if self.kind == Kind::Share && change[0].abs() < LEAST_SHARE {
+            return None;
+        }
         let after = after(&change);
         // Of parts as a whole: errors within one are correlated.
         let inverse = self.gram(all, RIDGES[chosen]).try_inverse()?;

@@ -45,16 +45,16 @@ pub struct RefinedCoefficient {
 pub struct Refined {
     pub model: ReducedModel,
     pub coefficients: Vec<RefinedCoefficient>,
-    pub notes: Notes,
-}
-
-/// What became of equations, in words.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Notes {
     /// Equations that stay as they were, and why.
     pub unchanged: Vec<String>,
     /// Equations all of whose coefficients are multiplied by one number, and that number.
-    pub shares: Vec<String>,
+    pub multiplied: Vec<String>,
+}
+
+#[derive(Default)]
+struct Notes {
+    unchanged: Vec<String>,
+    multiplied: Vec<String>,
 }
 
 const NO_SAMPLES: &str = "too few samples of the phase";
@@ -100,7 +100,7 @@ pub fn refine_from(
         if score(&tried) < score(&xi) && !diverges {
             xi = tried;
             coefficients.extend(found.into_iter().map(|(_, of)| of));
-            notes.shares.append(&mut of_phase.shares);
+            notes.multiplied.append(&mut of_phase.multiplied);
         } else if !found.is_empty() {
             notes
                 .unchanged
@@ -129,7 +129,8 @@ pub fn refine_from(
     Ok(Refined {
         model,
         coefficients,
-        notes,
+        unchanged: notes.unchanged,
+        multiplied: notes.multiplied,
     })
 }
 
@@ -269,7 +270,7 @@ impl Data<'_> {
             };
             if family.kind == Kind::Share {
                 let share = 1.0 + change.change[0];
-                notes.shares.push(format!("{place}: {share:.2}"));
+                notes.multiplied.push(format!("{place}: {share:.2}"));
             }
             found.extend(self.changed_coefficients(own, k, &change));
         }
@@ -284,7 +285,11 @@ impl Data<'_> {
         change: &Change,
     ) -> Vec<(usize, RefinedCoefficient)> {
         let d = self.model.latent_dim();
-        let terms = (0..own.xi.nrows()).filter(|&term| change.after[term] != own.xi[(term, k)]);
+        // A constant that the equation lacked comes last.
+        let is_new = |term: &usize| own.xi[(*term, k)] == 0.0;
+        let terms = (0..own.xi.nrows()).filter(|term| change.after[*term] != own.xi[(*term, k)]);
+        let (added, terms): (Vec<_>, Vec<_>) = terms.partition(is_new);
+        let terms = terms.into_iter().chain(added);
         let coefficient = |term: usize| {
             let (before, mut after) = (own.xi[(term, k)], change.after[term]);
             let errors = (after - before).abs() / change.deviations[term];
