@@ -159,7 +159,7 @@ def jump(bench, data):
     for refined_on, judged_on in (list(parts), list(parts)[::-1]):
         model, said = bench.refined([files[refined_on]], "refined", "--clock", "recorded")
         print(f"### Refined on {refined_on}, judged on {judged_on}\n")
-        print("\n".join(line for line in said.splitlines() if line.startswith(("multi", "by place", "unch", "error"))), "\n")
+        print("\n".join(line for line in said.splitlines() if line.startswith(("multiplied", "unchanged", "error"))), "\n")
         judged = [header, *parts[judged_on]]
         print("| after | model | " + " | ".join(SHOWN) + " |\n" + "|---" * (len(SHOWN) + 2) + "|")
         for restart_s in (0.05, 0.1):

@@ -6,7 +6,7 @@
 //! predicts left-out parts better, the equation is multiplied by one number instead: recorded torques are not always what
 //! the motors gave. Equations without a variable (free fall, a rotation that nothing changes) are physics and stay.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
