@@ -22,6 +22,8 @@ mod outside;
 mod random_bytes;
 #[path = "recording/real_jumps.rs"]
 mod real_jumps;
+#[path = "recording/repairs.rs"]
+mod repairs;
 #[path = "recording/samples.rs"]
 mod samples;
 #[path = "recording/sheet.rs"]

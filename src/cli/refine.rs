@@ -112,6 +112,9 @@ fn answer(arguments: &TrainArguments, from: &Path, refined: &Refined) -> Answer 
         .table();
     let output = arguments.output.display().to_string();
     let mut text = format!("{output}: {} refined\n\n{table}\n", from.display());
+    for of in &refined.multiplied {
+        let _ = writeln!(text, "multiplied as a whole: {of}");
+    }
     for of in &refined.unchanged {
         let _ = writeln!(text, "unchanged: {of}");
     }
@@ -119,6 +122,7 @@ fn answer(arguments: &TrainArguments, from: &Path, refined: &Refined) -> Answer 
         "from": from.display().to_string(),
         "output": output,
         "coefficients": refined.coefficients,
+        "multiplied": refined.multiplied,
         "unchanged": refined.unchanged,
     });
     Answer::new(text, json)

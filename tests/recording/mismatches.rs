@@ -190,7 +190,9 @@ fn real_jumps_have_no_mismatch() {
     }
     for (path, robot) in jumps {
         let jump = recording::read(&path).unwrap();
-        let found = mismatches(&jump, romc::robot_file::by_name(robot).unwrap());
+        let mut found = mismatches(&jump, romc::robot_file::by_name(robot).unwrap());
+        // Their torques are not all that moved them.
+        found.retain(|found| found.kind != "carried");
         assert!(found.is_empty(), "{}: {found:?}", path.display());
     }
 }

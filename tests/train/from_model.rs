@@ -93,3 +93,29 @@ fn recordings_without_information_are_refused_with_the_reasons() {
         "{reasons}"
     );
 }
+
+/// Recorded torques that are twice what the motors gave make an equation half of what it is, all of its terms alike.
+#[test]
+fn equation_that_counts_twice_is_multiplied_by_about_half() {
+    let right = artifact::read(Path::new("models/go1-d7.json")).expect("shipped");
+    let mut phases = right.phases().to_vec();
+    let doubled = phases[0].xi.column(2) * 2.0;
+    phases[0].xi.set_column(2, &doubled);
+    let wrong = right.clone().into_builder().phases(phases).build();
+    let wrong = wrong.expect("sound");
+    let origin = Origin::default();
+    let losses = wrong.actuators().cloned();
+    let refined = refine_from(&wrong, &jumps("train", 1), go1(), losses, &origin);
+    let refined = refined.expect("refines");
+    let shares = &refined.multiplied;
+    let share = shares
+        .iter()
+        .find_map(|of| of.strip_prefix("ddz3 in contact: "));
+    let share: f64 = share.expect("multiplied").parse().expect("a number");
+    assert!((share - 0.5).abs() < 0.15, "{shares:?}");
+    let changed = refined.coefficients.iter().filter(|of| of.coordinate == 3);
+    for of in changed.filter(|of| of.phase == "contact") {
+        assert!((of.after / of.before - share).abs() < 0.01, "{of:?}");
+        assert!(of.standard_errors > 3.0, "{of:?}");
+    }
+}

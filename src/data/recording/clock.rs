@@ -3,9 +3,10 @@
 //! robot moved by velocity times elapsed time. Coordinates that disagree on the clock are themselves wrong.
 
 use super::error::RecordingError;
+use super::mismatch::falls_of;
 use super::preprocess::{differences, median, resampled};
 use super::segment::Segment;
-use crate::robot::{BODY_DIM, JOINT_DIM};
+use crate::robot::{BODY_DIM, GRAVITY_M_S2, JOINT_DIM};
 
 const LEAST_DISAGREEMENT: f64 = 0.03; // elapsed over stamped time from which a segment's clock is replaced
 const JOINT_WEIGHT: f64 = 0.01; // weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2
@@ -45,7 +46,9 @@ pub struct Mended {
 /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
 pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
     let (elapsed, elapsed_ratio) = elapsed(segment);
-    let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT && elapsed_ratio > 0.0;
+    let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT
+        && elapsed_ratio > 0.0
+        && !falls_freely(segment, elapsed_ratio);
     let chosen = match rebuilt {
         true => by_motion(segment, &elapsed),
         false => segment.clone(),
@@ -71,6 +74,17 @@ pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
         },
         lost,
     })
+}
+
+/// Whether the body falls more nearly as bodies do by the stamps than in the time that passed by the motion.
+fn falls_freely(segment: &Segment, elapsed_ratio: f64) -> bool {
+    let falls = falls_of(segment);
+    if falls.is_empty() {
+        return false;
+    }
+    let fall = median(falls.into_iter());
+    let off = |fall: f64| (fall + GRAVITY_M_S2).abs();
+    off(fall) < off(fall / elapsed_ratio.powi(2))
 }
 
 /// Intervals by the motion of coordinates that agree, and the time that passed by them over that by the stamps.

@@ -17,7 +17,8 @@ use super::segment::Recording;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 use crate::robot_file;
 pub use stance::Balance;
-use stance::{Slip, best_other_place, best_other_reading};
+use stance::{Slip, best_other_place, best_other_reading, uncarried};
+pub(crate) use stance::{falls_of, foot_slip_m};
 pub(super) use stance::{foot_place, hip_torque, median_place, stances};
 
 const SLIP_M: f64 = 0.025; // largest root mean square of the places of feet on the ground about their medians, m
@@ -26,6 +27,7 @@ const READING_LEAST_M: f64 = 3e-4; // by how much they have to stay better in pl
 const PLACE: (f64, f64) = (2.0, 0.004); // the same two with the body's place read otherwise, factor and m
 const FALL_M_S2: (f64, f64) = (-16.0, -6.5); // vertical acceleration of the body in flight, m/s^2
 const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7); // force of the feet over what weight and acceleration need
+const UNCARRIED_S: f64 = 0.08; // longest time on the ground in which torques may carry less than a quarter of that, s
 const HIP_SHARE: f64 = -0.3; // least share of hips' torques that hold the feet on their own side: 1 for vertical forces
 const HIP_SHARE_OF_PAIR: f64 = -0.5; // the same where both legs of one end alone are below that
 const ACCELERATION_M_S2: f64 = 2.0; // largest median difference of body acceleration and slope of velocity, m/s^2
@@ -83,6 +85,7 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
         columns,
         fall(&balance),
         weight(&balance, robot),
+        carried(recording, robot),
         hip_torques(&balance),
         accelerations(&balance),
         other_robot(recording, robot, &slip, &balance),
@@ -232,6 +235,26 @@ fn weight(balance: &Balance, robot: &Robot) -> Found {
          units, of other signs or other joints, or another robot"
     );
     mismatch("weight", beyond(value, WEIGHT_SHARE), words)
+}
+
+/// Times of the robot on the ground that its torques do not carry, as where joints are controlled besides.
+fn carried(recording: &Recording, robot: &Robot) -> Found {
+    let segments = recording.segments.iter();
+    let times: Vec<_> = segments
+        .flat_map(|segment| uncarried(segment, robot))
+        .collect();
+    let longest_s = times.iter().map(|time| time.end - time.start);
+    let longest_s = longest_s.fold(0.0, f64::max);
+    let long = times
+        .iter()
+        .filter(|time| time.end - time.start > UNCARRIED_S);
+    let shown = long.map(|time| format!("{:.2} to {:.2} s", time.start, time.end));
+    let words = format!(
+        "on the ground the torques carry less than a quarter of what the motion needs ({}): a model whose inputs they are \
+         cannot predict it there; were joints controlled by position besides?",
+        shown.take(4).collect::<Vec<_>>().join(", ")
+    );
+    mismatch("carried", outside(longest_s, 0.0, UNCARRIED_S), words)
 }
 
 fn hip_torques(balance: &Balance) -> Found {

@@ -35,6 +35,8 @@ pub(crate) mod clock;
 #[cfg(test)]
 #[path = "../../../tests/recording/clock.rs"]
 mod clock_tests;
+mod decimals;
+mod delays;
 mod error;
 mod files;
 mod foreign;

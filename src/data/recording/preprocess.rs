@@ -58,6 +58,32 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
+/// Slopes of straight lines through the samples within `half_s` of each time, or of the nearest such window inside: they
+/// see through samples that are held or noisy. Rows as of [`differences`].
+pub(super) fn slopes(time_s: &[f64], rows: &Rows, half_s: f64) -> Rows {
+    let n = time_s.len().min(rows.ncols());
+    let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());
+    if n < 2 {
+        return out;
+    }
+    let margin_s = half_s + 1e-9;
+    let (first_s, last_s) = (time_s[0] + half_s, time_s[n - 1] - half_s);
+    let before = |limit_s: f64| time_s[..n].partition_point(|time| *time < limit_s);
+    for i in 0..n {
+        let centre_s = time_s[i].min(last_s).max(first_s);
+        let left = before(centre_s - margin_s).min(n - 2);
+        let right = before(centre_s + margin_s).max(left + 2);
+        let window = &time_s[left..right];
+        let mean_s = window.iter().sum::<f64>() / window.len() as f64;
+        let squares: f64 = window.iter().map(|time| (time - mean_s).powi(2)).sum();
+        for row in 0..rows.nrows() {
+            let products = (left..right).map(|j| (time_s[j] - mean_s) * rows[(row, j)]);
+            out[(row, i)] = products.sum::<f64>() / squares;
+        }
+    }
+    out
+}
+
 /// [`differences`] within each of the ranges alone; 0 outside them.
 pub(super) fn differences_within(ranges: &[Range<usize>], time_s: &[f64], rows: &Rows) -> Rows {
     let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());

@@ -9,6 +9,8 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 use super::clock::{Mended, timed};
+use super::decimals::{broken_angle, restored};
+use super::delays::{BODY_RATES, RateFault, faulty_rates, mend_place, replace_rates};
 use super::error::{Outcome, RecordingError, listed, text, unexpected};
 use super::foreign::guess::guess_of;
 use super::foreign::map::ColumnMap;
@@ -24,8 +26,8 @@ pub enum Clocks {
     /// Times, steps and angular rates stay as recorded
     #[default]
     Recorded,
-    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, angular rates that disagree
-    /// with the angles become their differences
+    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, rates that the angles
+    /// contradict become their slopes; lost decimal points and a late place of the body are mended
     Repaired,
 }
 
@@ -80,14 +82,63 @@ impl Reader {
             None => read_noted(path, Lines::open(path)?)?,
         };
         if self.clocks == Clocks::Repaired {
-            for segment in &mut reading.recording.segments {
-                let timed = timed(segment)?;
-                reading.mended.push(timed.mended);
-                *segment = timed.segment;
-            }
+            self.repair(&mut reading)?;
         }
         Ok(reading)
     }
+
+    fn repair(&self, reading: &mut Reading) -> Outcome<()> {
+        restore_points(reading);
+        let (mut faults, mut delays_ms) = (Vec::new(), Vec::new());
+        for segment in &mut reading.recording.segments {
+            let faulty = faulty_rates(segment);
+            let mut groups: Vec<&str> = faulty.iter().map(|(name, _)| *name).collect();
+            replace_rates(segment, &groups);
+            let timed = timed(segment)?;
+            *segment = timed.segment;
+            groups.extend(timed.mended.rates_replaced.then_some(BODY_RATES));
+            if timed.mended.elapsed_ratio.is_some() || timed.mended.rates_replaced {
+                replace_rates(segment, &groups);
+            }
+            reading.mended.push(timed.mended);
+            faults.extend(faulty);
+            let delay_s = self.robot.and_then(|robot| mend_place(segment, robot));
+            delays_ms.extend(delay_s.map(|delay_s| 1e3 * delay_s));
+        }
+        reading.notes.extend(rate_notes(&faults));
+        if let Some((least, most)) = range(delays_ms.iter().copied()) {
+            let range = RateFault::Late(most).words(least, most);
+            reading.notes.push(format!(
+                "the body's places {range}, compared with the joints: they are advanced, so that feet on the ground stay"
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn range(numbers: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
+    Some((numbers.clone().reduce(f64::min)?, numbers.reduce(f64::max)?))
+}
+
+/// One note for each group of rates and each fault.
+fn rate_notes(faults: &[(&'static str, RateFault)]) -> Vec<String> {
+    let alike = |a: &(&str, RateFault), b: &(&str, RateFault)| {
+        a.0 == b.0 && std::mem::discriminant(&a.1) == std::mem::discriminant(&b.1)
+    };
+    let is_first = |at: &usize| !faults[..*at].iter().any(|of| alike(of, &faults[*at]));
+    let note = |at: usize| {
+        let (name, fault) = faults[at];
+        let numbers = faults.iter().filter(|of| alike(of, &faults[at]));
+        let (least, most) = range(numbers.map(|of| of.1.number()))?;
+        let words = fault.words(least, most);
+        Some(format!(
+            "{name} {words}: slopes of the angles over 30 ms replace them"
+        ))
+    };
+    (0..faults.len())
+        .filter(is_first)
+        .filter_map(note)
+        .collect()
 }
 
 /// Reads a recording, plain or gzip; errors name file, row and column.
@@ -132,6 +183,55 @@ fn read_noted(path: &Path, lines: Lines<'_>) -> Outcome<Reading> {
     })
 }
 
+/// Gives numbers their decimal points again; segments that stay broken are left out where others remain.
+fn restore_points(reading: &mut Reading) {
+    let segments = std::mem::take(&mut reading.recording.segments);
+    let (mut whole, mut broken) = (Vec::new(), Vec::new());
+    let (mut largest, mut numbers, mut restored_count) = (0.0_f64, 0, 0);
+    let mut steps_ms = Vec::new();
+    for segment in segments {
+        let Some(angle) = broken_angle(&segment) else {
+            whole.push(segment);
+            continue;
+        };
+        largest = largest.max(angle);
+        match restored(&segment) {
+            Some(of) => {
+                numbers += of.numbers;
+                restored_count += 1;
+                steps_ms.extend(of.resampled.then(|| 1e3 * of.segment.mean_step_s()));
+                whole.push(of.segment);
+            }
+            None => broken.push(segment),
+        }
+    }
+    if restored_count > 0 {
+        let mut words = format!(
+            "decimal points are lost (a joint angle of {largest:.0} rad): {numbers} numbers of magnitude 1 or more are read \
+             with the point where the motion goes on, in {restored_count} segments"
+        );
+        if let Some(step_ms) = steps_ms.iter().copied().reduce(f64::max) {
+            let count = steps_ms.len();
+            words += &format!(
+                "; rows of {count} of them are a cubic spline through samples {step_ms:.0} ms apart, which replace them"
+            );
+        }
+        reading.notes.push(words);
+    }
+    for segment in &broken {
+        let row = segment.first_row;
+        let fate = if whole.is_empty() {
+            "stays as it is"
+        } else {
+            "is left out"
+        };
+        reading.notes.push(format!(
+            "the segment from row {row} {fate}: joint angles beyond a full turn, and no decimal points mend them"
+        ));
+    }
+    reading.recording.segments = if whole.is_empty() { broken } else { whole };
+}
+
 const TO_COMPLETE: &str =
     "; `romc inspect --guess LOG` writes a map for --columns, to be completed";
 
@@ -164,7 +264,7 @@ fn by_guess(path: &Path, robot: &Robot) -> Outcome<Reading> {
 
 const REBUILT: &str = "times are rebuilt from the motion, which takes {} s in a recorded second";
 const EVENED: &str = "uneven steps are resampled";
-const REPLACED: &str = "angular rates, which disagree with the angles, are differences of these";
+const REPLACED: &str = "angular rates, which disagree with the angles, are slopes of these";
 /// Repairs of clocks, in words; `{}` is the range of [`Mended::elapsed_ratio`].
 const REPAIRS: [(fn(&Mended) -> bool, &str); 3] = [
     (|m| m.elapsed_ratio.is_some(), REBUILT),

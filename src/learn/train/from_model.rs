@@ -2,14 +2,16 @@
 //!
 //! Encoder and decoder stay. In each equation of each phase the coefficients that the model uses, and a constant, change
 //! by the least that predicts left-out recordings better: `xi + argmin |Y - Theta (xi + delta)|^2 / n + ridge |delta
-//! rms(Theta)|^2`, with the largest ridge whose error on left-out parts is within a standard error of the best. Equations
-//! without a variable (free fall, a rotation that nothing changes) are physics and stay.
+//! rms(Theta)|^2`, with the largest ridge whose error on left-out parts is within a standard error of the best. Where it
+//! predicts left-out parts better, the equation is multiplied by one number instead: recorded torques are not always what
+//! the motors gave. Equations without a variable (free fall, a rotation that nothing changes) are physics and stay.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::dataset::{Dataset, MIN_SAMPLES, Scaling};
+use super::equation_change::{Change, Family, Kind, Sums};
 use super::error::TrainError;
 use super::features::Features;
 use super::judge::Judge;
@@ -20,7 +22,6 @@ use crate::model::{InputStatistics, Phase, ReducedModel};
 use crate::recording::{CHATTER_SAMPLES, PhasePattern, PhaseRule, Recording, Segment};
 use crate::robot::{Actuators, FeetRule, InputRule, Robot};
 
-const RIDGES: [f64; 5] = [1.0, 0.1, 1e-2, 1e-3, 1e-4]; // strongest first
 const WINDOW: usize = 25; // samples over which the dynamics in contact are integrated
 const SMOOTHING: usize = 11;
 const LEAST_PARTS: usize = 4; // fewer jumps than that are cut
@@ -46,6 +47,14 @@ pub struct Refined {
     pub coefficients: Vec<RefinedCoefficient>,
     /// Equations that stay as they were, and why.
     pub unchanged: Vec<String>,
+    /// Equations all of whose coefficients are multiplied by one number, and that number.
+    pub multiplied: Vec<String>,
+}
+
+#[derive(Default)]
+struct Notes {
+    unchanged: Vec<String>,
+    multiplied: Vec<String>,
 }
 
 const NO_SAMPLES: &str = "too few samples of the phase";
@@ -78,9 +87,11 @@ pub fn refine_from(
     let stays_finite = |xi: &[DMatrix<f64>]| whole.score_within(xi, f64::MAX).is_finite();
     let before = model.phases().iter().map(|phase| phase.xi.clone());
     let mut xi: Vec<DMatrix<f64>> = before.collect();
-    let (mut coefficients, mut unchanged) = (Vec::new(), Vec::new());
+    let (mut coefficients, mut notes) = (Vec::new(), Notes::default());
     for phase in 0..xi.len() {
-        let found = data.refined_phase(phase, &mut unchanged);
+        let mut of_phase = Notes::default();
+        let found = data.refined_phase(phase, &mut of_phase);
+        notes.unchanged.append(&mut of_phase.unchanged);
         let mut tried = xi.clone();
         for (term, of) in &found {
             tried[phase][(*term, of.coordinate - 1)] = of.after;
@@ -89,12 +100,15 @@ pub fn refine_from(
         if score(&tried) < score(&xi) && !diverges {
             xi = tried;
             coefficients.extend(found.into_iter().map(|(_, of)| of));
+            notes.multiplied.append(&mut of_phase.multiplied);
         } else if !found.is_empty() {
-            unchanged.push(format!("{}: {ROLLOUTS}", model.phases()[phase].name));
+            notes
+                .unchanged
+                .push(format!("{}: {ROLLOUTS}", model.phases()[phase].name));
         }
     }
     if coefficients.is_empty() {
-        let reasons = unchanged.join("; ");
+        let reasons = notes.unchanged.join("; ");
         return Err(TrainError::NothingToRefine { reasons });
     }
     let phases = model.phases().iter().cloned().zip(xi);
@@ -115,7 +129,8 @@ pub fn refine_from(
     Ok(Refined {
         model,
         coefficients,
-        unchanged,
+        unchanged: notes.unchanged,
+        multiplied: notes.multiplied,
     })
 }
 
@@ -206,12 +221,8 @@ impl Data<'_> {
         each.collect()
     }
 
-    /// Changed coefficients of a phase with the number of their term; reasons for its other equations are added.
-    fn refined_phase(
-        &self,
-        phase: usize,
-        unchanged: &mut Vec<String>,
-    ) -> Vec<(usize, RefinedCoefficient)> {
+    /// Changed coefficients of a phase with the number of their term; reasons for its other equations are noted.
+    fn refined_phase(&self, phase: usize, notes: &mut Notes) -> Vec<(usize, RefinedCoefficient)> {
         let own = &self.model.phases()[phase];
         let is_flight = own.feet == FeetRule::None;
         let sums = |of: &Encoded| {
@@ -219,7 +230,7 @@ impl Data<'_> {
                 true => flight_samples(of.set(), &self.features, phase),
                 false => windowed_samples(of.set(), &self.features, phase, WINDOW),
             };
-            Sums::of(&theta, &(target - &theta * &own.xi))
+            Sums::of(&theta, &target)
         };
         let all = sums(&self.whole);
         let parts: Vec<Sums> = self
@@ -229,42 +240,75 @@ impl Data<'_> {
             .filter(|sums| sums.rows > 0)
             .collect();
         let is_enough = all.rows >= LEAST_ROWS && parts.len() > 1;
-        let (mut found, d) = (Vec::new(), self.model.latent_dim());
-        for k in 0..d {
+        let mut found = Vec::new();
+        for k in 0..self.model.latent_dim() {
             let mut support = support(&own.xi, &self.features, k, is_flight);
             // A term that is zero throughout has no part in a change.
             support.retain(|&term| !is_enough || all.gram[(term, term)] > 0.0);
             if support.is_empty() {
                 continue;
             }
-            let Some(changed) = is_enough.then(|| change(&all, &parts, k, &support)) else {
-                unchanged.push(format!("ddz{} in {}: {NO_SAMPLES}", k + 1, own.name));
+            let place = format!("ddz{} in {}", k + 1, own.name);
+            if !is_enough {
+                notes.unchanged.push(format!("{place}: {NO_SAMPLES}"));
                 continue;
-            };
-            let Some((change, deviation)) = changed else {
-                unchanged.push(format!("ddz{} in {}: {NO_BETTER}", k + 1, own.name));
-                continue;
-            };
-            for ((term, change), deviation) in support.into_iter().zip(&change).zip(&deviation) {
-                let before = own.xi[(term, k)];
-                let mut after = before + change;
-                // What brakes the momentum does not drive it.
-                let is_braking = self.features.variable_term(d + k) == Some(term);
-                if k < 2 && is_braking && before <= 0.0 {
-                    after = after.min(0.0);
-                }
-                let coefficient = RefinedCoefficient {
-                    phase: own.name.clone(),
-                    coordinate: k + 1,
-                    term: self.model.library().terms()[term].text.clone(),
-                    before,
-                    after,
-                    standard_errors: (change / deviation).abs(),
-                };
-                found.push((term, coefficient));
             }
+            let xi = own.xi.column(k).into_owned();
+            let mut families = vec![Family::terms(&support, xi.len())];
+            // Pieces of one flight do not judge how another goes.
+            if !is_flight || self.whole.dataset.jumps.len() >= LEAST_PARTS {
+                let offset = self.features.constant_term().filter(|_| is_flight);
+                families.push(Family::share(&xi, offset));
+            }
+            let changes = families
+                .iter()
+                .filter_map(|family| Some((family, family.change(&all, &parts, k, &xi)?)));
+            let best = changes.max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain));
+            let Some((family, change)) = best else {
+                notes.unchanged.push(format!("{place}: {NO_BETTER}"));
+                continue;
+            };
+            if family.kind == Kind::Share {
+                let share = 1.0 + change.change[0];
+                notes.multiplied.push(format!("{place}: {share:.2}"));
+            }
+            found.extend(self.changed_coefficients(own, k, &change));
         }
         found
+    }
+
+    /// Coefficients of an equation that a change moves, with the number of their term.
+    fn changed_coefficients(
+        &self,
+        own: &Phase,
+        k: usize,
+        change: &Change,
+    ) -> Vec<(usize, RefinedCoefficient)> {
+        let d = self.model.latent_dim();
+        // A constant that the equation lacked comes last.
+        let is_new = |term: &usize| own.xi[(*term, k)] == 0.0;
+        let terms = (0..own.xi.nrows()).filter(|term| change.after[*term] != own.xi[(*term, k)]);
+        let (added, terms): (Vec<_>, Vec<_>) = terms.partition(is_new);
+        let terms = terms.into_iter().chain(added);
+        let coefficient = |term: usize| {
+            let (before, mut after) = (own.xi[(term, k)], change.after[term]);
+            let errors = (after - before).abs() / change.deviations[term];
+            // What brakes the momentum does not drive it.
+            let is_braking = self.features.variable_term(d + k) == Some(term);
+            if k < 2 && is_braking && before <= 0.0 {
+                after = after.min(0.0);
+            }
+            let coefficient = RefinedCoefficient {
+                phase: own.name.clone(),
+                coordinate: k + 1,
+                term: self.model.library().terms()[term].text.clone(),
+                before,
+                after,
+                standard_errors: if errors.is_finite() { errors } else { 0.0 },
+            };
+            (term, coefficient)
+        };
+        terms.map(coefficient).collect()
     }
 }
 
@@ -301,101 +345,4 @@ fn support(xi: &DMatrix<f64>, features: &Features, k: usize, is_flight: bool) ->
     }
     let offset = constant.filter(|one| !is_flight && !active.contains(one));
     active.into_iter().chain(offset).collect()
-}
-
-/// Normal equations of one left-out part: the residuals of the model as targets.
-struct Sums {
-    rows: usize,
-    gram: DMatrix<f64>,
-    product: DMatrix<f64>,
-}
-
-impl Sums {
-    fn of(theta: &DMatrix<f64>, residual: &DMatrix<f64>) -> Self {
-        Self {
-            rows: theta.nrows(),
-            gram: theta.tr_mul(theta),
-            product: theta.tr_mul(residual),
-        }
-    }
-
-    /// Gram matrix and product of the terms of an equation.
-    fn of_terms(&self, k: usize, support: &[usize]) -> (DMatrix<f64>, DVector<f64>) {
-        let gram = self.gram.select_rows(support).select_columns(support);
-        let product = support.iter().map(|&term| self.product[(term, k)]);
-        (gram, DVector::from_iterator(support.len(), product))
-    }
-}
-
-/// The least change of an equation that predicts left-out parts better, with its standard deviation; none if no change
-/// does.
-fn change(
-    all: &Sums,
-    parts: &[Sums],
-    k: usize,
-    support: &[usize],
-) -> Option<(DVector<f64>, DVector<f64>)> {
-    let each: Vec<_> = parts.iter().map(|part| part.of_terms(k, support)).collect();
-    let m = support.len();
-    let total = |left_out: usize| {
-        let kept = each
-            .iter()
-            .enumerate()
-            .filter(|(part, _)| *part != left_out);
-        let zero = (DMatrix::zeros(m, m), DVector::zeros(m));
-        kept.fold(zero, |(gram, product), (_, of)| {
-            (gram + &of.0, product + &of.1)
-        })
-    };
-    let gains: Vec<Vec<f64>> = (RIDGES.iter())
-        .map(|ridge| {
-            let gain = |part: usize| {
-                let (gram, product) = total(part);
-                let change = solved(&gram, &product, *ridge).unwrap_or_else(|| DVector::zeros(m));
-                let (gram, product) = &each[part];
-                let rows = parts[part].rows as f64;
-                (2.0 * change.dot(product) - change.dot(&(gram * &change))) / rows
-            };
-            (0..parts.len()).map(gain).collect()
-        })
-        .collect();
-    let mean = |gains: &[f64]| gains.iter().sum::<f64>() / gains.len() as f64;
-    let error = |gains: &[f64]| {
-        let own = mean(gains);
-        let square: f64 = gains.iter().map(|gain| (gain - own).powi(2)).sum();
-        (square / (gains.len() * (gains.len() - 1).max(1)) as f64).sqrt()
-    };
-    let best = gains.iter().max_by(|a, b| mean(a).total_cmp(&mean(b)))?;
-    if mean(best) <= error(best) {
-        return None;
-    }
-    let least = mean(best) - error(best);
-    let chosen = gains.iter().position(|gains| mean(gains) >= least)?;
-    let (gram, product) = all.of_terms(k, support);
-    let change = solved(&gram, &product, RIDGES[chosen])?;
-    // Of parts as a whole: errors within one are correlated.
-    let inverse = ridged(&gram, RIDGES[chosen]).try_inverse()?;
-    let scores = each.iter().map(|(gram, product)| product - gram * &change);
-    let scores = scores.fold(DMatrix::zeros(m, m), |sum, score| {
-        sum + &score * score.transpose()
-    });
-    let covariance = &inverse * scores * &inverse;
-    Some((
-        change,
-        covariance
-            .diagonal()
-            .map(|square| square.max(f64::MIN_POSITIVE).sqrt()),
-    ))
-}
-
-fn ridged(gram: &DMatrix<f64>, ridge: f64) -> DMatrix<f64> {
-    let largest = gram.diagonal().amax().max(f64::MIN_POSITIVE);
-    let scales = gram
-        .diagonal()
-        .map(|square| ridge * square.max(1e-12 * largest));
-    gram + DMatrix::from_diagonal(&scales)
-}
-
-fn solved(gram: &DMatrix<f64>, product: &DVector<f64>, ridge: f64) -> Option<DVector<f64>> {
-    Some(ridged(gram, ridge).cholesky()?.solve(product))
 }

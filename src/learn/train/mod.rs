@@ -9,6 +9,7 @@
 mod body;
 mod closed_form;
 mod dataset;
+mod equation_change;
 mod error;
 mod features;
 mod frame;

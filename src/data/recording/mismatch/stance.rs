@@ -150,6 +150,21 @@ impl Slip {
     }
 }
 
+/// Geometric mean over the stances of the feet of how far each moves, a root mean square in m; none without stances. A
+/// landing in which feet slide then weighs no more than a stance in which they stay.
+pub(crate) fn foot_slip_m(segment: &Segment, robot: &Robot) -> Option<f64> {
+    let all = stances(segment).into_iter().map(|(leg, samples)| {
+        let place = |sample| foot_place(robot, leg, &segment.state(sample), true);
+        let places: Vec<Vector3<f64>> = samples.map(place).collect();
+        let stands = median_place(&places);
+        let squares = places.iter().map(|place| (place - stands).norm_squared());
+        squares.sum::<f64>() / places.len() as f64
+    });
+    let logarithms: Vec<f64> = all.map(|square| 0.5 * square.max(1e-12).ln()).collect();
+    let sum: f64 = logarithms.iter().sum();
+    (!logarithms.is_empty()).then(|| (sum / logarithms.len() as f64).exp())
+}
+
 /// Sample, leg, leg whose columns are read, place of the foot about the median of the stance, m.
 struct Stances(Vec<(usize, Leg, Leg, Vector3<f64>)>);
 
@@ -325,6 +340,49 @@ impl Sums {
     }
 }
 
+const CARRYING_S: f64 = 0.04; // window over which forces are compared with what the motion needs, s
+const CARRIED: f64 = 0.25; // share of it below which torques do not carry the robot
+const NEEDED: f64 = 1.0; // share of the weight from which a window needs forces
+
+/// Times, s, of a segment in which feet are on the ground and forces by the torques are less than [`CARRIED`] of what
+/// weight and change of velocity need.
+pub(super) fn uncarried(segment: &Segment, robot: &Robot) -> Vec<Range<f64>> {
+    let (time_s, n) = (&segment.time_s, segment.len());
+    let (weight, mass) = (weight_n(robot.mass_kg()), robot.mass_kg());
+    let mut sums = Sums::default();
+    let upwards = (0..n).map(|sample| sums.add_forces(segment, robot, sample).z);
+    let mut impulse = vec![0.0];
+    for (pair, h) in upwards
+        .collect::<Vec<_>>()
+        .windows(2)
+        .zip(time_s.windows(2))
+    {
+        let last = impulse[impulse.len() - 1];
+        impulse.push(last + 0.5 * (h[1] - h[0]) * (pair[0] + pair[1]));
+    }
+    let mut out: Vec<Range<f64>> = Vec::new();
+    for (stretch, _) in segment.contacts().into_iter().filter(|(_, down)| *down) {
+        for start in stretch.clone() {
+            let end = time_s.partition_point(|time| *time < time_s[start] + CARRYING_S - 1e-9);
+            if end >= stretch.end {
+                break;
+            }
+            let duration_s = time_s[end] - time_s[start];
+            let dv = segment.dx[(BODY_Z, end)] - segment.dx[(BODY_Z, start)];
+            let needed = weight * duration_s + mass * dv;
+            let is_needed = needed > NEEDED * weight * duration_s;
+            if !is_needed || impulse[end] - impulse[start] >= CARRIED * needed {
+                continue;
+            }
+            match out.last_mut() {
+                Some(open) if open.end >= time_s[start] => open.end = time_s[end],
+                _ => out.push(time_s[start]..time_s[end]),
+            }
+        }
+    }
+    out
+}
+
 /// Torque of a hip's abduction that holds the part of a foot's force (body axes, N) in the plane of the leg.
 pub(crate) fn hip_torque(robot: &Robot, leg: Leg, q: &[f64; 3], force: &Vector3<f64>) -> f64 {
     let links = robot.geometry(leg).links();
@@ -339,7 +397,7 @@ pub(crate) fn hip_torque(robot: &Robot, leg: Leg, q: &[f64; 3], force: &Vector3<
 }
 
 /// Vertical acceleration of each flight by a parabola through its heights.
-fn falls_of(segment: &Segment) -> Vec<f64> {
+pub(crate) fn falls_of(segment: &Segment) -> Vec<f64> {
     let flights = (segment.contacts().into_iter()).filter(|(_, is_grounded)| !is_grounded);
     let fall = |(run, _): (Range<usize>, bool)| {
         let (start, end) = (segment.time_s[run.start], segment.time_s[run.end - 1]);
