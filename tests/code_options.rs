@@ -418,7 +418,7 @@ fn physical_latex_has_the_units_of_a_mass_and_of_times() {
     assert!(file("go1_d4-table.tex").contains(r"\mathrm{m/s^{2}}"));
     assert!(file("go1_d4-nomenclature.tex").contains(r"$\mathrm{N}$"));
     assert!(file("go1_d4.md").contains(r"\mathrm{m/s^{2}}"));
-    for unit in ["m/s^2", "1/kg", "rad/(kg m^2)", "rad/(m s^2)", "1/(kg m)"] {
+    for unit in ["m/s^2", "1/kg", "rad/(kg m^2)", "rad/(m s^2)"] {
         assert!(file("go1_d4.h").contains(unit), "{unit}");
     }
     assert!(!file("go1_d4.h").contains("scaled"));

@@ -375,7 +375,7 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
         if !is_thorough() && ![1, 3, 5].contains(&number) {
             continue;
         }
-        let emitted = Emitted::new(&model, Precision::Double);
+        let emitted = Emitted::with_library_sines(&model);
         let replay = root().join("tests/controller_c/replay.c");
         let program = emitted.program("cc", &[], replay.to_str().expect("UTF-8"));
         let file = emitted.scratch.path().join("steps");
@@ -416,7 +416,7 @@ fn controller_in_c_repeats_the_library_bit_for_bit_with_limits_on_torque_rates()
         if !is_thorough() && ![0, 3].contains(&number) {
             continue;
         }
-        let emitted = Emitted::new(&model, Precision::Double);
+        let emitted = Emitted::with_library_sines(&model);
         let replay = root().join("tests/controller_c/replay.c");
         let rates = format!("-D{}_TORQUE_RATES=1", emitted.name.to_ascii_uppercase());
         let program = emitted.program("cc", &[&rates], replay.to_str().expect("UTF-8"));

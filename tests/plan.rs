@@ -91,7 +91,7 @@ fn plan_is_a_recording_that_other_commands_take() {
     assert_eq!(
         torques(
             "again",
-            "terminal_weight = 100.0\ninput_weight = 30.0\nvelocity_weight = 1.0\n\
+            "terminal_weight = 100.0\ninput_weight = 10.0\nvelocity_weight = 1.0\n\
         effectiveness_time_s = 1.0\ndrive_stiffness_nm_rad = 20.0\ndrive_damping_nm_s_rad = 0.8\n"
         ),
         with

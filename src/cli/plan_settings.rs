@@ -61,7 +61,7 @@ fn of_plans(robot: &Robot) -> MpcSettings {
     let share = size(robot) / size(go1);
     let gain = |of_go1: f64| (1e3 * of_go1 * share).round() / 1e3;
     MpcSettings {
-        input_weight: 30.0,
+        input_weight: 10.0,
         velocity_weight: 1.0,
         terminal_weight: 100.0,
         effectiveness: Some(Effectiveness {

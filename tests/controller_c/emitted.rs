@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use romc::codegen::Precision;
+use romc::codegen::{Precision, SineCosine};
 use romc::deploy::{EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::model::ReducedModel;
@@ -32,8 +32,18 @@ pub struct Emitted {
 
 impl Emitted {
     pub fn new(model: &ReducedModel, precision: Precision) -> Self {
+        Self::with(model, precision, SineCosine::default())
+    }
+
+    /// With the sines of the C library, which the library of romc takes as well.
+    pub fn with_library_sines(model: &ReducedModel) -> Self {
+        Self::with(model, Precision::Double, SineCosine::Library)
+    }
+
+    fn with(model: &ReducedModel, precision: Precision, sines: SineCosine) -> Self {
         let options = EmitOptions {
             precision,
+            sines,
             ..EmitOptions::default()
         };
         let files = emit(&Equations::of(model), &[Target::ControllerC], &options);

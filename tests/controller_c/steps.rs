@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use romc::codegen::Precision;
 use romc_translate::controller;
 
 use crate::emitted::Emitted;
@@ -63,7 +62,7 @@ fn changed_lines(file: &str, from: &str, changed: &str) -> Vec<(String, String)>
 #[test]
 fn changes_of_the_steps_in_rust_change_the_commands_of_the_c() {
     let model = shipped("go1-d2");
-    let emitted = Emitted::new(&model, Precision::Double);
+    let emitted = Emitted::with_library_sines(&model);
     let source = emitted
         .folder()
         .join(format!("{}_controller.c", emitted.name));

@@ -376,7 +376,7 @@ fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
             let off = off.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             equal += usize::from(off < 1e-6);
             // In the few steps in which a foot would leave its pyramid torques are others, but not far.
-            assert!(off < 2.0, "{name} at {}: {off} N m", time_s);
+            assert!(off < 4.0, "{name} at {}: {off} N m", time_s);
         }
         match lift {
             Lift::Transpose => assert_eq!(equal, conic.rows.len(), "{name}"),
