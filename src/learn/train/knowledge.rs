@@ -180,7 +180,7 @@ impl Knowledge {
     ///
     /// With feet on the ground `ddz2` depends on its own force and velocity alone, and keeps its constant (gravity, less
     /// what the ground carries of the legs' weight). `ddz3` depends on velocities, on force and moment, and on products
-    /// of these with the height. The equations of the legs are affine, start from [`Standing`] and keep all terms. In
+    /// of these with the height if the library has them. The equations of the legs are affine, start from [`Standing`] and keep all terms. In
     /// flight `ddz1 = 0`, `ddz2 = -g`, `ddz3 = 0`, no term depends on force or moment, and the legs depend on their own
     /// inputs only. Momentum rows that change sign in a mirror image depend on forces and moments (`y` on its own force
     /// alone). No term depends on place or heading.
@@ -245,12 +245,10 @@ impl Knowledge {
         }
     }
 
-    /// Keeps the free terms of a column that are affine or a product of the height and a load.
-    fn keep(&mut self, column: usize, features: &Features, loads: &Range<usize>) {
-        for (term, variables) in features.variables() {
-            let is_arm = matches!(variables[..], [HEIGHT, load] if loads.contains(&load));
-            self.kept[(term, column)] =
-                self.free[(term, column)] && (features.affine[term] || is_arm);
+    /// Keeps the free terms of a column that are affine.
+    fn keep(&mut self, column: usize, features: &Features) {
+        for (term, is_affine) in features.affine.iter().enumerate() {
+            self.kept[(term, column)] = self.free[(term, column)] && *is_affine;
         }
     }
 
@@ -265,7 +263,7 @@ impl Knowledge {
                 let has_arm = !variables.contains(&HEIGHT) || variables.iter().any(is_load);
                 !(variables.iter().all(is_known) && has_arm)
             });
-            self.keep(k, features, &loads);
+            self.keep(k, features);
         }
     }
 
@@ -284,7 +282,7 @@ impl Knowledge {
                 [v] => v < inputs || !loads.contains(&(v - inputs)),
                 _ => true,
             });
-            self.keep(k, features, &(0..0));
+            self.keep(k, features);
         }
     }
 
@@ -339,7 +337,7 @@ impl Knowledge {
             self.free.column_mut(k).fill(false);
         }
         for k in legs.clone() {
-            self.keep(k, features, &loads);
+            self.keep(k, features);
         }
         self.swinging = legs;
     }

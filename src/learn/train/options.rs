@@ -1,7 +1,5 @@
 //! What to train and how.
 
-use std::iter;
-
 use clap::ValueEnum;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -16,9 +14,7 @@ use super::metrics::Trained;
 use super::progress::Monitor;
 use super::task::{Origin, Recordings};
 use crate::limits::table;
-use crate::model::{
-    Activation, LatentVariable, Library, LibraryChoice, MAX_LAYERS, StandardLibrary, check_name,
-};
+use crate::model::{Activation, Library, LibraryChoice, MAX_LAYERS, StandardLibrary, check_name};
 use crate::recording::CHATTER_SAMPLES;
 use crate::recording::PhaseRule;
 use crate::recording::preprocess::BATCH_ROWS;
@@ -58,8 +54,7 @@ impl Method {
 pub struct TrainOptions {
     pub name: String,
     pub latent_dim: usize,
-    /// Candidate terms. The default is 1, `z`, `dz` and `u`, and with the coordinates of the whole body also products of
-    /// its height with force and moment.
+    /// Candidate terms. The default is 1, `z`, `dz` and `u`.
     pub library: Option<LibraryChoice>,
     pub phases: PhaseRule,
     pub seed: u64,
@@ -256,19 +251,10 @@ impl TrainOptions {
         (0..count).map(|i| self.seed.wrapping_add(i)).collect()
     }
 
-    /// Library of the given or default terms. Products with the height model the lever arm of the ground forces.
+    /// Library of the given or default terms.
     pub(crate) fn library(&self) -> Result<Library, TrainError> {
-        let is_whole =
-            self.coordinates() == Coordinates::Named && has_leg_rows(&self.body(), self.latent_dim);
         let choice = match &self.library {
             Some(given) => given.clone(),
-            None if is_whole => {
-                let affine =
-                    LatentVariable::all(self.latent_dim).map(|variable| variable.to_string());
-                let loads = ["z2*u1", "z2*u2", "z2*u3"].map(str::to_owned);
-                let terms = iter::once("1".to_owned()).chain(affine).chain(loads);
-                LibraryChoice::Terms(terms.collect())
-            }
             None => LibraryChoice::Standard(StandardLibrary {
                 degree: 1,
                 trigonometric: false,
