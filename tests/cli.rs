@@ -1192,6 +1192,29 @@ fn inspect_tells_findings_of_a_recording_and_parts_of_a_model() {
 }
 
 #[test]
+fn inspect_says_what_each_latent_coordinate_is() {
+    let words = |model: &str| json(&["inspect", model])["files"][0]["latent_coordinates"].clone();
+    let whole = [
+        "centre of mass forwards, m",
+        "centre of mass upwards, m",
+        "rotation about the centre of mass, pitch, rad",
+        "front feet forwards from the centre of mass, m",
+        "front feet upwards from the centre of mass, m",
+        "rear feet forwards from the centre of mass, m",
+        "rear feet upwards from the centre of mass, m",
+    ];
+    assert_eq!(words("models/go1-d7.json"), serde_json::json!(whole));
+    let joints = &words("models/go1-d6.json")[3];
+    assert_eq!(joints, "joints of the rear legs, rad");
+    assert!(words("models/paper-2d.json").is_null());
+    let printed = done(&["inspect", "models/go1-d7.json"]);
+    assert!(
+        whole.iter().all(|words| printed.contains(words)),
+        "{printed}"
+    );
+}
+
+#[test]
 fn inspect_of_an_unknown_robot_lists_the_known_ones() {
     let error = refused(&["inspect", JUMP, "--robot", "go9"]);
     assert!(error.contains("go9") && error.contains("go1"), "{error}");

@@ -84,14 +84,14 @@ fn plan_is_a_recording_that_other_commands_take() {
         lines.collect::<Vec<_>>()
     };
     let own = fs::read_to_string(folder.join("plan.settings.toml")).expect("written");
-    assert!(own.contains("terminal_weight = 100.0 #"), "{own}");
+    assert!(own.contains("input_weight = 8.0 #"), "{own}");
     // The settings next to a plan are those of its controller: without them, commands are others.
     let [with, without] = [torques("with", &own), torques("without", "")];
     assert_ne!(with, without);
     assert_eq!(
         torques(
             "again",
-            "terminal_weight = 100.0\ninput_weight = 10.0\nvelocity_weight = 1.0\n\
+            "input_weight = 8.0\n\
         effectiveness_time_s = 1.0\ndrive_stiffness_nm_rad = 20.0\ndrive_damping_nm_s_rad = 0.8\n"
         ),
         with

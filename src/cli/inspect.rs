@@ -102,11 +102,11 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     if equations.terms.len() <= PATTERN_WIDTH {
         text.extend((0..phases.len()).map(|phase| pattern(&equations, phase)));
     }
-    let dominant = dominant_coordinates(model);
+    let (dominant, words) = (dominant_coordinates(model), latent_words::of(model));
     let [encoder, decoder] =
         [model.encoder_map(), model.decoder_map()].map(|map| map.ok().map(StateMap::summary));
     text += &match (&dominant, &encoder) {
-        (Some(dominant), _) => composition(dominant),
+        (Some(dominant), _) => composition(dominant, words.as_deref()),
         (None, Some(_)) => lines("  encoder ", &encoder) + &lines("  decoder ", &decoder),
         (None, None) => LATENT_ONLY.to_owned(),
     };
@@ -129,6 +129,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         "phases": phases,
         "exact": equations.steps,
         "dominant_coordinates": dominant,
+        "latent_coordinates": words,
         "encoder": encoder,
         "decoder": decoder,
         "actuators": model.actuators(),
@@ -150,13 +151,14 @@ fn phase_table(equations: &Equations<'_>, coefficients: usize) -> Table {
 
 type Dominant = Vec<Vec<(String, f64)>>;
 
-fn composition(dominant: &Dominant) -> String {
-    let line = |(weights, latent): (&Vec<(String, f64)>, i32)| {
+fn composition(dominant: &Dominant, words: Option<&[String]>) -> String {
+    let line = |(latent, weights): (usize, &Vec<(String, f64)>)| {
         let part = |(name, weight): &(String, f64)| format!("{} {name}", significant(*weight));
         let parts: Vec<String> = weights.iter().map(part).collect();
-        format!("  z{latent} = {} ...\n", parts.join(", "))
+        let what = words.map_or(String::new(), |words| format!("{}: ", words[latent]));
+        format!("  z{}  {what}{} ...\n", latent + 1, parts.join(", "))
     };
-    dominant.iter().zip(1..).map(line).collect()
+    dominant.iter().enumerate().map(line).collect()
 }
 
 fn input_rule(model: &ReducedModel) -> String {

@@ -49,9 +49,9 @@ pub(super) fn read_for(recording: &Path) -> Result<MpcSettings, Error> {
     settings.to_mpc().map_err(refused)
 }
 
-/// Unlike a recorded jump, a plan obeys the model: its inputs count more, and so do velocities and the end of a horizon.
-/// How much of the input arrives is estimated, under a joint PD: on the Go1 20 N m/rad and 0.8 N m s/rad as in the
-/// examples, on others in proportion to mass times length of the legs.
+/// Inputs count less than along a recorded jump, which brings the apex nearer. How much of them arrives is estimated, under a
+/// joint PD: on the Go1 20 N m/rad and 0.8 N m s/rad as in the examples, on others in proportion to mass times length of the
+/// legs.
 fn of_plans(robot: &Robot) -> MpcSettings {
     let size = |robot: &Robot| {
         let legs = robot.geometry(Leg::FrontRight).lengths_m;
@@ -61,9 +61,7 @@ fn of_plans(robot: &Robot) -> MpcSettings {
     let share = size(robot) / size(go1);
     let gain = |of_go1: f64| (1e3 * of_go1 * share).round() / 1e3;
     MpcSettings {
-        input_weight: 10.0,
-        velocity_weight: 1.0,
-        terminal_weight: 100.0,
+        input_weight: 8.0,
         effectiveness: Some(Effectiveness {
             time_constant_s: 1.0,
             stiffness_nm_rad: gain(20.0),

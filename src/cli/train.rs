@@ -154,8 +154,9 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
     let (report, latent_dim) = (&trained.report, trained.model.latent_dim());
     let output = arguments.output.display().to_string();
     let text = format!(
-        "{output}: {latent_dim} latent coordinates from {} recordings\n\n{}{}",
+        "{output}: {latent_dim} latent coordinates from {} recordings\n{}\n{}{}",
         arguments.recordings.len(),
+        latent_words::lines(&trained.model),
         metrics_table(report, tested),
         seed_table(report)
     );

@@ -1,6 +1,6 @@
 //! Torques that a leg needs to carry and move its own links, which never reach the ground.
 
-use core::ops::{Add, Mul, Sub};
+use core::ops::{Add, Mul, Neg, Sub};
 
 use super::geometry::{LegLinks, Robot};
 use super::joints::Leg;
@@ -22,9 +22,12 @@ pub struct LegMoments {
 }
 
 /// What formulas of vectors need of a number: numbers, and values of a program.
-pub trait Scalar: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+pub trait Scalar:
+    Copy + Neg<Output = Self> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+}
 
-impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Scalar for T {}
+impl<T: Copy + Neg<Output = T> + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> Scalar for T {}
 
 #[derive(Debug, Clone, Copy)]
 struct Vector<T>([T; 3]);
@@ -105,7 +108,6 @@ impl<T: Scalar> TrunkMotion<T> {
     ) -> Self {
         // Axes of the rates of pitch and yaw in the trunk's axes: (0, c_r, -s_r) and (-s_p, c_p s_r, c_p c_r).
         let (y_yaw, z_yaw) = (c_p * s_r, c_p * c_r);
-        let zero = s_p - s_p;
         let across = |roll_like: T, pitch_like: T, yaw_like: T| {
             Vector([
                 roll_like - s_p * yaw_like,
@@ -115,9 +117,9 @@ impl<T: Scalar> TrunkMotion<T> {
         };
         // The rates of these axes times the rates.
         let by_axes = Vector([
-            zero - c_p * pitch * yaw,
+            -(c_p * pitch * yaw),
             (z_yaw * roll - s_p * s_r * pitch) * yaw - s_r * roll * pitch,
-            zero - c_r * roll * pitch - (y_yaw * roll + s_p * c_r * pitch) * yaw,
+            -(c_r * roll * pitch) - (y_yaw * roll + s_p * c_r * pitch) * yaw,
         ]);
         // Turned back by the yaw, the pitch and the roll.
         let (along, aside) = (c_y * x + s_y * y, c_y * y - s_y * x);
