@@ -1195,17 +1195,17 @@ fn inspect_tells_findings_of_a_recording_and_parts_of_a_model() {
 fn inspect_says_what_each_latent_coordinate_is() {
     let words = |model: &str| json(&["inspect", model])["files"][0]["latent_coordinates"].clone();
     let whole = [
-        "centre of mass forwards, m",
-        "centre of mass upwards, m",
-        "rotation about the centre of mass, pitch, rad",
-        "front feet forwards from the centre of mass, m",
-        "front feet upwards from the centre of mass, m",
-        "rear feet forwards from the centre of mass, m",
-        "rear feet upwards from the centre of mass, m",
+        "centre of mass forwards, in 10 m",
+        "centre of mass upwards, in 10 m",
+        "rotation about the centre of mass, pitch, in 10 rad",
+        "front feet forwards from the centre of mass, in 10 m",
+        "front feet upwards from the centre of mass, in 10 m",
+        "rear feet forwards from the centre of mass, in 10 m",
+        "rear feet upwards from the centre of mass, in 10 m",
     ];
     assert_eq!(words("models/go1-d7.json"), serde_json::json!(whole));
     let joints = &words("models/go1-d6.json")[3];
-    assert_eq!(joints, "joints of the rear legs, rad");
+    assert_eq!(joints, "joints of the rear legs, in 10 rad");
     assert!(words("models/paper-2d.json").is_null());
     let printed = done(&["inspect", "models/go1-d7.json"]);
     assert!(

@@ -341,6 +341,41 @@ fn recordings_that_contradict_each_other_or_physics_are_refused_by_name() {
 }
 
 #[test]
+fn moments_of_legs_that_no_leg_has_are_refused_by_name() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("actuators.toml");
+    let losses = "[actuators]\nviscous = [1, 1, 1]\ndry = [0, 0, 0]\narmature = [0, 0, 0]\n[legs]\nside_kg_m = 0.07\n\
+                  thigh_kg_m = 0.07\ncalf_kg_m = 0.03\n";
+    let losses = losses
+        .replace("[1, 1, 1]", "[1.0, 1.0, 1.0]")
+        .replace("[0, 0, 0]", "[0.0, 0.0, 0.0]");
+    for (moments, expected) in [
+        ("thigh_kg_m2 = 0.02\ncalf_kg_m2 = 0.006\n", None),
+        (
+            "thigh_kg_m2 = -0.02\ncalf_kg_m2 = 0.006\n",
+            Some("legs.thigh_kg_m2"),
+        ),
+        (
+            "thigh_kg_m2 = 0.02\ncalf_kg_m2 = nan\n",
+            Some("legs.calf_kg_m2"),
+        ),
+    ] {
+        std::fs::write(&file, losses.clone() + moments).expect("written");
+        let read = romc::robot_file::read_actuators(&file, None);
+        match expected {
+            None => assert!(read.expect("sound").legs.is_some()),
+            Some(place) => {
+                let error = read.expect_err(place).to_string();
+                assert!(
+                    error.contains(place) && error.contains("actuators.toml"),
+                    "{error}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn training_refuses_them_too_whatever_actuators_it_is_given() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut without = read_all(&["go1/test_02.csv.gz"]).remove(0);

@@ -182,7 +182,17 @@ fn input_rule(model: &ReducedModel) -> String {
         .column("viscous", "N m s/rad", actuators.viscous)
         .column("dry", "N m", actuators.dry)
         .column("armature", "kg m^2", actuators.armature);
-    format!("{rule} torques of the motors less what the joints take\n\n{table}")
+    let legs = actuators.legs.map_or(String::new(), |legs| {
+        let first = [legs.side_kg_m, legs.thigh_kg_m, legs.calf_kg_m].map(significant);
+        let second = [legs.thigh_kg_m2, legs.calf_kg_m2].map(significant);
+        format!(
+            "\n  links of a leg on the ground, also taken off: first moments beside the hip, of thigh and calf {} kg m, \
+             second moments of thigh and calf {} kg m^2\n",
+            first.join(", "),
+            second.join(", ")
+        )
+    });
+    format!("{rule} torques of the motors less what the joints take\n\n{table}{legs}")
 }
 
 fn pattern(equations: &Equations<'_>, phase: usize) -> String {

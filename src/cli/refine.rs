@@ -6,6 +6,7 @@ use super::args::{TrainArguments, TrainSettings};
 use super::prepared_recordings::RecordedSets;
 use super::robot::chosen;
 use super::*;
+use crate::robot::Actuators;
 use crate::robot_file::read_actuators;
 use crate::train::{Origin, Refined, refine_from};
 
@@ -34,7 +35,15 @@ pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer, Err
     let is_other = model.robot().is_ok_and(|own| own.name != robot.name);
     if is_other && settings.actuators.is_none() && actuators.is_some() {
         note(
-            "joint friction and rotor inertia are those of the model's robot; --actuators replaces them",
+            "joint friction, rotor inertia and moments of the legs are those of the model's robot; --actuators replaces \
+             them",
+        );
+    }
+    let legs = |of: Option<&Actuators>| of.is_some_and(|known| known.legs.is_some());
+    if legs(actuators.as_ref()) != legs(model.actuators()) {
+        note(
+            "what the links of legs on the ground take is subtracted from torques in one of model and --actuators, and \
+             not in the other: inputs differ from those of the model's training",
         );
     }
     let sets = [&arguments.recordings[..], &[], &[]];

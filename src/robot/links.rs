@@ -21,6 +21,23 @@ pub struct LegMoments {
     pub calf_kg_m2: f64,
 }
 
+impl LegMoments {
+    /// The first moment that is not finite, or second one that is negative: its name and value.
+    #[must_use]
+    pub fn unusable(&self) -> Option<(&'static str, f64)> {
+        let all = [
+            ("side_kg_m", self.side_kg_m, f64::NEG_INFINITY),
+            ("thigh_kg_m", self.thigh_kg_m, f64::NEG_INFINITY),
+            ("calf_kg_m", self.calf_kg_m, f64::NEG_INFINITY),
+            ("thigh_kg_m2", self.thigh_kg_m2, 0.0),
+            ("calf_kg_m2", self.calf_kg_m2, 0.0),
+        ];
+        let bad = |(_, value, least): &(_, f64, f64)| !(value.is_finite() && value >= least);
+        let found = all.into_iter().find(bad);
+        found.map(|(name, value, _)| (name, value))
+    }
+}
+
 /// What formulas of vectors need of a number: numbers, and values of a program.
 pub trait Scalar:
     Copy + Neg<Output = Self> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>

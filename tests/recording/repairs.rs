@@ -213,6 +213,28 @@ fn clipped_rates_and_differences_of_held_angles_are_recognised() {
 }
 
 #[test]
+fn rates_that_repeat_while_the_angle_turns_no_faster_do_not_clip() {
+    let mut still = jump();
+    for row in [0, 3] {
+        let extreme = still.dx.row(row).amax();
+        // A coarse encoder of a joint that turns at one speed for a while.
+        for i in 40..50 {
+            still.dx[(row, i)] = extreme;
+            still.x[(row, i)] =
+                still.x[(row, i - 1)] + extreme * (still.time_s[i] - still.time_s[i - 1]);
+        }
+        let end = still.x[(row, 49)] - still.x[(row, 50)];
+        still
+            .x
+            .row_mut(row)
+            .columns_mut(50, still.time_s.len() - 50)
+            .add_scalar_mut(end);
+    }
+    let reading = repaired(still);
+    assert!(!says(&reading, "clip"), "{:?}", reading.notes);
+}
+
+#[test]
 fn late_place_of_the_body_is_advanced_until_feet_stay() {
     let right = jump();
     let mut late = right.clone();

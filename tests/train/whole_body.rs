@@ -147,7 +147,7 @@ fn equations_of_the_whole_body_obey_what_is_known() {
         .iter()
         .map(|term| &term.text[..])
         .collect();
-    assert!(texts.ends_with(&["z2*u1", "z2*u2", "z2*u3"]), "{texts:?}");
+    assert_eq!(texts.len(), 1 + 3 * 7, "{texts:?}");
     let term = |name: &str| texts.iter().position(|text| *text == name).expect("a term");
     let [contact, flight] = [0, 1].map(|phase| &model.phases()[phase].xi);
     // Nothing rotates the body in flight; its legs depend on their own inputs.
@@ -156,11 +156,6 @@ fn equations_of_the_whole_body_obey_what_is_known() {
         let own = *text == "1" || ["u4", "u5", "u6", "u7"].contains(text);
         for leg in 3..7 {
             assert_eq!(flight[(index, leg)] != 0.0, own, "{text} of z{}", leg + 1);
-            assert!(
-                !text.contains('*') || contact[(index, leg)] == 0.0,
-                "{text} of z{}",
-                leg + 1
-            );
         }
         // On the ground its rotation depends on velocities, force and moment, not on positions.
         let moves = text.starts_with("dz")

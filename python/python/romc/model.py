@@ -79,7 +79,7 @@ class Model:
         - `wrench_frame`: axes of the force and moment in the inputs, `"body"` (as published), `"world"` or `"ground"`.
         - `actuators`: friction and inertia of the joints, if training took them from the torques: a mapping of
           `"viscous"` (N m s/rad), `"dry"` (N m) and `"armature"` (kg m^2), 12 numbers each or 3 for a leg, or a file
-          of `romc identify`.
+          of `romc identify`, which may also have the moments of the legs.
         - `inputs_from`: recordings that give the mean and covariance of the inputs, which the controller needs, and
           that the model is compared with: one that misses them is refused, with the usual slip that explains it;
           `unchecked=True` warns instead.

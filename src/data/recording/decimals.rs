@@ -17,6 +17,8 @@ const STEPS_S: [f64; 6] = [0.01, 0.005, 0.004, 0.0025, 0.002, 0.001]; // of logg
 const FITS: f64 = 1e-6; // largest error of the spline, relative to the largest value
 const EXPONENT: f64 = 1e-5; // of numbers that are written with one; the next, 1e-6, makes no difference
 const OUTLIER: (f64, f64) = (0.3, 0.2); // an angle or place that far from its neighbours, which are that close together
+const SOUND_STEP: f64 = 0.5; // from one sample to the next, rad or m, below which a row is left alone
+const LARGEST_TORQUE_NM: f64 = 100.0; // up to which all torques are left alone
 const LARGEST_RATE: f64 = 60.0; // of a joint, rad/s, above which angles stay broken
 
 /// A segment whose numbers have their points again.
@@ -44,7 +46,10 @@ pub(super) fn restored(segment: &Segment) -> Option<Restored> {
     let resampled = spline.is_some();
     let mut found = spline.unwrap_or_else(|| segment.clone());
     let before = found.clone();
-    remake(&mut found.x, |values| without_outliers(continuous(values)));
+    remake(&mut found.x, |values| match is_sound(values) {
+        true => values.to_vec(),
+        false => without_outliers(continuous(values)),
+    });
     let slopes = differences(&found.time_s, &found.x);
     for (rate, slope) in found.dx.iter_mut().zip(&slopes) {
         let nearest = |a: &f64, b: &f64| (a - slope).abs().total_cmp(&(b - slope).abs());
@@ -53,10 +58,13 @@ pub(super) fn restored(segment: &Segment) -> Option<Restored> {
             .min_by(nearest)
             .expect("itself at least");
     }
-    remake(&mut found.torque_nm, continuous);
+    if found.torque_nm.amax() > LARGEST_TORQUE_NM {
+        remake(&mut found.torque_nm, continuous);
+    }
     found.ddx = differences(&found.time_s, &found.dx);
     let slopes = slopes.rows(0, JOINT_DIM);
-    let is_whole = broken_angle(&found).is_none() && slopes.amax() < LARGEST_RATE;
+    let angles = found.x.rows(0, JOINT_DIM);
+    let is_whole = angles.amax() <= FULL_TURN_RAD && slopes.amax() < LARGEST_RATE;
     let pairs = [
         (&before.x, &found.x),
         (&before.dx, &found.dx),
@@ -71,6 +79,18 @@ pub(super) fn restored(segment: &Segment) -> Option<Restored> {
         numbers,
         resampled,
     })
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values
+        .iter()
+        .fold(0.0, |largest, value| largest.max(value.abs()))
+}
+
+/// Whether angles or places, rad or m, can be as they are.
+fn is_sound(values: &[f64]) -> bool {
+    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    largest(values) <= FULL_TURN_RAD && largest(&steps) < SOUND_STEP
 }
 
 /// Each row of a matrix, remade as a whole.

@@ -18,6 +18,7 @@ const RATES_EXPLAINED: f64 = 0.75;
 const UNEXPLAINED: f64 = 0.2; // share of rates above which they are noise rather than late
 const SLIP_EXPLAINED: f64 = 0.75;
 const LEAST_SLIP_M: f64 = 0.006; // feet that stay that well in place have no delay
+const BEYOND_CLIP: f64 = 1.02; // slopes of the angles over a rate that clips
 const CLIPPED_SAMPLES: usize = 5; // equal consecutive rates at an extreme
 const HELD_SHARE: f64 = 0.05; // of samples that repeat the one before
 const ARE_DIFFERENCES: f64 = 1e-3; // unexplained share of rates that are differences of the angles themselves
@@ -91,7 +92,7 @@ fn fault(
     rates: &DMatrix<f64>,
     slopes: &DMatrix<f64>,
 ) -> Option<RateFault> {
-    if let Some(extreme) = clipped(rates) {
+    if let Some(extreme) = clipped(rates, slopes) {
         return Some(RateFault::Clipped(extreme));
     }
     let n = time_s.len();
@@ -111,15 +112,24 @@ fn fault(
     (is_late && least < RATES_EXPLAINED * now).then_some(RateFault::Late(1e3 * lag as f64 * step_s))
 }
 
-/// The extreme at which a rate stays for [`CLIPPED_SAMPLES`].
-fn clipped(rates: &DMatrix<f64>) -> Option<f64> {
-    rates.row_iter().find_map(|row| {
-        let values: Vec<f64> = row.iter().map(|rate| rate.abs()).collect();
-        let extreme = row.amax();
-        let mut runs = values.windows(CLIPPED_SAMPLES);
-        let stays = runs.any(|run| run.iter().all(|rate| *rate == extreme));
-        (extreme > 0.0 && stays).then_some(extreme)
-    })
+/// The extreme at which a rate stays for [`CLIPPED_SAMPLES`] while the angle turns faster.
+fn clipped(rates: &DMatrix<f64>, slopes: &DMatrix<f64>) -> Option<f64> {
+    rates
+        .row_iter()
+        .zip(slopes.row_iter())
+        .find_map(|(row, slopes)| {
+            let values: Vec<f64> = row.iter().map(|rate| rate.abs()).collect();
+            let slopes: Vec<f64> = slopes.iter().map(|slope| slope.abs()).collect();
+            let extreme = row.amax();
+            let mut runs = values
+                .windows(CLIPPED_SAMPLES)
+                .zip(slopes.windows(CLIPPED_SAMPLES));
+            let stays = runs.any(|(run, slopes)| {
+                let is_faster = |slope: &f64| *slope > BEYOND_CLIP * extreme;
+                run.iter().all(|rate| *rate == extreme) && slopes.iter().all(is_faster)
+            });
+            (extreme > 0.0 && stays).then_some(extreme)
+        })
 }
 
 /// Share of the squares of rates that slopes of `lag` samples before do not explain, whatever the factor.

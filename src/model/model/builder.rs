@@ -236,6 +236,12 @@ impl ModelBuilder {
             let needs = "robot";
             return Err(ModelError::Incomplete { part, needs });
         }
+        let legs = self.actuators.as_ref().and_then(|known| known.legs);
+        if let Some((name, found)) = legs.and_then(|legs| legs.unusable()) {
+            let place = format!("`actuators.legs.{name}`");
+            let expected = "a finite number, of second moments at least 0";
+            return Err(ModelError::invalid(place, found, expected));
+        }
         match self.actuators.as_ref().and_then(Actuators::unusable) {
             None => Ok(()),
             Some((array, joint, found)) => {

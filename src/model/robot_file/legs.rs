@@ -369,6 +369,11 @@ pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, R
         actuators,
         legs,
     } = from_toml_text(&file, &text_of(path)?)?;
+    if let Some((name, found)) = legs.and_then(|legs| legs.unusable()) {
+        let (place, found) = (format!("legs.{name}"), found.to_string());
+        let expected = "a finite number, of second moments at least 0";
+        return Err(RobotFileError::at(&file, place, found, expected));
+    }
     let is_off = |gravity: &f64| (gravity / GRAVITY_M_S2 - 1.0).abs() > GRAVITY_SHARE;
     if let Some(gravity) = gravity.filter(is_off) {
         let expected = format!(
