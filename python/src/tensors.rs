@@ -10,7 +10,7 @@ use romc::cli::{Compared, import_compared};
 use romc::import::{ImportOptions, Tensor, parse_standard};
 use romc::model::LibraryChoice;
 use romc::robot::{Actuators, Robot};
-use romc::robot_file::{ActuatorsEntry, RobotFileError, find, read_actuators};
+use romc::robot_file::{ActuatorsEntry, RobotFileError, find, leg_moments, read_actuators};
 
 use crate::errors::{choice, python_error, wrench_frame};
 use crate::model::Model;
@@ -51,14 +51,38 @@ pub struct ImportArguments {
 #[derive(FromPyObject)]
 enum Losses {
     File(PathBuf),
-    Arrays(BTreeMap<String, Vec<f64>>),
+    Arrays(BTreeMap<String, Loss>),
+}
+
+/// Numbers of the joints, or the moments of a leg by name.
+#[derive(FromPyObject)]
+enum Loss {
+    Joints(Vec<f64>),
+    Legs(BTreeMap<String, f64>),
 }
 
 impl Losses {
     fn actuators(&self, robot: Option<&Robot>) -> Result<Actuators, RobotFileError> {
         match self {
             Losses::File(path) => read_actuators(path, robot),
-            Losses::Arrays(arrays) => ActuatorsEntry::of_arrays(arrays.clone())?.actuators(""),
+            Losses::Arrays(arrays) => {
+                let (mut joints, mut legs) = (BTreeMap::new(), None);
+                for (name, loss) in arrays {
+                    match loss {
+                        Loss::Legs(moments) if name == "legs" => {
+                            legs = Some(leg_moments(moments.clone())?);
+                        }
+                        Loss::Joints(values) => {
+                            joints.insert(name.clone(), values.clone());
+                        }
+                        Loss::Legs(_) => {
+                            joints.insert(name.clone(), Vec::new());
+                        }
+                    }
+                }
+                let actuators = ActuatorsEntry::of_arrays(joints)?.actuators("")?;
+                Ok(Actuators { legs, ..actuators })
+            }
         }
     }
 }

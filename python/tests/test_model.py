@@ -54,6 +54,13 @@ def test_maps_and_accelerations_are_those_of_the_arrays(parts):
             np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
 
 
+def losses_toml(actuators):
+    """The file of losses, with the moments of a leg in a table of their own."""
+    lines = lambda values: "".join(f"{name} = {value}\n" for name, value in values.items())
+    joints = {name: values for name, values in actuators.items() if name != "legs"}
+    return f"[actuators]\n{lines(joints)}[legs]\n{lines(actuators['legs'])}"
+
+
 def test_model_of_arrays_equals_the_import_of_a_file(parts, command_line, tmp_path):
     arrays = {f"xi.{phase}": xi for phase, xi in parts["xi"].items()}
     for part in ("encoder", "decoder"):
@@ -62,8 +69,7 @@ def test_model_of_arrays_equals_the_import_of_a_file(parts, command_line, tmp_pa
     (tmp_path / "terms.json").write_text(json.dumps(parts["library"]))
     arguments = ["import", "net.npz", "--library", "terms.json", "--scaling", parts["scaling"], "--robot", "go1"]
     arguments += ["--wrench-frame", parts["wrench_frame"]]
-    losses = "".join(f"{name} = {values}\n" for name, values in parts["actuators"].items())
-    (tmp_path / "losses.toml").write_text(f"[actuators]\n{losses}")
+    (tmp_path / "losses.toml").write_text(losses_toml(parts["actuators"]))
     arguments += ["--actuators", "losses.toml"]
     arguments += ["--input-scaling", ",".join(map(repr, parts["input_scaling"]))]
     inputs = [JUMPS / "train_01.csv.gz", JUMPS / "train_02.csv.gz"]
@@ -254,8 +260,8 @@ def test_model_that_misses_its_recordings_is_refused_with_the_slip(parts):
 
 def test_actuators_are_a_mapping_or_a_file_and_checked(parts, tmp_path):
     given = parts["actuators"]
-    leg = {name: values[:3] for name, values in given.items()}
-    (tmp_path / "losses.toml").write_text("[actuators]\n" + "".join(f"{name} = {v}\n" for name, v in leg.items()))
+    leg = {name: values if name == "legs" else values[:3] for name, values in given.items()}
+    (tmp_path / "losses.toml").write_text(losses_toml(leg))
     for actuators in (given, leg, tmp_path / "losses.toml", str(tmp_path / "losses.toml")):
         model = romc.Model.from_arrays(**{**parts, "actuators": actuators})
         assert model.to_dict()["actuators"] == given
@@ -274,6 +280,11 @@ def test_actuators_are_a_mapping_or_a_file_and_checked(parts, tmp_path):
         romc.Model.from_arrays(**{**parts, "actuators": {"viscous": [1.0] * 3, "dry": [0.1] * 3}})
     with pytest.raises(romc.RomcError, match="actuators.stiction: found an unknown array"):
         romc.Model.from_arrays(**{**parts, "actuators": {**leg, "stiction": [1.0] * 3}})
+    with pytest.raises(romc.RomcError, match="actuators.legs.calf_kg_m: found nothing"):
+        legs = {name: value for name, value in given["legs"].items() if name != "calf_kg_m"}
+        romc.Model.from_arrays(**{**parts, "actuators": {**leg, "legs": legs}})
+    with pytest.raises(romc.RomcError, match="actuators.legs.thigh_kg_m2: found -1"):
+        romc.Model.from_arrays(**{**parts, "actuators": {**leg, "legs": {**given["legs"], "thigh_kg_m2": -1.0}}})
     with pytest.raises(romc.RomcError, match="without a robot"):
         romc.Model.from_arrays(**{**parts, "robot": None})
 

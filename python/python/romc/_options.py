@@ -24,7 +24,7 @@ class ImportOptions(TypedDict, total=False):
     xi_layout: str
     library_order: str
     wrench_frame: str
-    actuators: Union[PathLike, Mapping[str, Sequence[float]]]
+    actuators: Union[PathLike, Mapping[str, Union[Sequence[float], Mapping[str, float]]]]
     inputs_from: Recordings
     unchecked: bool
     sample_time: float

@@ -78,8 +78,8 @@ class Model:
           fl rr rl), the first match wins; `contact` and `flight` are known.
         - `wrench_frame`: axes of the force and moment in the inputs, `"body"` (as published), `"world"` or `"ground"`.
         - `actuators`: friction and inertia of the joints, if training took them from the torques: a mapping of
-          `"viscous"` (N m s/rad), `"dry"` (N m) and `"armature"` (kg m^2), 12 numbers each or 3 for a leg, or a file
-          of `romc identify`, which may also have the moments of the legs.
+          `"viscous"` (N m s/rad), `"dry"` (N m) and `"armature"` (kg m^2), 12 numbers each or 3 for a leg, and if known `"legs"`, a mapping of
+          the moments of a leg; or a file of `romc identify`.
         - `inputs_from`: recordings that give the mean and covariance of the inputs, which the controller needs, and
           that the model is compared with: one that misses them is refused, with the usual slip that explains it;
           `unchecked=True` warns instead.
@@ -171,7 +171,7 @@ class Model:
         xi_layout: Optional[str] = None,
         library_order: Optional[str] = None,
         wrench_frame: str = "body",
-        actuators: Union[PathLike, Mapping[str, Sequence[float]], None] = None,
+        actuators: Union[PathLike, Mapping[str, Union[Sequence[float], Mapping[str, float]]], None] = None,
         inputs_from: Optional[Recordings] = None,
         unchecked: bool = False,
         sample_time: Optional[float] = None,

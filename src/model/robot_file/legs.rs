@@ -359,6 +359,36 @@ impl ActuatorsEntry {
     }
 }
 
+/// Moments of a leg by name, as programs give them.
+pub fn leg_moments(mut values: BTreeMap<String, f64>) -> Result<LegMoments, RobotFileError> {
+    let fault = |name: &str, found: &str, expected: &str| {
+        RobotFileError::at(
+            "",
+            format!("actuators.legs.{name}"),
+            found.to_owned(),
+            expected,
+        )
+    };
+    let mut take = |name: &str| {
+        let value = values.remove(name);
+        value.ok_or_else(|| fault(name, "nothing", "a number"))
+    };
+    let moments = LegMoments {
+        side_kg_m: take("side_kg_m")?,
+        thigh_kg_m: take("thigh_kg_m")?,
+        calf_kg_m: take("calf_kg_m")?,
+        thigh_kg_m2: take("thigh_kg_m2")?,
+        calf_kg_m2: take("calf_kg_m2")?,
+    };
+    match (values.into_keys().next(), moments.unusable()) {
+        (Some(name), _) => Err(fault(&name, "an unknown moment", "the five of a leg alone")),
+        (None, Some((name, found))) => Err(fault(name, &found.to_string(), MOMENTS)),
+        (None, None) => Ok(moments),
+    }
+}
+
+const MOMENTS: &str = "a finite number, of second moments at least 0";
+
 /// Reads the tables `[actuators]` and, if there is one, `[legs]` of a TOML file, such as one of `romc identify`, for a
 /// robot if one is known.
 pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, RobotFileError> {
@@ -371,8 +401,7 @@ pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, R
     } = from_toml_text(&file, &text_of(path)?)?;
     if let Some((name, found)) = legs.and_then(|legs| legs.unusable()) {
         let (place, found) = (format!("legs.{name}"), found.to_string());
-        let expected = "a finite number, of second moments at least 0";
-        return Err(RobotFileError::at(&file, place, found, expected));
+        return Err(RobotFileError::at(&file, place, found, MOMENTS));
     }
     let is_off = |gravity: &f64| (gravity / GRAVITY_M_S2 - 1.0).abs() > GRAVITY_SHARE;
     if let Some(gravity) = gravity.filter(is_off) {

@@ -26,5 +26,5 @@ mod read;
 mod urdf;
 
 pub use identity::{RobotEntry, RobotReading, to_toml};
-pub use legs::{ActuatorsEntry, read_actuators};
+pub use legs::{ActuatorsEntry, leg_moments, read_actuators};
 pub use read::{RobotFileError, RobotOptions, by_name, find, from_text, known_names, open};
