@@ -7,12 +7,11 @@ its test jumps, of the Go1 then along `go1-other`. The last rows are baselines. 
 most of it for d = 9 and 10, whose controllers have no structured solver; needs Python alone.
 """
 
-import argparse
 import json
 import pathlib
 import tempfile
 
-from whole_body import ROOT, jumps, run
+from whole_body import chosen_romc, jumps, run
 
 GO1 = ("go1", "", ["go1/test_*.csv.gz", "go1-other/*.csv.gz"])
 GO2 = (
@@ -38,11 +37,7 @@ HEAD = (
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target" / "release" / "romc")
-    romc = parser.parse_args().romc.resolve()
+    romc = chosen_romc(__doc__)
     print(HEAD)
     with tempfile.TemporaryDirectory() as folder:
         baselines = {}

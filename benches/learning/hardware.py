@@ -3,7 +3,7 @@
     cargo build --release && python3 benches/learning/hardware.py FOLDER
 
 FOLDER holds `go1_hardware_jump.csv`, `go1_hardware_flights.csv.gz` and `a1/a1_01.csv.gz` to `a1_24.csv.gz`, which are not
-part of romc (docs/hardware.md names their sources). No model is judged on what it was refined on. Under a minute on two
+part of romc (docs/hardware.md names their sources). No model is judged on the recordings that refined it. Under a minute on two
 cores; needs Python alone.
 """
 
@@ -52,7 +52,7 @@ class Bench:
         return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
 
     def repaired(self, recording, model, name):
-        """The rows of a recording as romc repairs them, and what it says about that."""
+        """The rows of a recording as romc repairs them, and the notes that it prints."""
         path = self.folder / f"{name}.csv"
         done = self.run("convert", recording, "--clock", "repaired", "--inputs-of", model, "--output", path, "--force")
         if done.returncode != 0:

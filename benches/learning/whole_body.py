@@ -32,11 +32,7 @@ HEAD = (
 
 
 def main():
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target" / "release" / "romc")
-    romc = parser.parse_args().romc.resolve()
+    romc = chosen_romc(__doc__)
     print(HEAD)
     with tempfile.TemporaryDirectory() as folder:
         losses = pathlib.Path(folder) / "losses.toml"
@@ -50,6 +46,15 @@ def main():
             cells = [cell for of in SETS for cell in figures(romc, model, jumps(of))]
             shown = f"{name}, `{flags}`" if flags else name
             print("| " + " | ".join([shown, *cells]) + " |", flush=True)
+
+
+def chosen_romc(description):
+    """The compiler that the command line names."""
+    parser = argparse.ArgumentParser(
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target" / "release" / "romc")
+    return parser.parse_args().romc.resolve()
 
 
 def without_legs(romc, path):

@@ -1,8 +1,8 @@
 """Inputs of a jump by the rule of a model: what its controller takes as `u` of a reference.
 
 The model's own generated C is the rule: `NAME_generalised_input`, compiled with `cc` and called
-through ctypes. It takes off what friction takes of the motors' torques; what the inertia of motors
-and legs takes is taken off here, as romc does with recordings: from accelerations averaged over 11
+through ctypes. It subtracts friction from the motors' torques; the inertia of motors and legs is
+subtracted here, as romc does with recordings: from accelerations averaged over 11
 samples of equal contact, by the rule `ground` of a model that of the motors only while a foot is
 down, and that of a leg (`NAME_leg_torque`, where the model has it) while its own foot is.
 """

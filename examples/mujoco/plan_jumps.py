@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 import romc_controller
-from assessment import assess, repetition_faults
+from assessment import assess, longest_flight, repetition_faults
 from closed_loop import named_number, read_jump, write_strip
 from followers import LatentMpc, Replay
 from model_inputs import ModelInputs
@@ -84,6 +84,8 @@ class Outcome:
     apex_goal_m: float
     distance_error_m: float
     apex_error_m: float
+    pitch_error_rad: float  # where the reference touches down
+    take_off_late_s: float
     input_deviation: float
     solve_ms: float
 
@@ -254,13 +256,14 @@ def run(task):
     )
     outcome = Outcome(
         name, condition.name, goal.name, goal.name.startswith("in"), False, "no plan",
-        goal.distance_m, goal.apex_m, np.nan, np.nan,
+        goal.distance_m, goal.apex_m, np.nan, np.nan, np.nan, np.nan,
         answer.get("input_deviation", np.nan), answer.get("solve_ms", np.nan),
     )
     if reference is None:
         return outcome
     start = read_jump(start_of(goal))
-    takeoff_s = reference.time_s[np.flatnonzero(~reference.feet.any(axis=1))[0]]
+    in_flight = np.flatnonzero(~reference.feet.any(axis=1))
+    takeoff_s = reference.time_s[in_flight[0]]
     simulation = perturbed_simulation(
         ROBOT, condition, Floor(), start.x[0], start.dx[0], takeoff_s
     )
@@ -286,8 +289,11 @@ def run(task):
     outcome.success, outcome.faults = not faults, "; ".join(faults)
     outcome.distance_error_m = forwards - goal.distance_m
     outcome.apex_error_m = repeated.apex_rise_m - goal.apex_m
+    landed = min(in_flight[-1], len(log.x) - 1)
+    outcome.pitch_error_rad = float(log.x[landed, 16] - reference.x[in_flight[-1], 16])
+    left = longest_flight(log.feet())[0]
+    outcome.take_off_late_s = float((left - in_flight[0]) * CONTROL_STEP_S)
     if arguments.strips and name == "plan, controller" and condition.name == NOMINAL.name:
-        in_flight = np.flatnonzero(~reference.feet.any(axis=1))
         margin = round(STRIP_MARGIN_S / CONTROL_STEP_S)
         path = arguments.out_dir / f"{goal.name}.png"
         write_strip(path, reference, log.x, in_flight[0] - margin, in_flight[-1] + margin)

@@ -186,7 +186,7 @@ fn input_rule(model: &ReducedModel) -> String {
         let first = [legs.side_kg_m, legs.thigh_kg_m, legs.calf_kg_m].map(significant);
         let second = [legs.thigh_kg_m2, legs.calf_kg_m2].map(significant);
         format!(
-            "\n  links of a leg on the ground, also taken off: first moments beside the hip, of thigh and calf {} kg m, \
+            "\n  without the torques that carry and move the links of a leg on the ground: first moments beside the hip, of thigh and calf {} kg m, \
              second moments of thigh and calf {} kg m^2\n",
             first.join(", "),
             second.join(", ")

@@ -42,8 +42,8 @@ pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer, Err
     let legs = |of: Option<&Actuators>| of.is_some_and(|known| known.legs.is_some());
     if legs(actuators.as_ref()) != legs(model.actuators()) {
         note(
-            "what the links of legs on the ground take is subtracted from torques in one of model and --actuators, and \
-             not in the other: inputs differ from those of the model's training",
+            "torques that carry and move the links of legs on the ground are subtracted in one of model and --actuators, \
+             and not in the other: inputs differ from those of the model's training",
         );
     }
     let sets = [&arguments.recordings[..], &[], &[]];

@@ -3,8 +3,8 @@
 //!
 //! `tau` are the torques at the links: a motor torque `t` less the joint's losses, `t - b dq - c tanh(dq / v) - I ddq`
 //! ([`Actuators`]): viscous friction, dry friction (smooth around standstill, `v` = [`DRY_SPEED_RAD_S`]) and the
-//! rotor's inertia seen through the gear (armature); in [`WrenchFrame::Ground`] also less what carries and moves the
-//! links of a leg whose foot is on the ground ([`MovingLeg`]). `F` and `M` follow through the feet in contact.
+//! rotor's inertia seen through the gear (armature); in [`WrenchFrame::Ground`] also less the torques that carry and
+//! move the links of a leg whose foot is on the ground ([`MovingLeg`]). `F` and `M` follow through the feet in contact.
 
 use nalgebra::{Matrix3, SMatrix, Vector6};
 
@@ -27,8 +27,8 @@ pub enum WrenchFrame {
     /// is the power of the feet on the body, which is what `W_e^T u_lat` stands for.
     World,
     /// As `World`, and feet only push: one in contact whose torques would need a downward force adds nothing, as at the
-    /// end of a stance. Torques of a leg on the ground are those that reach it, less what carries and moves its links. In
-    /// the air rotors and links are what the input accelerates, so that their inertia is no loss.
+    /// end of a stance. Torques of a leg on the ground are those that reach it, without those that carry and move its links.
+    /// In the air rotors and links are what the input accelerates, so that their inertia is no loss.
     Ground,
 }
 
@@ -98,7 +98,7 @@ impl InputRule {
         self.frame
     }
 
-    /// Moments of the legs, if what carries and moves their links is taken off the torques.
+    /// Moments of the legs, if the torques that carry and move their links are subtracted.
     pub fn legs(&self) -> Option<&LegMoments> {
         let known = self
             .actuators
@@ -112,7 +112,7 @@ impl InputRule {
         is_grounded || self.frame != WrenchFrame::Ground
     }
 
-    /// What of the motors' torques does not enter the input, N m: [`joint_loss`] of every joint, and
+    /// The part of the motors' torques that does not enter the input, N m: [`joint_loss`] of every joint, and
     /// [`Self::leg_torques`], at a state `x`, `dx` and `ddx` (rad, m, s); zero without actuators.
     pub fn losses(
         &self,
@@ -137,7 +137,7 @@ impl InputRule {
     }
 
     /// Torques that carry and move the links of the legs on the ground, N m; zero for the others, and where they are not
-    /// taken off.
+    /// subtracted.
     pub fn leg_torques(
         &self,
         [x, dx, ddx]: [&[f64; STATE_DIM]; 3],

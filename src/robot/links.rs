@@ -22,6 +22,9 @@ pub struct LegMoments {
 }
 
 impl LegMoments {
+    /// The moments that are accepted, in words.
+    pub const ACCEPTED: &str = "a finite number, of second moments at least 0";
+
     /// The first moment that is not finite, or second one that is negative: its name and value.
     #[must_use]
     pub fn unusable(&self) -> Option<(&'static str, f64)> {

@@ -41,10 +41,10 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 3], LowerE
     let has_legs = model.input_rule().is_ok_and(|rule| rule.legs().is_some());
     let (inertia, in_flight) = if has_legs {
         (
-            "With a foot on the ground, subtract the motors' inertia times acceleration from tau before, and \
-             what leg_torque gives; in flight do not.",
+            "With a foot on the ground, subtract the motors' inertia times acceleration and leg_torque from \
+             tau before; in flight do not.",
             " In flight give zeros as ddx: the motors' inertia is part of net. With a foot on the ground add \
-             what leg_torque gives.",
+             leg_torque.",
         )
     } else if is_ground {
         (

@@ -30,7 +30,7 @@ pub fn actuator_torque(model: &ReducedModel) -> Result<Option<Program>, LowerErr
 
 /// Torques that carry and move the links of the legs on the ground ([`InputRule::leg_torques`]): inputs `x`, `dx`, `ddx`
 /// (18 robot coordinates, their velocities and accelerations) and `feet` (4, as of [`generalised_input`]); output `own`
-/// (12, N m). `None` as for [`generalised_input`], and for a model whose rule does not take them off.
+/// (12, N m). `None` as for [`generalised_input`], and for a model whose rule does not subtract them.
 pub fn leg_torque(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
     let rule = rule_of(model).filter(|rule| rule.legs().is_some());
     rule.map(|rule| leg_torque_of(&rule)).transpose()

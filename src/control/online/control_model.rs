@@ -189,10 +189,10 @@ impl ControlModel {
         std::array::from_fn(|foot| bits >> foot & 1 == 1)
     }
 
-    /// What of the motors' torques does not enter the input, N m, over a time `step_s` of a phase from latent state
+    /// The part of the motors' torques that does not enter the input, N m, over a time `step_s` of a phase from latent state
     /// `start` to `end` (both `(z, dz)`), by the rule of the inputs: losses of the joints at the mean decoded velocities,
-    /// with their difference as acceleration, at most the torque limit; and what takes the links of legs with their
-    /// `feet` on the ground, in the middle. Zero without actuators.
+    /// with their difference as acceleration, at most the torque limit; and the torques that carry and move the links
+    /// of legs with their `feet` on the ground, in the middle. Zero without actuators.
     pub fn planned_losses(
         &self,
         (phase, feet): (usize, ContactFlags),

@@ -139,8 +139,8 @@ fn input_in_words(rule: &InputRule, name: &str) -> String {
     let torques = match rule.actuators() {
         None => "its torques are those of the motors",
         Some(_) => {
-            "its torques are those at the links: what friction and the inertia of motors and legs take is off, \
-             and commands have it on top"
+            "its torques are those at the links: losses to friction and to the inertia of motors and legs are \
+             subtracted, and commands have them on top"
         }
     };
     let wrench = match rule.wrench_frame() {
@@ -163,8 +163,8 @@ fn input_in_words(rule: &InputRule, name: &str) -> String {
             ", of torques less the inertia of the motors times ddq"
         }
         Some(_) if rule.legs().is_some() => {
-            ", of torques less, with a foot on the ground, the inertia of the motors times ddq and what the legs' \
-             links take (leg_torque)"
+            ", of torques less, with a foot on the ground, the inertia of the motors times ddq and the torques of \
+             the legs' links (leg_torque)"
         }
         Some(_) => {
             ", of torques less, with a foot on the ground, the inertia of the motors times ddq"

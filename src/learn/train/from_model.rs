@@ -292,7 +292,8 @@ impl Data<'_> {
         let terms = terms.into_iter().chain(added);
         let coefficient = |term: usize| {
             let (before, mut after) = (own.xi[(term, k)], change.after[term]);
-            let errors = (after - before).abs() / change.deviations[term];
+            let least = f64::MIN_POSITIVE.sqrt();
+            let errors = (after - before).abs() / change.deviations[term].max(least);
             // What brakes the momentum does not drive it.
             let is_braking = self.features.variable_term(d + k) == Some(term);
             if k < 2 && is_braking && before <= 0.0 {
@@ -304,7 +305,7 @@ impl Data<'_> {
                 term: self.model.library().terms()[term].text.clone(),
                 before,
                 after,
-                standard_errors: if errors.is_finite() { errors } else { 0.0 },
+                standard_errors: errors,
             };
             (term, coefficient)
         };

@@ -3,7 +3,7 @@
 use super::identifier::identifier_of;
 use super::maps::pinv_of_transpose;
 use super::*;
-use crate::robot::FeetRule;
+use crate::robot::{FeetRule, LegMoments};
 
 const MAX_PHASES: usize = 16;
 const MAX_STATE_DIM: usize = 256;
@@ -239,8 +239,7 @@ impl ModelBuilder {
         let legs = self.actuators.as_ref().and_then(|known| known.legs);
         if let Some((name, found)) = legs.and_then(|legs| legs.unusable()) {
             let place = format!("`actuators.legs.{name}`");
-            let expected = "a finite number, of second moments at least 0";
-            return Err(ModelError::invalid(place, found, expected));
+            return Err(ModelError::invalid(place, found, LegMoments::ACCEPTED));
         }
         match self.actuators.as_ref().and_then(Actuators::unusable) {
             None => Ok(()),

@@ -382,12 +382,10 @@ pub fn leg_moments(mut values: BTreeMap<String, f64>) -> Result<LegMoments, Robo
     };
     match (values.into_keys().next(), moments.unusable()) {
         (Some(name), _) => Err(fault(&name, "an unknown moment", "the five of a leg alone")),
-        (None, Some((name, found))) => Err(fault(name, &found.to_string(), MOMENTS)),
+        (None, Some((name, found))) => Err(fault(name, &found.to_string(), LegMoments::ACCEPTED)),
         (None, None) => Ok(moments),
     }
 }
-
-const MOMENTS: &str = "a finite number, of second moments at least 0";
 
 /// Reads the tables `[actuators]` and, if there is one, `[legs]` of a TOML file, such as one of `romc identify`, for a
 /// robot if one is known.
@@ -401,7 +399,12 @@ pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, R
     } = from_toml_text(&file, &text_of(path)?)?;
     if let Some((name, found)) = legs.and_then(|legs| legs.unusable()) {
         let (place, found) = (format!("legs.{name}"), found.to_string());
-        return Err(RobotFileError::at(&file, place, found, MOMENTS));
+        return Err(RobotFileError::at(
+            &file,
+            place,
+            found,
+            LegMoments::ACCEPTED,
+        ));
     }
     let is_off = |gravity: &f64| (gravity / GRAVITY_M_S2 - 1.0).abs() > GRAVITY_SHARE;
     if let Some(gravity) = gravity.filter(is_off) {
