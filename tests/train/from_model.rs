@@ -3,12 +3,39 @@
 use std::path::Path;
 
 use romc::artifact;
-use romc::evaluate::Assessment;
+use romc::evaluate::{Assessment, Horizon};
 use romc::model::ReducedModel;
 use romc::recording::Recording;
 use romc::train::{Origin, TrainError, refine_from};
 
+use super::whole_body::FLEXIONS_AND_KNEES;
 use super::{go1, jumps};
+
+/// The jumps with torques of zero in flight, as where a position control that moves the legs is not recorded.
+fn without_torques_in_flight(recordings: Vec<Recording>) -> Vec<Recording> {
+    let mut recordings = recordings;
+    for segment in recordings.iter_mut().flat_map(|of| &mut of.segments) {
+        for (sample, feet) in segment.feet.iter().enumerate() {
+            if !feet.contains(&true) {
+                segment.torque_nm.column_mut(sample).fill(0.0);
+            }
+        }
+    }
+    recordings
+}
+
+/// Root mean square of flexions and knees at touchdown, without a restart in flight, of the model and of a constant
+/// velocity, rad.
+fn legs_at_touchdown(model: &ReducedModel, recordings: &[Recording]) -> [f64; 2] {
+    let assessment = Assessment::over(model, recordings, 0.1).expect("of its robot");
+    let horizons = Horizon::all(model, &assessment).expect("the same");
+    let flights = &horizons.last().expect("flights").predictors;
+    [0, 1].map(|of| {
+        let fits = flights[of].1.fits();
+        let squares = FLEXIONS_AND_KNEES.map(|leg| fits[leg].expect("flights").rms.powi(2));
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    })
+}
 
 /// Error of body z over 0.1 s on the test jumps, m.
 fn error_m(model: &ReducedModel) -> f64 {
@@ -118,4 +145,57 @@ fn equation_that_counts_twice_is_multiplied_by_about_half() {
         assert!((of.after / of.before - share).abs() < 0.01, "{of:?}");
         assert!(of.standard_errors > 3.0, "{of:?}");
     }
+}
+
+/// Legs whose torques in flight are not recorded follow a joint control that the refinement finds.
+#[test]
+fn joint_control_that_torques_do_not_show_is_found_in_flights() {
+    let model = artifact::read(Path::new("models/go1-d7.json")).expect("shipped");
+    let [training, test] =
+        [("train", 4), ("test", 3)].map(|(set, n)| without_torques_in_flight(jumps(set, n)));
+    let origin = Origin::default();
+    let losses = model.actuators().cloned();
+    let refined = refine_from(&model, &training, go1(), losses.clone(), &origin);
+    let refined = refined.expect("refines");
+    let added = |term: &str| {
+        let mut changed = refined.coefficients.iter();
+        let own = changed.find(|of| of.phase == "flight" && of.term == term);
+        own.map_or(0.0, |of| of.after)
+    };
+    let rate = -0.5 * added("dz7");
+    assert!(rate > 1.0, "{:?}", refined.coefficients);
+    for leg in 4..=7 {
+        assert_eq!(added(&format!("dz{leg}")), -2.0 * rate);
+        let stiffness = added(&format!("z{leg}"));
+        assert!((stiffness + rate * rate).abs() < 1e-9 * rate * rate);
+    }
+    let [before, constant_velocity] = legs_at_touchdown(&model, &test);
+    let [after, _] = legs_at_touchdown(&refined.model, &test);
+    assert!(
+        after < 0.5 * before && after < 0.5 * constant_velocity,
+        "{before} {after} {constant_velocity}"
+    );
+    // Without the found rate legs coast.
+    let mut phases = refined.model.phases().to_vec();
+    for term in model
+        .library()
+        .terms()
+        .iter()
+        .zip(0..)
+        .filter(|(t, _)| t.text.contains('z'))
+    {
+        phases[1].xi.row_mut(term.1).fill(0.0);
+    }
+    let coasting = refined.model.clone().into_builder().phases(phases).build();
+    let [coasting, _] = legs_at_touchdown(&coasting.expect("sound"), &test);
+    assert!(coasting > 2.0 * after, "{coasting} {after}");
+    // Recorded torques that move the legs leave nothing to a control.
+    let complete = refine_from(&model, &jumps("train", 4), go1(), losses, &origin);
+    let changed = complete.map_or(Vec::new(), |of| of.coefficients);
+    assert!(
+        !changed
+            .iter()
+            .any(|of| of.phase == "flight" && of.before == 0.0),
+        "{changed:?}"
+    );
 }

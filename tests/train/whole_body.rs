@@ -15,7 +15,7 @@ use romc::train::TrainOptions;
 use super::{jumps, jumps_of, losses_of_the_simulated_go1, train_with};
 
 const PITCH: usize = JOINT_DIM + 4;
-const FLEXIONS_AND_KNEES: [usize; 8] = [1, 2, 4, 5, 7, 8, 10, 11];
+pub(super) const FLEXIONS_AND_KNEES: [usize; 8] = [1, 2, 4, 5, 7, 8, 10, 11];
 
 static WHOLE_BODY: LazyLock<ReducedModel> = LazyLock::new(|| {
     let mut options = TrainOptions::new("go1-d7", 7);

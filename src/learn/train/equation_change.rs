@@ -1,7 +1,7 @@
 //! The least change of one equation that predicts left-out parts of recordings better: of single coefficients, or of the
 //! equation as a whole.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 const RIDGES: [f64; 5] = [1.0, 0.1, 1e-2, 1e-3, 1e-4]; // strongest first
 const LEAST_SHARE: f64 = 0.1; // from 1, by which an equation is multiplied
@@ -27,7 +27,7 @@ impl Sums {
     }
 
     /// The sums of the other parts.
-    fn without(parts: &[Self], left_out: usize) -> Self {
+    pub(super) fn without(parts: &[Self], left_out: usize) -> Self {
         let mut others = parts
             .iter()
             .enumerate()
@@ -58,10 +58,28 @@ pub(super) enum Kind {
     Share,
 }
 
-/// Changes of an equation: coefficients change along these directions, `library_dim x m`.
+/// Changes of an equation: its coefficients change along these directions, `library_dim x m`, after they moved by a
+/// shift.
 pub(super) struct Family {
     pub(super) kind: Kind,
     directions: DMatrix<f64>,
+    shift: Option<Shift>,
+}
+
+/// What coefficients change by before anything else: found in all parts, and without each.
+pub(super) struct Shift {
+    pub(super) of_all: DVector<f64>,
+    pub(super) without: Vec<DVector<f64>>,
+}
+
+impl Shift {
+    /// Squared standard deviations, of the values without each part (jackknife).
+    fn variances(&self) -> DVector<f64> {
+        let count = self.without.len() as f64;
+        let mean = self.without.iter().sum::<DVector<f64>>() / count;
+        let squares = self.without.iter().map(|of| (of - &mean).map(|d| d * d));
+        squares.sum::<DVector<f64>>() * ((count - 1.0) / count)
+    }
 }
 
 /// The change of a family that predicts left-out parts best.
@@ -79,18 +97,24 @@ impl Family {
         Self {
             kind: Kind::Terms,
             directions: DMatrix::from_fn(library_dim, support.len(), unit),
+            shift: None,
         }
     }
 
-    /// The equation as a whole, multiplied by a number that is not negative, and perhaps a constant.
-    pub(super) fn share(xi: &DVector<f64>, offset: Option<usize>) -> Self {
+    /// The equation as a whole, multiplied by a number that is not negative; and perhaps a constant.
+    pub(super) fn share(xi: &DVector<f64>, added: Option<usize>) -> Self {
         let unit = |term: usize| DVector::from_fn(xi.len(), |i, _| f64::from(u8::from(i == term)));
         let whole = std::iter::once(xi.clone());
-        let directions: Vec<DVector<f64>> = whole.chain(offset.map(unit)).collect();
+        let directions: Vec<DVector<f64>> = whole.chain(added.map(unit)).collect();
         Self {
             kind: Kind::Share,
             directions: DMatrix::from_columns(&directions),
+            shift: None,
         }
+    }
+
+    pub(super) fn shifted(self, shift: Option<Shift>) -> Self {
+        Self { shift, ..self }
     }
 
     fn gram(&self, sums: &Sums, ridge: f64) -> DMatrix<f64> {
@@ -113,6 +137,24 @@ impl Family {
         Some(change)
     }
 
+    /// Normal equations of two more terms once the changes of the family are eliminated.
+    pub(super) fn without_its_changes(
+        &self,
+        sums: &Sums,
+        k: usize,
+        xi: &DVector<f64>,
+        terms: [usize; 2],
+    ) -> Option<(Matrix2<f64>, Vector2<f64>)> {
+        let own = self.gram(sums, RIDGES[RIDGES.len() - 1]).cholesky()?;
+        let by_terms = self.directions.tr_mul(&sums.gram.select_columns(&terms));
+        let slopes = sums.product.column(k) - &sums.gram * xi;
+        let gram = Matrix2::from_fn(|i, j| sums.gram[(terms[i], terms[j])]);
+        let gram = gram - (by_terms.transpose() * own.solve(&by_terms)).fixed_view::<2, 2>(0, 0);
+        let slopes = DVector::from_fn(2, |i, _| slopes[terms[i]])
+            - by_terms.transpose() * own.solve(&self.slopes(sums, k, xi));
+        Some((gram, slopes.fixed_rows::<2>(0).into_owned()))
+    }
+
     /// The change that predicts left-out parts better than `xi`; none if none does. Of single terms the least change
     /// within a standard error of the best; of the equation as a whole the best that gains [`LEAST_GAIN`].
     pub(super) fn change(
@@ -122,14 +164,21 @@ impl Family {
         k: usize,
         xi: &DVector<f64>,
     ) -> Option<Change> {
-        let after = |change: &DVector<f64>| xi + &self.directions * change;
+        let start = |left_out: Option<usize>| match (&self.shift, left_out) {
+            (None, _) => xi.clone(),
+            (Some(shift), None) => xi + &shift.of_all,
+            (Some(shift), Some(part)) => xi + &shift.without[part],
+        };
+        let after = |from: &DVector<f64>, change: &DVector<f64>| from + &self.directions * change;
         let others: Vec<Sums> = (0..parts.len())
             .map(|left_out| Sums::without(parts, left_out))
             .collect();
         let gain = |ridge: f64, part: usize| {
-            let change = self.solved(&others[part], k, xi, ridge);
+            let from = start(Some(part));
+            let change = self.solved(&others[part], k, &from, ridge);
             let own = &parts[part];
-            let gained = change.map(|change| own.error(k, xi) - own.error(k, &after(&change)));
+            let gained =
+                change.map(|change| own.error(k, xi) - own.error(k, &after(&from, &change)));
             gained.unwrap_or(0.0) / own.rows as f64
         };
         let of_ridge = |ridge: &f64| (0..parts.len()).map(|part| gain(*ridge, part)).collect();
@@ -153,11 +202,12 @@ impl Family {
             return None;
         }
         let chosen = gains.iter().position(|gains| mean(gains) >= least)?;
-        let change = self.solved(all, k, xi, RIDGES[chosen])?;
+        let from = start(None);
+        let change = self.solved(all, k, &from, RIDGES[chosen])?;
         if self.kind == Kind::Share && change[0].abs() < LEAST_SHARE {
             return None;
         }
-        let after = after(&change);
+        let after = after(&from, &change);
         // Of parts as a whole: errors within one are correlated.
         let inverse = self.gram(all, RIDGES[chosen]).try_inverse()?;
         let slopes = parts.iter().map(|part| self.slopes(part, k, &after));
@@ -166,7 +216,11 @@ impl Family {
         });
         let covariance = &inverse * squares * &inverse;
         let of_terms = &self.directions * covariance * self.directions.transpose();
-        let deviations = of_terms.diagonal().map(|square| square.max(0.0).sqrt());
+        let mut variances = of_terms.diagonal();
+        if let Some(shift) = &self.shift {
+            variances += shift.variances();
+        }
+        let deviations = variances.map(|square| square.max(0.0).sqrt());
         Some(Change {
             gain: mean(&gains[chosen]),
             change,

@@ -4,16 +4,19 @@
 //! by the least that predicts left-out recordings better: `xi + argmin |Y - Theta (xi + delta)|^2 / n + ridge |delta
 //! rms(Theta)|^2`, with the largest ridge whose error on left-out parts is within a standard error of the best. Where it
 //! predicts left-out parts better, the equation is multiplied by one number instead: recorded torques are not always what
-//! the motors gave. Equations without a variable (free fall, a rotation that nothing changes) are physics and stay.
+//! the motors gave. In flight a joint control that torques do not show is added (`joint_control`). Equations without a variable (free fall, a rotation that nothing changes) are physics and stay.
 
-use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::dataset::{Dataset, MIN_SAMPLES, Scaling};
-use super::equation_change::{Change, Family, Kind, Sums};
+use super::equation_change::{Change, Family, Kind, Shift, Sums};
 use super::error::TrainError;
 use super::features::Features;
+use super::joint_control::{self, Controlled};
 use super::judge::Judge;
 use super::latent::{EncodedSet, Latent};
 use super::task::Origin;
@@ -78,6 +81,7 @@ pub fn refine_from(
         model,
         features: Features::new(model.library()),
         whole: encoded(model, recordings, &rule)?,
+        jumps: encoded(model, recordings, &rule)?.each(),
         parts: encoded(model, &parts(recordings), &rule)?.each(),
     };
     let all = data.whole.set();
@@ -203,6 +207,7 @@ struct Data<'a> {
     model: &'a ReducedModel,
     features: Features,
     whole: Encoded,
+    jumps: Vec<Encoded>,
     parts: Vec<Encoded>,
 }
 
@@ -233,13 +238,20 @@ impl Data<'_> {
             Sums::of(&theta, &target)
         };
         let all = sums(&self.whole);
-        let parts: Vec<Sums> = self
-            .parts
+        // Pieces of one flight do not judge how another goes.
+        let flights = is_flight.then_some(&self.jumps).filter(|of| of.len() > 1);
+        let parts: Vec<Sums> = flights
+            .unwrap_or(&self.parts)
             .iter()
             .map(sums)
             .filter(|sums| sums.rows > 0)
             .collect();
         let is_enough = all.rows >= LEAST_ROWS && parts.len() > 1;
+        let control = match flights {
+            Some(_) if is_enough => self.joint_control(own, &all, &parts),
+            _ => Vec::new(),
+        };
+        let mut control: BTreeMap<usize, Shift> = control.into_iter().collect();
         let mut found = Vec::new();
         for k in 0..self.model.latent_dim() {
             let mut support = support(&own.xi, &self.features, k, is_flight);
@@ -255,15 +267,18 @@ impl Data<'_> {
             }
             let xi = own.xi.column(k).into_owned();
             let mut families = vec![Family::terms(&support, xi.len())];
-            // Pieces of one flight do not judge how another goes.
-            if !is_flight || self.whole.dataset.jumps.len() >= LEAST_PARTS {
+            if !is_flight || flights.is_some() {
                 let offset = self.features.constant_term().filter(|_| is_flight);
-                families.push(Family::share(&xi, offset));
+                families.push(Family::share(&xi, offset).shifted(control.remove(&k)));
             }
             let changes = families
                 .iter()
                 .filter_map(|family| Some((family, family.change(&all, &parts, k, &xi)?)));
-            let best = changes.max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain));
+            // In flight the equation as a whole, if it changes: of few flights single terms are guesses.
+            let best = match is_flight {
+                true => changes.last(),
+                false => changes.max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain)),
+            };
             let Some((family, change)) = best else {
                 notes.unchanged.push(format!("{place}: {NO_BETTER}"));
                 continue;
@@ -275,6 +290,40 @@ impl Data<'_> {
             found.extend(self.changed_coefficients(own, k, &change));
         }
         found
+    }
+
+    /// Joint control of the legs in flight as changes of each equation; empty if the sums show none.
+    fn joint_control(&self, own: &Phase, all: &Sums, parts: &[Sums]) -> Vec<(usize, Shift)> {
+        let (features, d) = (&self.features, self.model.latent_dim());
+        let controlled = |k: usize| {
+            let is_physics = support(&own.xi, features, k, true).is_empty();
+            let terms = [features.variable_term(d + k)?, features.variable_term(k)?];
+            let xi = own.xi.column(k).into_owned();
+            (!is_physics).then_some(Controlled { k, xi, terms })
+        };
+        let equations: Vec<Controlled> = (0..d).filter_map(controlled).collect();
+        let Some(constant) = features.constant_term() else {
+            return Vec::new();
+        };
+        let found = |sums: &Sums| joint_control::coefficients(&equations, sums, constant);
+        let without = (0..parts.len()).map(|part| found(&Sums::without(parts, part)));
+        let (Some(of_all), Some(without)) = (found(all), without.collect::<Option<Vec<_>>>())
+        else {
+            return Vec::new();
+        };
+        let each = equations.iter().map(|of| {
+            let change = |values: &[f64; 2]| {
+                let mut change = DVector::zeros(of.xi.len());
+                for (&term, value) in of.terms.iter().zip(values) {
+                    change[term] = value - of.xi[term];
+                }
+                change
+            };
+            let without = without.iter().map(change).collect();
+            let of_all = change(&of_all);
+            (of.k, Shift { of_all, without })
+        });
+        each.collect()
     }
 
     /// Coefficients of an equation that a change moves, with the number of their term.

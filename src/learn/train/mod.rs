@@ -16,6 +16,7 @@ mod frame;
 mod from_model;
 mod growth;
 mod joint;
+mod joint_control;
 mod judge;
 mod jumps;
 mod knowledge;
