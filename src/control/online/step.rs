@@ -136,7 +136,11 @@ impl Controller {
             return false;
         };
         self.memory.keep_posture(&joints, &lower, &upper);
-        let share = if in_flight { self.settings.flight_torque } else { 1.0 };
+        let share = if in_flight {
+            self.settings.flight_torque
+        } else {
+            1.0
+        };
         let limit = self.plant.robot().torque_limit_nm();
         self.memory.keep_torque(&torque, share, limit);
         command.joint_position_rad = self.memory.joint_position;
