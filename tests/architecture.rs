@@ -321,6 +321,7 @@ fn an_elementary_function_is_named_in_few_files() {
 fn a_setting_of_the_controller_stands_in_at_most_four_files() {
     for setting in [
         "swing_turn",
+        "flight_torque",
         "lift_prior_weight",
         "joint_penalty",
         "effectiveness_time_s",

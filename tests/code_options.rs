@@ -575,3 +575,46 @@ fn tidy_text_has_single_blank_lines_and_one_newline_at_its_end_and_comments_brea
         ["one two", "  three"]
     );
 }
+
+#[test]
+fn every_target_says_what_the_latent_coordinates_are() {
+    let model = load("models/go1-d7.json");
+    let scaled = Equations::of(&model);
+    let physical = scaled.in_physical_units().expect("has units");
+    for (equations, words) in [
+        (
+            &scaled,
+            "rotation about the centre of mass, pitch, in 10 rad",
+        ),
+        (
+            &scaled,
+            "rear feet upwards from the centre of mass, in 10 m",
+        ),
+        (&physical, "centre of mass forwards, m"),
+        (
+            &physical,
+            "rear feet upwards from the centre of mass, times a constant, rad",
+        ),
+    ] {
+        for target in [Target::C, Target::Rust, Target::Markdown, Target::Mathml]
+            .into_iter()
+            .chain([Target::Python, Target::Casadi, Target::Matlab])
+        {
+            let files = emit(equations, &[target], &EmitOptions::default()).expect("emits");
+            let has_words = files.iter().any(|file| file.contents.contains(words));
+            assert!(has_words, "{target:?}: {words}");
+        }
+    }
+    for (target, suffix) in [
+        (Target::Latex, "-nomenclature.tex"),
+        (Target::Controller, "include/go1_d7_controller.h"),
+        (Target::Controller, "README.md"),
+        (Target::ControllerC, "controller-c/go1_d7_controller.h"),
+        (Target::ControllerC, "controller-c/README.md"),
+    ] {
+        let files = emit(&scaled, &[target], &EmitOptions::default()).expect("emits");
+        let file = files.iter().find(|file| file.path.ends_with(suffix));
+        let text = &file.expect("is emitted").contents;
+        assert!(text.contains("centre of mass upwards, in 10 m"), "{suffix}");
+    }
+}

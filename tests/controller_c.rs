@@ -183,6 +183,7 @@ fn replay_file(
             linearisation: [Linearisation::Reference, Linearisation::LastPlan][run / 2 % 3 % 2],
             effectiveness,
             swing_turn: [1.0, 0.0, 0.5][run / 3 % 3],
+            flight_torque: [1.0, 0.3, 0.0][run / 2 % 3],
             torque_rate_nm_s: match rates {
                 Rates::Free => None,
                 Rates::Limited => [Some(300.0), Some(100.0), None, Some(1000.0)][run % 4],
@@ -235,6 +236,7 @@ fn replay_file(
                     settings.lift_prior_weight,
                     settings.torque_rate_nm_s.unwrap_or(0.0),
                     settings.swing_turn,
+                    settings.flight_torque,
                 ],
             );
             push(&mut bytes, reference.time_s);

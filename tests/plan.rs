@@ -85,6 +85,7 @@ fn plan_is_a_recording_that_other_commands_take() {
     };
     let own = fs::read_to_string(folder.join("plan.settings.toml")).expect("written");
     assert!(own.contains("input_weight = 8.0 #"), "{own}");
+    assert!(own.contains("flight_torque = 1.0 #"), "{own}");
     // The settings next to a plan are those of its controller: without them, commands are others.
     let [with, without] = [torques("with", &own), torques("without", "")];
     assert_ne!(with, without);
@@ -99,6 +100,7 @@ fn plan_is_a_recording_that_other_commands_take() {
     for (settings, expected) in [
         ("weight = 1.0", "found `weight`"),
         ("input_weight = -1.0", "`input_weight` is -1"),
+        ("flight_torque = 2.0", "`flight_torque` is 2"),
     ] {
         fs::write(folder.join("with.settings.toml"), settings).expect("written");
         let output = romc(folder, &["mpc", &model, "with.csv"]);

@@ -151,6 +151,12 @@ impl Model {
     }
 
     #[getter]
+    fn latent_words(&self) -> Vec<String> {
+        let words = self.data.latent_words();
+        words.iter().map(ToString::to_string).collect()
+    }
+
+    #[getter]
     fn library(&self) -> Vec<String> {
         let terms = self.data.library().terms().iter();
         terms.map(|term| term.text.clone()).collect()

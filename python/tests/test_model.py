@@ -54,6 +54,17 @@ def test_maps_and_accelerations_are_those_of_the_arrays(parts):
             np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
 
 
+def test_latent_words_have_quantity_and_unit(parts):
+    words = romc.Model.from_arrays(**parts).latent_words
+    assert words[1:4] == [
+        "centre of mass upwards, in 10 m",
+        "rotation about the centre of mass, pitch, in 10 rad",
+        "joints of the rear legs, in 10 rad",
+    ]
+    assert len(words) == 6
+    assert romc.Model.load(MODELS / "paper-2d.json").latent_words == []
+
+
 def losses_toml(actuators):
     """The file of losses, with the moments of a leg in a table of their own."""
     lines = lambda values: "".join(f"{name} = {value}\n" for name, value in values.items())

@@ -102,11 +102,14 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     if equations.terms.len() <= PATTERN_WIDTH {
         text.extend((0..phases.len()).map(|phase| pattern(&equations, phase)));
     }
-    let (dominant, words) = (dominant_coordinates(model), latent_words::of(model));
+    let words: Vec<String> = (model.latent_words().iter())
+        .map(ToString::to_string)
+        .collect();
+    let dominant = dominant_coordinates(model);
     let [encoder, decoder] =
         [model.encoder_map(), model.decoder_map()].map(|map| map.ok().map(StateMap::summary));
     text += &match (&dominant, &encoder) {
-        (Some(dominant), _) => composition(dominant, words.as_deref()),
+        (Some(dominant), _) => composition(dominant, &words),
         (None, Some(_)) => lines("  encoder ", &encoder) + &lines("  decoder ", &decoder),
         (None, None) => LATENT_ONLY.to_owned(),
     };
@@ -129,7 +132,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         "phases": phases,
         "exact": equations.steps,
         "dominant_coordinates": dominant,
-        "latent_coordinates": words,
+        "latent_coordinates": (!words.is_empty()).then_some(words),
         "encoder": encoder,
         "decoder": decoder,
         "actuators": model.actuators(),
@@ -151,11 +154,13 @@ fn phase_table(equations: &Equations<'_>, coefficients: usize) -> Table {
 
 type Dominant = Vec<Vec<(String, f64)>>;
 
-fn composition(dominant: &Dominant, words: Option<&[String]>) -> String {
+fn composition(dominant: &Dominant, words: &[String]) -> String {
     let line = |(latent, weights): (usize, &Vec<(String, f64)>)| {
         let part = |(name, weight): &(String, f64)| format!("{} {name}", significant(*weight));
         let parts: Vec<String> = weights.iter().map(part).collect();
-        let what = words.map_or(String::new(), |words| format!("{}: ", words[latent]));
+        let what = words
+            .get(latent)
+            .map_or(String::new(), |words| format!("{words}: "));
         format!("  z{}  {what}{} ...\n", latent + 1, parts.join(", "))
     };
     dominant.iter().enumerate().map(line).collect()

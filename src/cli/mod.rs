@@ -14,7 +14,6 @@ mod flags;
 mod identify;
 mod import;
 mod inspect;
-mod latent_words;
 mod manual;
 mod mpc;
 mod plan;

@@ -71,15 +71,15 @@ fn of_plans(robot: &Robot) -> MpcSettings {
     }
 }
 
-/// The file for a plan of a robot: the settings that differ from the usual ones.
+/// The file for a plan of a robot: the settings that differ from the usual ones, and the torques in flight, which plans need.
 pub(super) fn text(robot: &Robot) -> String {
     let both = [of_plans(robot), MpcSettings::default()];
     let [own, usual] = both.map(|settings| Settings::from(&settings).numbers());
     let mut text = "# Settings of the controller for the plan of the same name. `romc mpc` and `romc compile --plan`\n\
-                    # read them. In flight, keep the torques of the commands: they swing the legs.\n"
+                    # read them.\n"
         .to_owned();
     for ((setting, own), usual) in SETTINGS.iter().zip(own).zip(usual) {
-        if own != usual {
+        if own != usual || setting.name == "flight_torque" {
             text += &format!("{} = {own:?} # {}\n", setting.name, setting.text);
         }
     }

@@ -31,12 +31,15 @@ pub(crate) fn page(
     let model = content.model;
     let equations = &Equations::of(model);
     let typeset = Typeset::new(equations, &SymbolTable::default(), Rounding::default());
+    let words = model.latent_words().into_iter().zip(1..);
+    let words = words.map(|(words, number)| format!("z{number}: {words}"));
     let page = Page {
         model,
         version: env!("CARGO_PKG_VERSION"),
         digest: artifact::digest(model).to_string(),
         introduction,
         tiles: tiles(content),
+        coordinates: words.collect(),
         remarks: &content.assessment.remarks,
         phases: typeset.systems.iter().zip(equations.phases()).collect(),
         rounding: rounding(&HTML, Rounding::default(), &typeset.rounding),
@@ -57,6 +60,8 @@ struct Page<'a> {
     digest: String,
     introduction: &'a Introduction,
     tiles: Vec<(String, String)>,
+    /// Quantity and unit of each latent coordinate; empty where the model does not determine them.
+    coordinates: Vec<String>,
     remarks: &'a [String],
     phases: Vec<(&'a EquationSystem, &'a PhaseEquations)>,
     rounding: String,

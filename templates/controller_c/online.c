@@ -1067,6 +1067,15 @@ static inline MAYBE_UNUSED void online_memory_keep_time(online_memory *self, dou
     memset(self->joint_velocity, 0, sizeof(real[12]));
 }
 
+/* Stores a share of the commanded torques (N m), within the motors' limits. */
+static inline MAYBE_UNUSED void online_memory_keep_torque(online_memory *restrict self, const real *torque,
+        real share, const real *limit)
+{
+    for (int i = 0; i < 12; ++i) {
+        self->feed_forward_nm[i] = online_clamped_torque(share * torque[i], limit[i]);
+    }
+}
+
 /* Whether a measurement is not believed: it jumps, and few did before. Its velocities must not become torques. */
 static inline MAYBE_UNUSED bool online_memory_refuses(online_memory *self, bool is_jump, int patience)
 {

@@ -2,7 +2,7 @@
  * usage: replay FILE; prints steps, differing ones, the most iterations and torques beyond their limits. Native byte order:
  * runs until the end of the file, each of
  *   int64 samples, steps, has_u, is_next, lift, linearisation; double body_friction, effectiveness_time_s, stiffness and
- *   damping of the drives, foot_friction, lift_prior_weight, torque_rate_nm_s, swing_turn;
+ *   damping of the drives, foot_friction, lift_prior_weight, torque_rate_nm_s, swing_turn, flight_torque;
  *   double time_s[samples], x[18 samples], dx[18 samples], u[18 samples] if has_u; uint8 feet[4 samples]
  *   and for each step double time_s, x[18], dx[18]; uint8 feet[4], flags (1 prepare, 2 reset); double torque[12],
  *   joint_position[12], joint_velocity[12], u_lat[D]; int64 status, iterations. */
@@ -54,8 +54,8 @@ int main(int argc, char **argv)
     }
     while (get(head, sizeof head[0], 6)) {
         const size_t count = (size_t)head[0];
-        double chosen[8];
-        need(chosen, sizeof chosen[0], 8);
+        double chosen[9];
+        need(chosen, sizeof chosen[0], 9);
         double *time_s = array(sizeof(double), count), *x = array(sizeof(double), 18 * count);
         double *dx = array(sizeof(double), 18 * count), *u = NULL;
         if (head[2]) {
@@ -71,6 +71,7 @@ int main(int argc, char **argv)
         settings.lift_prior_weight = chosen[5];
         settings.torque_rate_nm_s = chosen[6];
         settings.swing_turn = chosen[7];
+        settings.flight_torque = chosen[8];
         settings.lift = (int32_t)head[4];
         settings.linearisation = (int32_t)head[5];
         const int is_next = head[3] != 0;

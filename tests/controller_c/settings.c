@@ -51,6 +51,9 @@ int main(void)
     TRY(joint_penalty, 0);
     TRY(body_friction, -0.5);
     TRY(swing_turn, -0.1);
+    TRY(flight_torque, -0.1);
+    TRY(flight_torque, 1.1);
+    TRY(flight_torque, (double)NAN);
     TRY(torque_rate_nm_s, -1);
     TRY(torque_rate_nm_s, (double)NAN);
     settings.torque_rate_nm_s = 100;

@@ -1,4 +1,4 @@
-//! Legs in flight against an error of pitch.
+//! Legs in flight: turned against an error of pitch, under a share of the torques.
 
 use std::path::PathBuf;
 
@@ -25,11 +25,15 @@ fn jump() -> Segment {
 
 /// The command at a sample of a jump for a body that has turned `error_rad` too far forwards.
 fn command(swing_turn: f64, sample: usize, error_rad: f64) -> Command {
-    let (model, segment) = (shipped(), jump());
     let settings = MpcSettings {
         swing_turn,
         ..MpcSettings::default()
     };
+    command_with(settings, sample, error_rad)
+}
+
+fn command_with(settings: MpcSettings, sample: usize, error_rad: f64) -> Command {
+    let (model, segment) = (shipped(), jump());
     let mut controller = romc::mpc::controller(&model, settings).expect("a complete model");
     let reference = ReferenceSamples {
         time_s: &segment.time_s,
@@ -106,4 +110,35 @@ fn an_absurd_error_of_pitch_turns_no_leg_further_than_a_large_one() {
     let sample = in_flight(&jump());
     let [large, absurd] = [0.6, 3.0].map(|error| command(1.0, sample, error));
     assert_eq!(large.joint_position_rad, absurd.joint_position_rad);
+}
+
+#[test]
+fn share_of_torques_acts_in_flight_alone() {
+    for (sample, scale) in [(20, 1.0), (100, 1.0), (in_flight(&jump()), 0.3)] {
+        let [whole, part] = [1.0, 0.3].map(|flight_torque| {
+            let settings = MpcSettings {
+                flight_torque,
+                ..MpcSettings::default()
+            };
+            command_with(settings, sample, 0.0)
+        });
+        assert!(whole.torque_nm.iter().any(|torque| torque.abs() > 0.1));
+        assert_eq!(part.torque_nm, whole.torque_nm.map(|torque| scale * torque));
+        assert_eq!(part.losses_nm, whole.losses_nm.map(|loss| scale * loss));
+        assert_eq!(part.joint_position_rad, whole.joint_position_rad);
+        assert_eq!(part.u_lat, whole.u_lat);
+    }
+}
+
+#[test]
+fn share_of_torques_beyond_one_is_refused() {
+    for flight_torque in [-0.1, 1.1, f64::NAN] {
+        let settings = MpcSettings {
+            flight_torque,
+            ..MpcSettings::default()
+        };
+        let refused = romc::mpc::controller(&shipped(), settings).map(drop);
+        let error = refused.expect_err("outside 0 to 1").to_string();
+        assert!(error.contains("flight_torque"), "{error}");
+    }
 }

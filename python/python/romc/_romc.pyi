@@ -36,6 +36,7 @@ class Model:
     latent_dim: int
     state_dim: Optional[int]
     is_linear: bool
+    latent_words: List[str]
     library: List[str]
     @staticmethod
     def load(path: str) -> Model: ...

@@ -237,6 +237,12 @@ class Model:
         return self._native.latent_dim
 
     @property
+    def latent_words(self) -> List[str]:
+        """Quantity and unit of each latent coordinate, such as `"centre of mass upwards, in 10 m"`: the scaled value is 1
+        at 10 m. Empty unless a linear encoder maps the coordinates of a known robot."""
+        return self._native.latent_words
+
+    @property
     def library(self) -> List[str]:
         """The candidate terms, in the order of Xi's rows."""
         return self._native.library

@@ -12,6 +12,18 @@ const MOST_TERMS: usize = 40;
 const WORLD_AXES: &str = "Axes are the world's; the arm p_k of a moment is the foot from the body's origin. The three \
      moments are the generalised forces of roll, pitch and yaw: they do work on the rates of these angles";
 
+/// A list of the latent coordinates behind a blank line; empty where the model does not determine them.
+pub(super) fn of_coordinates(system: &Equations<'_>) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (number, words) in (1..).zip(system.latent_words()) {
+        if number == 1 {
+            lines.extend(["", "Latent coordinates:", ""].map(str::to_owned));
+        }
+        lines.push(format!("- z{number}: {words}"));
+    }
+    lines
+}
+
 pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 3], LowerError> {
     let robot = model.robot()?.name;
     let axes = match model.wrench_frame() {

@@ -1,7 +1,7 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
 use super::dialect::{Parameter, Role};
-use super::documentation::{equations, of_inputs, of_maps};
+use super::documentation::{equations, of_coordinates, of_inputs, of_maps};
 use super::options::Units;
 use crate::equations::{Equations, LatentUnits};
 use crate::ir::{Program, Statement};
@@ -33,6 +33,8 @@ pub struct ModelInterface {
     /// Whether latent quantities are in physical units instead of the model's scaled ones.
     pub is_physical: bool,
     pub latent_dim: usize,
+    /// Lines of the documentation with quantity and unit of each latent coordinate; empty where they are not known.
+    pub latent_lines: Vec<String>,
     /// Number of robot coordinates, if the model speaks of any.
     pub state_dim: Option<usize>,
     pub(crate) maps: Vec<FunctionSpec>,
@@ -51,6 +53,7 @@ impl ModelInterface {
             units,
             is_physical: system.latent_units().is_some(),
             latent_dim: model.latent_dim(),
+            latent_lines: of_coordinates(system),
             state_dim: model.state_dim(),
             maps: match units {
                 Units::Si => {

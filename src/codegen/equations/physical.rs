@@ -17,8 +17,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::system::{Equations, PhaseEquations, Summand};
 use crate::model::{
-    AffineMap, CandidateTerm, CoordinateNames, LatentVariable, ModelError, ReducedModel,
-    ScaleFactors, Scaling,
+    AffineMap, CandidateTerm, CoordinateNames, LatentVariable, LatentWords, ModelError,
+    ReducedModel, ScaleFactors, Scaling,
 };
 use crate::symbolic::{ExprId, ExprPool, Node, SymbolId};
 
@@ -131,6 +131,26 @@ impl Equations<'_> {
             steps: self.steps.clone(),
             physical: Some((units, Box::new(self.clone().into_owned()))),
         })
+    }
+
+    /// Quantity and unit of each latent coordinate of these equations; empty where the model does not determine them.
+    pub fn latent_words(&self) -> Vec<LatentWords> {
+        let scaled = self.in_scaled_units().model().latent_words();
+        let Some(units) = self.latent_units() else {
+            return scaled;
+        };
+        let all = scaled.into_iter().zip(self.model().latent_words());
+        let all = all.zip(&units.position).map(|((scaled, own), unit)| {
+            let unit = unit.to_string();
+            let has_unit = own.unit.is_empty() || own.unit == unit;
+            let factor = match has_unit && own.quantity == scaled.quantity {
+                true => "",
+                false => ", times a constant",
+            };
+            let quantity = scaled.quantity + factor;
+            LatentWords { quantity, unit }
+        });
+        all.collect()
     }
 
     /// Terms of scaled variables, and the numeric factor that went out of each.

@@ -3,7 +3,7 @@
 use askama::Template;
 
 use crate::equations::Equations;
-use crate::model::FeetRule;
+use crate::model::{FeetRule, LatentVariable};
 use crate::robot::{ContactFlags, Leg};
 
 use super::decimal::{
@@ -12,7 +12,7 @@ use super::decimal::{
 use super::equations::{EquationSystem, Typeset};
 use super::symbols::PrintOptions;
 use super::table::{rounded, rounded_up};
-use super::tree::{Math, Signed};
+use super::tree::{Math, Signed, Symbol};
 
 /// How a sentence spells words from outside and mathematics.
 #[derive(Debug)]
@@ -173,6 +173,8 @@ pub(super) struct Page<'a> {
     pub equations: &'a Equations<'a>,
     pub spelling: &'a Spelling,
     pub typeset: Typeset,
+    /// Symbol of each latent coordinate, its quantity and unit; empty where the model does not determine them.
+    pub coordinates: Vec<(Symbol, String)>,
     pub rounding: String,
     width_em: f64,
     pub digest: Option<&'a str>,
@@ -186,7 +188,13 @@ impl<'a> Page<'a> {
         spelling: &'a Spelling,
     ) -> Self {
         let typeset = Typeset::new(equations, &options.symbols, options.rounding);
+        let words = equations.latent_words().into_iter().enumerate();
+        let coordinates = words.map(|(index, words)| {
+            let symbol = options.symbols.symbol(LatentVariable::Z(index));
+            (symbol, words.to_string())
+        });
         Self {
+            coordinates: coordinates.collect(),
             equations,
             spelling,
             rounding: rounding(spelling, options.rounding, &typeset.rounding),

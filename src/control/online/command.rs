@@ -201,6 +201,13 @@ impl Memory {
         self.has_position = true;
     }
 
+    /// Stores a share of the commanded torques (N m), within the motors' limits.
+    pub(super) fn keep_torque(&mut self, torque: &[Real], share: Real, limit: &[Real]) {
+        for i in 0..12 {
+            self.feed_forward_nm[i] = clamped_torque(share * torque[i], limit[i]);
+        }
+    }
+
     /// Keeps the time of a command and awaits the next measurement.
     pub(super) fn keep_time(&mut self, time_s: f64, step_s: f64) {
         self.command_s = self.now_s(time_s, step_s);

@@ -116,6 +116,8 @@ pub enum Accepts {
     Optional,
     /// As [`Self::Optional`], of rows that link stages: the switch that compiles them in the C, and what that compiles.
     LinkRows(&'static str, &'static str),
+    /// A number from 0 to 1.
+    Share,
     /// Zero or a positive number; not looked at where this setting is zero.
     With(&'static str),
 }
@@ -130,6 +132,7 @@ impl Accepts {
             Self::Positive | Self::Optional | Self::LinkRows(..) => {
                 (is_positive, "a positive number")
             }
+            Self::Share => ((0.0..=1.0).contains(&found), "a number from 0 to 1"),
             Self::NotNegative | Self::With(_) => {
                 (is_positive || found == 0.0, "zero or a positive number")
             }
@@ -368,6 +371,10 @@ settings! {
         /// Zero leaves them where the reference has them from the body, 1 where it has them from the ground.
         swing_turn: f64 = 1.0 => swing_turn: Real, Accepts::NotNegative,
             "share of the error of pitch that joint_position turns the legs against in flight";
+        /// They swing the legs; the ground does not answer them.
+        flight_torque: f64 = 1.0 => flight_torque: Real, Accepts::Share,
+            "share of the torques that acts in flight, 0 to 1; 0 leaves the legs to the joint PD",
+            in_ros "share of the feed-forward torques that acts in flight, 0 to 1; 0 leaves the legs to the PD";
     }
     rust {
         /// What stands for the reference's own dynamics.

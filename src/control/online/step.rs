@@ -136,10 +136,16 @@ impl Controller {
             return false;
         };
         self.memory.keep_posture(&joints, &lower, &upper);
-        self.memory.feed_forward_nm = self.plant.clamp_torque(torque);
+        let share = if in_flight {
+            self.settings.flight_torque
+        } else {
+            1.0
+        };
+        let limit = self.plant.robot().torque_limit_nm();
+        self.memory.keep_torque(&torque, share, limit);
         command.joint_position_rad = self.memory.joint_position;
         command.torque_nm = self.memory.feed_forward_nm;
-        command.losses_nm = stance.losses_nm;
+        command.losses_nm = stance.losses_nm.map(|loss| share * loss);
         command.inconsistency = self.inconsistency(command);
         true
     }

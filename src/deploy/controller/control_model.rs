@@ -156,6 +156,10 @@ impl SettingText {
                 (condition, positive)
             }
             Accepts::Positive => (format!("!is_positive({number})"), positive),
+            Accepts::Share => {
+                let condition = format!("!is_not_negative({number}) || {number} > 1");
+                (condition, "a number from 0 to 1")
+            }
             Accepts::With(first) => {
                 let condition = format!("settings->{first} > 0 && !is_not_negative({number})");
                 (condition, other)

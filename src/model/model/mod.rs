@@ -34,6 +34,7 @@ mod coordinates;
 mod error;
 mod identifier;
 mod jump_prior;
+mod latent_words;
 mod library;
 mod listed;
 mod maps;
@@ -49,6 +50,7 @@ pub use coordinates::{CoordinateNames, ScaleFactors, Scaling};
 pub use error::ModelError;
 pub use identifier::{Identifier, IdentifierError, check_name};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks};
+pub use latent_words::LatentWords;
 pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN, Step, Tape,
 };

@@ -270,13 +270,16 @@ fn symbol_list<'a>(system: &Equations<'_>, header: String, options: &PrintOption
             .join(", "),
         _ => format!(r"{}, \dots, {}", symbol(of(0)), symbol(of(dim - 1))),
     };
-    let position = |index| {
+    let words = system.latent_words();
+    let position = |index: usize| {
         let unit = units.map(|units| tex_unit(units.position[index]));
-        (
-            symbol(LatentVariable::Z(index)),
-            unit,
-            coordinate(model, index, numbers),
-        )
+        let words = words.get(index).map(|words| match unit {
+            Some(_) => words.quantity.clone(),
+            None => words.to_string(),
+        });
+        let words = words.map_or(String::new(), |words| format!(": {}", tex_text(&words)));
+        let meaning = coordinate(model, index, &words, numbers);
+        (symbol(LatentVariable::Z(index)), unit, meaning)
     };
     let input = |(index, unit): (usize, &Unit)| {
         (symbol(LatentVariable::U(index)), tex_unit(*unit), index + 1)
@@ -305,8 +308,8 @@ fn symbol_list<'a>(system: &Equations<'_>, header: String, options: &PrintOption
     }
 }
 
-/// A latent coordinate and the robot coordinates that it mostly consists of.
-fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String {
+/// A latent coordinate with its words, and the robot coordinates that it mostly consists of.
+fn coordinate(model: &ReducedModel, row: usize, words: &str, numbers: NumberStyle) -> String {
     let (Ok(encoder), Some(state)) = (model.encoder(), model.state()) else {
         return format!("latent coordinate {}", row + 1);
     };
@@ -324,7 +327,7 @@ fn coordinate(model: &ReducedModel, row: usize, numbers: NumberStyle) -> String 
         })
         .collect();
     let (number, strongest) = (row + 1, strongest.join(", "));
-    format!("latent coordinate {number}; largest weights: {strongest}")
+    format!("latent coordinate {number}{words}; largest weights: {strongest}")
 }
 
 /// A nonlinear encoder by the widths of its layers; its weights stay in the model file.

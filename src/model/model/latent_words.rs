@@ -1,9 +1,7 @@
-//! What each latent coordinate of a linear encoder over a robot's coordinates is, in words and with its unit.
+//! Quantities and units of latent coordinates of a linear encoder over a robot's coordinates.
 
-use nalgebra::DVector;
-
-use crate::model::ReducedModel;
-use crate::robot::{BODY_X, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot, STATE_DIM};
+use super::*;
+use crate::robot::{BODY_X, JOINT_DIM, LEG_JOINT_DIM, Leg};
 
 const BODY: [(&str, &str); 6] = [
     ("centre of mass forwards", "m"),
@@ -23,42 +21,53 @@ const LIKE_FEET: f64 = 0.95;
 const MOST: f64 = 0.9; // share of the squared weights of a row that names it after two legs
 const NONE: f64 = 1e-9;
 
-/// One text a coordinate, such as `centre of mass upwards, in 10 m`; none for other models.
-pub(super) fn of(model: &ReducedModel) -> Option<Vec<String>> {
-    let (encoder, robot) = (model.encoder().ok()?, model.robot().ok()?);
-    if encoder.input_dim() != STATE_DIM {
-        return None;
-    }
-    let rest = model.decode(&DVector::zeros(model.latent_dim())).ok()?;
-    let factors = model.state_factors().ok()?;
-    if factors.iter().any(|factor| *factor != factors[0]) {
-        return None;
-    }
-    let rows = encoder.weights().row_iter();
-    let words = rows.map(|row| words(&row.transpose(), &rest, robot).scaled(factors[0]));
-    Some(words.collect())
+/// Quantity and unit of a latent coordinate; displayed as `centre of mass upwards, in 10 m`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LatentWords {
+    pub quantity: String,
+    /// `m`, or `in 10 m` for a scaled value that is 1 at 10 m; empty if one unit does not describe the coordinate.
+    pub unit: String,
 }
 
-/// What a coordinate is, and the unit of its SI value if it has one.
+impl fmt::Display for LatentWords {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let comma = if self.unit.is_empty() { "" } else { ", " };
+        write!(f, "{}{comma}{}", self.quantity, self.unit)
+    }
+}
+
+impl ReducedModel {
+    /// Quantity and unit of each latent coordinate; empty unless a linear encoder maps the coordinates of a known robot.
+    pub fn latent_words(&self) -> Vec<LatentWords> {
+        let (Ok(encoder), Ok(robot)) = (self.encoder(), self.robot()) else {
+            return Vec::new();
+        };
+        let rest = self.decode(&DVector::zeros(self.latent_dim()));
+        let (Ok(rest), Ok(factors)) = (rest, self.state_factors()) else {
+            return Vec::new();
+        };
+        let factor = factors[0];
+        if encoder.input_dim() != STATE_DIM || factors.iter().any(|other| *other != factor) {
+            return Vec::new();
+        }
+        let rows = encoder.weights().row_iter();
+        let words = rows.map(|row| words(&row.transpose(), &rest, robot).scaled(factor));
+        words.collect()
+    }
+}
+
+/// Quantity of a coordinate, and the unit of its SI value if it has one.
 struct Words(String, Option<&'static str>);
 
 impl Words {
-    /// With the unit of the scaled value: what it is in SI units when it is 1.
-    fn scaled(self, factor: f64) -> String {
-        match self.1 {
-            None => self.0,
-            Some(unit) if factor == 1.0 => format!("{}, {unit}", self.0),
-            Some(unit) => format!("{}, in {} {unit}", self.0, 1.0 / factor),
-        }
+    fn scaled(self, factor: f64) -> LatentWords {
+        let unit = self.1.map_or(String::new(), |unit| match factor {
+            1.0 => unit.to_owned(),
+            _ => format!("in {} {unit}", 1.0 / factor),
+        });
+        let quantity = self.0;
+        LatentWords { quantity, unit }
     }
-}
-
-/// A line a coordinate, such as `  z2  centre of mass upwards, in 10 m`; empty for other models.
-pub(super) fn lines(model: &ReducedModel) -> String {
-    let words = of(model).unwrap_or_default().into_iter().zip(1..);
-    words
-        .map(|(words, number)| format!("  z{number}  {words}\n"))
-        .collect()
 }
 
 fn words(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
