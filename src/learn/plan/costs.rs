@@ -60,8 +60,31 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
     }
     for part in 0..task.seed.parts.len() {
         add_feet(task, y, part, &mut out);
+        if part > 0 {
+            add_take_off(task, y, part, &mut out);
+        }
     }
     out
+}
+
+/// Feet rise after take-off as they do in the prior: where they rise more slowly, a soft floor holds them.
+fn add_take_off(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)>) {
+    let (settings, of) = (task.settings, &task.seed.parts[part]);
+    let (before, after) = (task.seed.parts[part - 1].landmark.feet, of.landmark.feet);
+    let step = of.duration_s / of.intervals() as f64;
+    let lifted: Vec<Leg> = Leg::down(before)
+        .filter(|leg| !after[leg.index()])
+        .collect();
+    for &leg in &lifted {
+        let [_, from] = moved_foot(task, y, leg, (part, 0));
+        let nodes = (settings.take_off_s / step).round() as usize;
+        for node in 1..=nodes.min(of.intervals()) {
+            let [_, moved] = moved_foot(task, y, leg, (part, node));
+            let unit = settings.foot_m[1];
+            let weight = settings.take_off / lifted.len() as f64 * step / TIME_UNIT_S;
+            out.push((moved - from.clone(), weight / (unit * unit)));
+        }
+    }
 }
 
 /// Feet stay as far as they do in the prior: along the floor from the start or touch-down, above it from the start.

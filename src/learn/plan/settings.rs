@@ -54,6 +54,9 @@ settings! {
     smoothness: f64 = 3.0, ANY;
     /// Weight of feet that leave their place, per [`Self::foot_m`].
     feet: f64 = 3.0, ANY;
+    /// Weight of feet that rise otherwise than in the prior, per [`Self::foot_m`], and for how long after take-off, s.
+    take_off: f64 = 3.0, ANY;
+    take_off_s: f64 = 0.04, 0.1;
     /// Displacement of a foot along and above the floor that counts one, m.
     foot_m: [f64; 2] = [0.005, 0.004], 1.0;
     /// Weight of durations, per 15 % of change: of parts on the ground, and of the flight.
