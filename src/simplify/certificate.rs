@@ -3,14 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Serialize, Serializer};
-use serde_json::{Value, json};
+use serde::Serializer;
 
 use super::measure::Measured;
-use crate::equations::ExactStep;
-use crate::model::LatentVariable;
-use crate::symbolic::Interval;
-use crate::typeset::rounded;
+use super::*;
 
 /// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

@@ -1,14 +1,8 @@
 //! The terms of equations with those that they may be rewritten to, and ranges of their combinations over a box.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use nalgebra::DMatrix;
-
-use super::domain::SimplifyError;
 use super::equation::Rewrite;
-use crate::equations::Equations;
-use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
-use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
+use super::*;
+use crate::symbolic::{ExprId, ExprPool, Node};
 
 /// Relative error of the algebra's constants, with room to spare: a merged or halved float has an error of 2^-53.
 const CONSTANT_ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;

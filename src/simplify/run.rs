@@ -1,24 +1,13 @@
 //! From a model, a domain and a tolerance to a simplified model and its certificate.
 
-use std::collections::BTreeSet;
-
-use nalgebra::DMatrix;
-use serde_json::{Value, json};
-
-use super::certificate::{
-    BeforeAfter, Certificate, EquationCertificate, PhaseCertificate, Tolerance,
-};
-use super::domain::{Domain, Samples, SimplifyError, check_count};
+use super::certificate::{BeforeAfter, EquationCertificate};
+use super::domain::check_count;
 use super::equation::{Equation, is_same_decimal};
 use super::measure::Differences;
-use super::ranges::{Ranges, Workspace};
-use crate::artifact;
-use crate::equations::Equations;
+use super::*;
 use crate::ir::{Program, Statement};
 use crate::lower::{self, Form};
-use crate::model::{LatentVariable, ReducedModel};
 use crate::robot::{BODY_Z, GRAVITY_M_S2};
-use crate::symbolic::{Interval, SymbolId};
 
 /// What the search may use is lowered to this share of itself until the final evaluation confirms the tolerance.
 const RETREAT: f64 = 0.8;

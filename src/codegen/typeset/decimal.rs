@@ -1,12 +1,7 @@
 //! Numbers as they are printed, and coefficients before terms with a record of what rounding changed.
 
-use std::fmt;
-
-use nalgebra::DMatrix;
-
-use super::equations::{Equation, EquationSystem};
 use super::expression::with_coefficient;
-use super::tree::{Signed, Symbol};
+use super::*;
 
 /// How coefficients are rounded for print.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

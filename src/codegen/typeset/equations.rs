@@ -1,14 +1,7 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
 #![allow(missing_docs, reason = "the names say it")]
 
-use nalgebra::DMatrix;
-
-use crate::equations::{Equations, Unit};
-
-use super::decimal::{Decimal, Rounder, Rounding, RoundingReport};
-use super::expression::terms;
-use super::symbols::SymbolTable;
-use super::tree::{Math, Signed, Symbol};
+use super::*;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct EquationSystem {

@@ -1,12 +1,8 @@
 //! From canonical expressions to the typeset tree, with factors and terms in the order that readers expect.
 
-use crate::equations::Equations;
-use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
-
-use super::decimal::Decimal;
-use super::symbols::SymbolTable;
-use super::tree::{Glyph, Math, Signed};
+use super::*;
+use crate::model::MAX_LATENT_DIM;
+use crate::symbolic::{ExprId, ExprPool, Node, Number, SymbolId};
 
 /// Lays out an expression over the variables of a latent model.
 ///

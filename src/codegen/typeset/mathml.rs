@@ -1,19 +1,7 @@
 //! Pages: equations in MathML Core, which browsers draw without scripts, and the one way in for text from outside.
 
-use std::fmt;
-
-use askama::Template;
-
-use crate::equations::{Equations, Unit};
-use crate::files::{EmittedFile, is_invisible};
-use crate::model::LatentVariable;
-use crate::typeset::latex::tex_cases;
-use crate::typeset::tree::{function_name, greek_letter};
-use crate::typeset::words::{Page, Spelling, code_point, rendered};
-use crate::typeset::{
-    Decimal, EQUALS, Emitted, EquationSystem, Glyph, Math, PrintOptions, Signed, Symbol,
-    SymbolTable, break_lines, symbol_width,
-};
+use super::*;
+use crate::typeset::tree::function_name;
 
 const INDENT: f64 = 2.0; // of a continued line, in em
 

@@ -2,16 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
-use crate::equations::Equations;
-use crate::model::{AffineMap, LatentVariable};
-
-use super::decimal::{Decimal, Rounder, Rounding, RoundingReport};
-use super::equations::{EquationSystem, coefficients};
-use super::expression::terms;
-use super::symbols::{SymbolTable, TypesetError, glyph};
-use super::tree::{Glyph, Math, Signed, Symbol};
+use super::equations::coefficients;
+use super::symbols::glyph;
+use super::*;
+use crate::model::AffineMap;
 
 /// Weights below this share of their row's largest are left out of the printed encoder.
 const NEGLIGIBLE: f64 = 0.02;

@@ -2,8 +2,7 @@
 //! of Computer Modern, good to a few percent) and where a long equation is broken.
 #![allow(missing_docs, reason = "the names say it")]
 
-use super::decimal::Decimal;
-use crate::symbolic::Function;
+use super::*;
 
 /// One piece of laid-out mathematics: parentheses, dots and signs are in place, a printer chooses spelling alone.
 #[derive(Clone, Debug, PartialEq)]

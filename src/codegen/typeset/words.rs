@@ -1,18 +1,9 @@
 //! Sentences of every printed form of a model, in the form's spelling, and what Markdown and HTML pages are made of.
 
-use askama::Template;
-
-use crate::equations::Equations;
+use super::decimal::{LEAST_DECIMALS, Occurrence, RELATIVE_ERROR};
+use super::*;
 use crate::model::FeetRule;
 use crate::robot::{ContactFlags, Leg};
-
-use super::decimal::{
-    Decimal, LEAST_DECIMALS, Occurrence, RELATIVE_ERROR, Rounding, RoundingReport,
-};
-use super::equations::{EquationSystem, Typeset};
-use super::symbols::PrintOptions;
-use super::table::{rounded, rounded_up};
-use super::tree::{Math, Signed};
 
 /// How a sentence spells words from outside and mathematics.
 #[derive(Debug)]

@@ -2,11 +2,9 @@
 //! logger that counts samples says that time passes evenly even where samples came late or were lost; between two the
 //! robot moved by velocity times elapsed time. Coordinates that disagree on the clock are themselves wrong.
 
-use super::error::RecordingError;
 use super::mismatch::falls_of;
-use super::preprocess::{differences, median, resampled};
-use super::segment::Segment;
-use crate::robot::{BODY_DIM, GRAVITY_M_S2, JOINT_DIM};
+use super::preprocess::resampled;
+use super::*;
 
 const LEAST_DISAGREEMENT: f64 = 0.03; // elapsed over stamped time from which a segment's clock is replaced
 const JOINT_WEIGHT: f64 = 0.01; // weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2

@@ -25,6 +25,10 @@ use crate::mpc::problem::StageRows;
 use crate::solver::ROW_NUMBERS;
 use source::{Numbers, Source};
 
+use crate::mpc::{MpcError, MpcSettings};
+use crate::robot::{JOINT_DIM, STATE_DIM};
+use source::nested;
+
 struct Facts<'a> {
     controller: controller::Facts<'a>,
     banner: String,

@@ -1,22 +1,10 @@
 //! The files of the LaTeX backend.
 
-use std::fmt;
-
-use askama::Template;
-
-use super::math::{
-    self, Block, comment_text, label, tex, tex_number, tex_symbol, tex_text, tex_unit,
-};
-use super::table::{self, TableBlock};
-use crate::equations::{Equations, Unit};
-use crate::files::EmittedFile;
-use crate::model::{Activation, Identifier, LatentVariable, ReducedModel, ScaleFactors, StateMap};
-use crate::typeset::decimal::RoundingReport;
-use crate::typeset::words::{self, Spelling};
-use crate::typeset::{
-    Decimal, Emitted, EquationSystem, Form, NumberStyle, PrintOptions, RobotTypeset, Rounding,
-    Typeset, TypesetError, words::rendered,
-};
+use super::math::{Block, comment_text};
+use super::table::TableBlock;
+use super::*;
+use crate::model::{Activation, Identifier, ReducedModel, ScaleFactors, StateMap};
+use crate::typeset::words;
 
 /// The LaTeX files of a model; NAME is its identifier:
 ///

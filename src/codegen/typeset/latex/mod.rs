@@ -27,3 +27,6 @@ mod table;
 pub use document::emit;
 pub use math::tex_cases;
 pub(crate) use math::{tex, tex_symbol, tex_unit};
+
+use super::*;
+use math::{label, tex_number, tex_text};

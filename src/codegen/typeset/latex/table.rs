@@ -1,9 +1,7 @@
 //! The coefficients as booktabs tables.
 
-use crate::typeset::{CoefficientRow, CoefficientTable, Decimal, NumberStyle, width};
-
 use super::document::is_narrow;
-use super::math::{label, tex, tex_number, tex_symbol, tex_text, tex_unit};
+use super::*;
 
 const TERM_HEAD_EM: f64 = 2.31;
 const COLUMN_SPACE_EM: f64 = 1.2; // around a column: twice LaTeX's `\tabcolsep` at 10 pt

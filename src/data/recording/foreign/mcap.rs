@@ -2,21 +2,18 @@
 //! one by one and chunks unpacked one at a time. A file that ends early gives what its whole records and chunks hold.
 //! Folders of ROS 2 bags have the MCAP files that one recording was split into.
 
-use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
 
+use ::mcap::read::parse_record;
+use ::mcap::records::{ChunkHeader, Record, op};
 use flate2::Crc;
-use mcap::read::parse_record;
-use mcap::records::{ChunkHeader, Record, op};
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 
-use super::signal::Log;
 use super::topics::Topics;
+use super::*;
 use crate::files::magic::{MAGIC_BYTES, MCAP, recognised};
 use crate::files::size::{Capped, Format, read_text_capped};
-use crate::recording::error::{Checked, Outcome, RecordingFault, io_fault, text, unexpected};
 
 const RECORD_HEADER: usize = 9; // bytes of a record before its contents: its kind and their length
 const LEAST_WINDOW: u64 = 1 << 23; // window of a zstd frame that every chunk may have, in bytes

@@ -1,8 +1,6 @@
 //! Messages of ROS 1 and 2 as numbers with names, by the definition that a log carries. Faults are words.
 
-use std::collections::BTreeMap;
-
-use crate::recording::clock::Instant;
+use super::*;
 
 const MOST_ENTRIES: usize = 64; // longest array whose entries become columns: an image is no column
 const MOST_NUMBERS: usize = 4096; // most numbers of a message

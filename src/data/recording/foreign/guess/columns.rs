@@ -2,11 +2,9 @@
 
 use std::cmp::Reverse;
 
-use super::super::elements::{Dimension, QUATERNION, Quantity};
-use super::super::signal::{Channel, Log};
-use super::names::{Reading, is_quantity, is_time, is_wanted, read, unit};
+use super::names::{Reading, is_quantity, is_time, is_wanted, read};
+use super::*;
 use crate::recording::preprocess::median;
-use crate::robot::Robot;
 
 #[derive(Debug, Clone)]
 pub(super) struct Group {

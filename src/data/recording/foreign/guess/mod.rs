@@ -18,6 +18,19 @@ use super::text::read_text;
 use crate::recording::error::{Outcome, RecordingError, RecordingFault, text};
 use crate::robot::Robot;
 
+use super::*;
+
+use nalgebra::DMatrix;
+
+use crate::recording::{
+    Recording,
+    foreign::{elements::Dimension, map::ColumnMap},
+};
+use crate::robot::JOINT_DIM;
+use columns::Group;
+use names::unit;
+use physics::{scale, slopes};
+
 const MOST_SKIPPED: usize = 20; // most lines before the header of a text
 const LEAST_COLUMNS: usize = 3; // fewest columns of a table
 
