@@ -1,10 +1,8 @@
 //! Array statements as loops and calls, and where their values live: which arrays hold them, in place or copied.
 
-use super::dialect::{Dialect, Index, Role, Span};
-use super::ident::Ident;
-use super::printer::Text;
 use super::translate::Translator;
-use crate::ir::{Binary, LANES, ValueId, Vector, alternating};
+use super::*;
+use crate::ir::{LANES, Vector, alternating};
 
 /// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
 struct MatrixStorage {

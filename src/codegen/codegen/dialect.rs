@@ -2,9 +2,7 @@
 //! broken into lines. `$name` and its like in a pattern stand for what is filled in; `$model`, `$upper`, `$real` and
 //! `$f` (identifier of the model, the same in upper case, type of numbers, suffix of literals) are known everywhere.
 
-use super::ident::Ident;
-use super::options::Precision;
-use crate::ir::{Table, Unary};
+use super::*;
 
 /// The patterns of a language. Those with two entries are for double and single precision.
 pub(crate) struct Spelling {

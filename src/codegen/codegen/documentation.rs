@@ -1,9 +1,8 @@
 //! Words of the generated documentation: equations, arrays and units of each function.
 
-use super::options::Units;
-use crate::equations::{Equations, LatentUnits, Unit, summand_words};
-use crate::lower::LowerError;
-use crate::model::{CoordinateNames, ReducedModel};
+use super::*;
+use crate::equations::{Unit, summand_words};
+use crate::model::CoordinateNames;
 use crate::robot::WrenchFrame;
 use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
 

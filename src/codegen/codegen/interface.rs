@@ -1,12 +1,9 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
-use super::dialect::{Parameter, Role};
 use super::documentation::{equations, of_inputs, of_maps};
-use super::options::Units;
-use crate::equations::{Equations, LatentUnits};
-use crate::ir::{Program, Statement};
-use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
-use crate::model::{ModelError, ReducedModel};
+use super::*;
+use crate::lower::{self, Form, Map};
+use crate::model::ModelError;
 
 #[derive(Clone, Debug)]
 pub(crate) struct FunctionSpec {

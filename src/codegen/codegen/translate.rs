@@ -1,14 +1,9 @@
 //! Programs to the text of a function's body: names and nested expressions; the tree of operations stays.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
-use super::dialect::{Dialect, Function, Index, Parameter, Role, Span};
-use super::ident::{Ident, Namer, Tables};
-use super::interface::{FunctionSpec, computes_angles};
-use super::options::SineCosine;
-use super::printer::{Printer, Text};
-
-use crate::ir::{Binary, Program, Slot, Statement, Unary, ValueId};
+use super::printer::Printer;
+use super::*;
 
 /// Deepest nesting of operations in one expression.
 const DEEPEST: usize = 48;

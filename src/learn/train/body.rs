@@ -1,11 +1,6 @@
 //! Coordinates of the body whose momentum is a row of the encoder.
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::{Deserialize, Serialize};
-
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM};
+use super::*;
 
 pub(super) const PITCH: usize = JOINT_DIM + 4;
 /// In the order of their rows: those in the plane of a symmetric motion, then those that change sign in a mirror image.

@@ -1,19 +1,10 @@
 //! Encoder rows known from physics: momentum of the robot, and feet that stand still.
 
-use std::ops::Range;
-
-use nalgebra::{DMatrix, DVector};
-
-use super::body::{BodyRows, PITCH, is_lateral};
-use super::dataset::{Dataset, Jump, centred, mean};
-use super::latent::input_projection;
-use super::options::Coordinates;
+use super::body::PITCH;
+use super::*;
 use crate::model::complement;
 use crate::recording::stretches;
-use crate::robot::{
-    BODY_X, BODY_Z, FOOT_DIM, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot,
-    STATE_DIM, WrenchFrame,
-};
+use crate::robot::{FOOT_DIM, LEG_JOINT_DIM, Leg};
 
 pub(super) const TURN: usize = 2; // the row of pitch, where there is one
 /// Rows of the legs: feet forwards and upwards, of the front pair and of the rear pair.

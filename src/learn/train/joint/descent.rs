@@ -2,9 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::batch::Batch;
-use super::loss::{JointLoss, Losses};
-use super::parameters::Parameters;
+use super::*;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {

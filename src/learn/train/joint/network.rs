@@ -3,11 +3,8 @@
 //! three stand below one another (a *stack* of 3 n rows), so that a layer is one product; rows of the Jacobian, one for
 //! each output, are stacked the same way. Of elu at zero derivatives are those of the negative side.
 
-use nalgebra::{DMatrix, DVector};
-
-use crate::model::Activation;
+use super::*;
 use crate::train::features::vectorised;
-use crate::train::random::Random;
 
 const LANES: usize = 16;
 

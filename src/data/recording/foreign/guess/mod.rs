@@ -11,22 +11,16 @@ mod write;
 
 use std::path::Path;
 
-use super::map::TextFormat;
-use super::mcap::{is_mcap, read_mcap};
-use super::signal::Log;
-use super::text::read_text;
-use crate::recording::error::{Outcome, RecordingError, RecordingFault, text};
-use crate::robot::Robot;
-
-use super::*;
-
 use nalgebra::DMatrix;
 
+use super::text::read_text;
+use super::*;
+use crate::recording::error::{Outcome, RecordingError, RecordingFault, text};
 use crate::recording::{
     Recording,
     foreign::{elements::Dimension, map::ColumnMap},
 };
-use crate::robot::JOINT_DIM;
+use crate::robot::{JOINT_DIM, Robot};
 use columns::Group;
 use names::unit;
 use physics::{scale, slopes};
