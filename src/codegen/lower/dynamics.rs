@@ -171,7 +171,9 @@ fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination
 }
 
 fn finite(phase: &PhaseEquations, row: usize, sum: Combination) -> Result<Combination, LowerError> {
-    match sum.non_finite() {
+    let coefficients = sum.items.iter().map(|&(coefficient, _)| coefficient);
+    let mut numbers = std::iter::once(sum.constant).chain(coefficients);
+    match numbers.find(|value| !value.is_finite()) {
         None => Ok(sum),
         Some(value) => Err(LowerError::NonFinite {
             phase: phase.name.clone(),

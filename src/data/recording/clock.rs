@@ -52,7 +52,9 @@ pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
         false => segment.clone(),
     };
     let step_s = segment.mean_step_s();
-    let is_uneven = !is_even(&chosen);
+    let even_s = chosen.mean_step_s();
+    let mut steps = chosen.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+    let is_uneven = steps.any(|step| (step - even_s).abs() > EVEN * even_s);
     let rows = (chosen.duration_s() / step_s).round() as usize + 1;
     let mut segment = match is_uneven {
         false => chosen.clone(),
@@ -134,12 +136,6 @@ fn lost(samples_s: &[f64], time_s: &[f64], step_s: f64) -> Vec<bool> {
         right < samples_s.len() && samples_s[right] - samples_s[right - 1] > LOST_STEPS * step_s
     };
     time_s.iter().map(of).collect()
-}
-
-fn is_even(segment: &Segment) -> bool {
-    let step_s = segment.mean_step_s();
-    let mut steps = segment.time_s.windows(2).map(|pair| pair[1] - pair[0]);
-    steps.all(|step| (step - step_s).abs() <= EVEN * step_s)
 }
 
 /// The samples at times that their motion says, without those that were logged twice.

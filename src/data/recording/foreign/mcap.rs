@@ -27,7 +27,8 @@ pub(crate) fn is_mcap(path: &Path) -> bool {
         let read = file.and_then(|mut file| file.read_to_end(&mut start));
         read.is_ok() && start == MCAP
     };
-    is_bag(path)
+    // A bag is the folder of its files and, mostly, the list of them.
+    (path.is_dir() && (path.join(METADATA).is_file() || !parts(path).is_empty()))
         || ending.is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
         || (path.is_file() && begins())
 }
@@ -310,10 +311,6 @@ fn unpacked<'a>(header: &ChunkHeader, data: Bytes<'a>, left: u64) -> Result<Byte
 
 const METADATA: &str = "metadata.yaml"; // the list of files in a bag's folder
 const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".mcap.zst"]; // endings of files that bags are made of
-
-fn is_bag(path: &Path) -> bool {
-    path.is_dir() && (path.join(METADATA).is_file() || !parts(path).is_empty())
-}
 
 /// The files of a log: the path itself, or those of the bag that the folder is; and notes on files that are left out.
 fn files(path: &Path) -> Outcome<(Vec<PathBuf>, Vec<String>)> {
