@@ -31,7 +31,7 @@ pub(super) fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
 ) -> Result<Option<Outcome>, Error> {
-    let (original, files) = (equations.model(), &arguments.domain);
+    let (original, files) = (&*equations.model, &arguments.domain);
     if files.is_empty() {
         return Ok(None);
     }

@@ -38,7 +38,7 @@ pub(crate) fn page(
         introduction,
         tiles: tiles(content),
         remarks: &content.assessment.remarks,
-        phases: typeset.systems.iter().zip(equations.phases()).collect(),
+        phases: typeset.systems.iter().zip(&equations.phases).collect(),
         rounding: rounding(&HTML, Rounding::default(), &typeset.rounding),
         jumps: &figures.jumps,
         rest: content.assessment.runs.len() - figures.jumps.len(),

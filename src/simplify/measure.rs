@@ -82,7 +82,7 @@ pub(crate) fn printed(
 ) -> Result<Vec<PrintedEquation>, SimplifyError> {
     let workspace = Workspace::new(equations)?;
     let mut all = Vec::new();
-    for (index, phase) in equations.phases().iter().enumerate() {
+    for (index, phase) in equations.phases.iter().enumerate() {
         let theta = domain.theta(index, samples, &workspace.library)?;
         let mut ranges = domain
             .phase(index)

@@ -94,8 +94,8 @@ impl Workspace {
 
 /// `1` and every variable of the terms in use that are no variables themselves, with their texts.
 fn wanted(equations: &Equations<'_>) -> Vec<(ExprId, String)> {
-    let pool = equations.pool();
-    let phases = equations.phases().iter();
+    let pool = &equations.pool;
+    let phases = equations.phases.iter();
     let summands = phases.flat_map(|phase| &phase.ddz).flatten();
     let active: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
     let mut wanted = vec![(ExprId::ONE, "1".to_owned())];

@@ -39,8 +39,8 @@ pub fn simplify(
     if samples.is_none() && matches!(tolerance, Tolerance::ShareOfRms(share) if share != 0.0) {
         return Err(SimplifyError::NoSamples);
     }
-    let original = equations.model();
-    let n_phases = equations.phases().len();
+    let original = &equations.model;
+    let n_phases = equations.phases.len();
     check_count(samples.map_or(n_phases, |s| s.phases.len()), n_phases)?;
     let workspace = Workspace::new(equations)?;
     let mut xi = Vec::new();
@@ -126,10 +126,10 @@ impl<'a> PhaseProblem<'a> {
         phase: usize,
     ) -> Result<Self, SimplifyError> {
         let theta = domain.theta(phase, samples, &workspace.library)?;
-        let factors = equations.model().state_factors();
+        let factors = equations.model.state_factors();
         let recorded = samples.map_or(0, |samples| samples.phases[phase].ncols());
         Ok(Self {
-            name: &equations.phases()[phase].name,
+            name: &equations.phases[phase].name,
             workspace,
             xi: workspace.coefficients(equations, phase),
             domain: domain.phase(phase),
@@ -282,9 +282,9 @@ fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyErr
 
 /// The variables that any `ddz` of a phase depends on, in the order of [`LatentVariable::all`].
 fn variables(system: &Equations<'_>, phase: usize) -> Vec<LatentVariable> {
-    let summands = system.phases()[phase].ddz.iter().flatten();
+    let summands = system.phases[phase].ddz.iter().flatten();
     let exprs = summands.map(|summand| system.terms[summand.term].expr);
-    let symbols: BTreeSet<SymbolId> = exprs.flat_map(|e| system.pool().symbols_of(e)).collect();
+    let symbols: BTreeSet<SymbolId> = exprs.flat_map(|e| system.pool.symbols_of(e)).collect();
     LatentVariable::all(system.latent_dim())
         .filter(|variable| symbols.contains(&system.symbol(*variable)))
         .collect()

@@ -169,8 +169,8 @@ impl Dialect {
             let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
             format!("{open}{}{close}\n", lines.join(between))
         };
-        let entries: String = (0..table.rows()).map(|r| row(table.row(r))).collect();
-        let [rows, cols] = [table.rows(), table.cols()].map(|count| count.to_string());
+        let entries: String = (0..table.rows).map(|r| row(table.row(r))).collect();
+        let [rows, cols] = [table.rows, table.cols].map(|count| count.to_string());
         let words = [
             ("name", name.as_str()),
             ("rows", &rows),

@@ -233,7 +233,7 @@ pub(super) fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<Stri
         lines.push(format!("ddz{} = {right}", row + 1));
         let units = system.latent_units();
         if let Some(units) = units.filter(|_| (1..=MOST_TERMS).contains(&terms.len())) {
-            let unit = |term| units.acceleration(row) / units.of_term(system.pool(), term);
+            let unit = |term| units.acceleration(row) / units.of_term(&system.pool, term);
             let each = terms.iter();
             let each = each.map(|(_, term)| format!("{} {}", term.text, unit(term.expr)));
             let each = each.collect::<Vec<_>>().join(", ");

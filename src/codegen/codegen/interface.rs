@@ -38,7 +38,7 @@ pub struct ModelInterface {
 
 impl ModelInterface {
     pub fn new(system: &Equations<'_>, form: Form, units: Units) -> Result<Self, LowerError> {
-        let model = &units.convert(system.model())?;
+        let model = &units.convert(&system.model)?;
         let phases = (0..model.phases().len())
             .map(|phase| phase_entries(system, phase, form))
             .collect::<Result<_, _>>()?;
@@ -133,7 +133,7 @@ fn phase_entries(
     phase: usize,
     form: Form,
 ) -> Result<PhaseInterface, LowerError> {
-    let identifier = system.model().phase_identifier(phase).to_string();
+    let identifier = system.model.phase_identifier(phase).to_string();
     let name = &system.phase(phase)?.name;
     let units = match system.latent_units() {
         None => "scaled units",

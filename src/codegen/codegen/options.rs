@@ -73,7 +73,7 @@ fn beyond_single(program: &Program) -> Option<f64> {
         Statement::Constant(value) => Some(*value),
         _ => None,
     });
-    let entries = program.tables().iter().flat_map(|table| table.entries());
+    let entries = program.tables.iter().flat_map(|table| &table.entries);
     let inner = program.callees.iter().find_map(beyond_single);
     constants
         .chain(entries.copied())

@@ -117,7 +117,7 @@ impl<'a> Translator<'a> {
         let operands = live
             .filter(|(_, live)| *live)
             .flat_map(|(s, _)| s.operands());
-        let results = program.results().iter().map(|entry| entry.value);
+        let results = program.results.iter().map(|entry| entry.value);
         for value in operands.chain(results) {
             n_uses[value.index()] += 1;
         }
@@ -248,7 +248,7 @@ impl<'a> Translator<'a> {
         let mut outputs = self.outputs.iter();
         let in_place = outputs.any(|output| output.role == Role::InOut);
         let mut assigned = Vec::new();
-        for entry in self.program.results() {
+        for entry in &self.program.results {
             let output = &self.outputs[entry.slot];
             let target = self.parameter(output, entry.index);
             let mut value = self.read(entry.value);

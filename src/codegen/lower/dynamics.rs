@@ -86,7 +86,7 @@ fn with_derivatives(
     columns: &[SymbolId],
 ) -> Result<(Program, JacobianPattern), LowerError> {
     let equations = accelerations(system, phase)?;
-    let mut pool = system.pool().clone();
+    let mut pool = system.pool.clone();
     let mut entries = Vec::new();
     let mut pattern = JacobianPattern::default();
     for (row, equation) in equations.iter().enumerate() {
@@ -165,7 +165,7 @@ fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination
     let equation = |row| {
         let summands = phase.summands(system, row);
         let summands = summands.map(|(coefficient, term)| (coefficient, term.expr));
-        finite(phase, row, Combination::collect(system.pool(), summands))
+        finite(phase, row, Combination::collect(&system.pool, summands))
     };
     (0..system.latent_dim()).map(equation).collect()
 }

@@ -16,7 +16,7 @@ pub(super) fn terms<'e>(
     equations: &'e Equations<'_>,
     symbols: &SymbolTable,
 ) -> Vec<(&'e str, Signed)> {
-    let layout = |expr| expression(equations.pool(), expr, symbols);
+    let layout = |expr| expression(&equations.pool, expr, symbols);
     let terms = equations.terms.iter();
     terms
         .map(|term| (term.text.as_str(), layout(term.expr)))
@@ -38,7 +38,7 @@ pub(super) fn with_coefficient(coefficient: &Decimal, is_omitted: bool, term: Si
         math => product(vec![number, in_brackets(math)]),
     };
     Signed {
-        negative: coefficient.is_negative() != term.negative,
+        negative: coefficient.negative != term.negative,
         math,
     }
 }
@@ -202,7 +202,7 @@ impl Layout<'_> {
     fn base(&self, expr: ExprId) -> Factor {
         let (key, math) = self.factor(expr);
         let is_whole = match &math {
-            Math::Number(number) => number.exponent().is_none(),
+            Math::Number(number) => number.exponent.is_none(),
             Math::Symbol(_) | Math::Dot | Math::Absolute(_) | Math::Group(_) => true,
             _other => false,
         };

@@ -10,7 +10,7 @@ use crate::typeset::words::ends_line;
 /// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
 pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &MARKDOWN);
-    let path = format!("{}.md", equations.model().identifier());
+    let path = format!("{}.md", equations.model.identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
 

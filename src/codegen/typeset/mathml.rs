@@ -38,7 +38,7 @@ struct Lines<'a> {
 /// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
 pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &HTML);
-    let path = format!("{}.html", equations.model().identifier());
+    let path = format!("{}.html", equations.model.identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
 
@@ -235,8 +235,8 @@ pub(crate) fn mathml_terms(terms: &[Signed], continues: bool) -> String {
 }
 
 fn mathml_number(number: &Decimal) -> String {
-    let digits = format!("<mn>{}</mn>", number.digits());
-    let size = match number.exponent() {
+    let digits = format!("<mn>{}</mn>", number.digits);
+    let size = match number.exponent {
         None => digits,
         Some(exponent) => {
             let power = if exponent < 0 {
@@ -248,7 +248,7 @@ fn mathml_number(number: &Decimal) -> String {
             format!("<mrow>{digits}<mo>\u{D7}</mo><msup><mn>10</mn>{power}</msup></mrow>")
         }
     };
-    match number.is_negative() {
+    match number.negative {
         true => format!(r#"<mrow><mo form="prefix">{MINUS}</mo>{size}</mrow>"#),
         false => size,
     }

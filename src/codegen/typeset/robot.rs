@@ -35,7 +35,7 @@ impl RobotTypeset {
         symbols: &SymbolTable,
         rounding: Rounding,
     ) -> Result<Option<Self>, TypesetError> {
-        let model = system.model();
+        let model = &*system.model;
         let maps = (model.encoder(), model.decoder(), model.state_factors());
         let (Some(state), (Ok(map), Ok(decoder), Ok(factors))) = (model.state(), maps) else {
             return Ok(None);
@@ -52,7 +52,7 @@ impl RobotTypeset {
         });
         let names = state.names.iter().map(|name| format!("dd({name})"));
         let outputs: Vec<(Symbol, String)> = doubled.zip(names).collect();
-        for (index, phase) in system.phases().iter().enumerate() {
+        for (index, phase) in system.phases.iter().enumerate() {
             let xi = system.coefficients(index);
             let mut ddq = DMatrix::zeros(terms.len(), outputs.len());
             for (row, (_, output)) in outputs.iter().enumerate() {

@@ -192,7 +192,7 @@ impl<'a> Page<'a> {
         &self,
         math: impl Fn(&EquationSystem, f64) -> String,
     ) -> Vec<(&str, String, String)> {
-        let phases = self.typeset.systems.iter().zip(self.equations.phases());
+        let phases = self.typeset.systems.iter().zip(&self.equations.phases);
         let phases = phases.map(|(system, phase)| {
             let feet = feet(&phase.feet);
             (phase.name.as_str(), feet, math(system, self.width_em))

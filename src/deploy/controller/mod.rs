@@ -101,7 +101,7 @@ pub(crate) fn emit(
     provenance: &str,
     plan: Option<&PlannedJump>,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let plant = plant(equations.model())?;
+    let plant = plant(&equations.model)?;
     let entries = &ModelInterface::new(equations, form, Units::Si)?;
     let facts = &Facts::new(entries, &plant, plan);
     let (name, folder) = (facts.name, format!("{}-controller", facts.name));

@@ -70,7 +70,7 @@ pub(crate) fn emit(
     options: &EmitOptions,
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let (model, precision) = (equations.model(), options.precision);
+    let (model, precision) = (&equations.model, options.precision);
     let plant = plant(model)?;
     let rows = StageRows::of_all_kinds(&plant);
     let entries = compiled(equations, options, Units::Si)?;

@@ -20,7 +20,7 @@ const ALL: &str = "all";
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct BodyRows {
-    coordinates: Vec<usize>, // indices of the state, in the order of `NAMED`
+    pub(super) coordinates: Vec<usize>, // indices of the state, in the order of `NAMED`
 }
 
 impl BodyRows {
@@ -35,15 +35,6 @@ impl BodyRows {
         Self {
             coordinates: NAMED[..count].iter().map(|(_, of)| *of).collect(),
         }
-    }
-
-    /// Indices of the state, in the order of the rows.
-    pub(super) fn coordinates(&self) -> &[usize] {
-        &self.coordinates
-    }
-
-    pub(super) fn has_pitch(&self) -> bool {
-        self.coordinates.contains(&PITCH)
     }
 
     /// Whether a row changes sign in a mirror image: there is more than the motion in the plane.

@@ -67,7 +67,7 @@ impl Frame {
             return Self::plain(active);
         }
         let spatial = body.is_spatial();
-        let rows = body.coordinates().to_vec();
+        let rows = body.coordinates.clone();
         let momentum = momentum_rows(training, &rows, robot);
         let mut held: Vec<DVector<f64>> =
             momentum.column_iter().map(|row| row.into_owned()).collect();
@@ -191,7 +191,7 @@ fn without(free: DMatrix<f64>, rows: &[DVector<f64>]) -> DMatrix<f64> {
 
 /// Whether the rows of the legs are among those that are held, as far as the recordings identify them.
 pub(super) fn has_leg_rows(body: &BodyRows, latent_dim: usize) -> bool {
-    body.has_pitch() && latent_dim >= body.coordinates().len() + LEG_ROWS
+    body.coordinates.contains(&PITCH) && latent_dim >= body.coordinates.len() + LEG_ROWS
 }
 
 /// Orthonormal directions of the pairs of a left and a right joint with one among `active`: with `parity` 1 those that a

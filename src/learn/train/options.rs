@@ -266,7 +266,7 @@ impl TrainOptions {
         table::MASK_STD.check(encoder.least_std)?;
         table::MASK_INPUT_SHARE.check(encoder.least_input_share)?;
         table::SEEDS.check_count(self.n_seeds.max(1))?;
-        let rows = self.body().coordinates().len();
+        let rows = self.body().coordinates.len();
         if rows > self.latent_dim {
             return Err(TrainError::Option {
                 option: "body",

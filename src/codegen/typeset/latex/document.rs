@@ -16,7 +16,7 @@ use crate::typeset::words;
 /// # Errors
 /// [`TypesetError`] if a coefficient is too large for a float in robot coordinates.
 pub fn emit(system: &Equations<'_>, options: &PrintOptions) -> Emitted {
-    let model = system.model();
+    let model = &*system.model;
     let typeset = Typeset::new(system, &options.symbols, options.rounding);
     let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
     let stem = model.identifier().as_str();
@@ -247,7 +247,7 @@ const STRONGEST: usize = 3; // of an encoder row's weights are named
 const NEGLIGIBLE: f64 = 0.1; // share of the row's largest weight below which none is named
 
 fn symbol_list<'a>(system: &Equations<'_>, header: String, options: &PrintOptions) -> Document<'a> {
-    let (model, units) = (system.model(), system.latent_units());
+    let (model, units) = (&*system.model, system.latent_units());
     let (dim, numbers) = (model.latent_dim(), options.numbers);
     let symbol = |variable| format!("${}$", tex_symbol(&options.symbols.symbol(variable)));
     // `$z_1, \dots, z_6$`, or all of up to three.

@@ -56,11 +56,11 @@ pub(crate) fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool)
 }
 
 pub(crate) fn tex_number(number: &Decimal, numbers: NumberStyle) -> String {
-    match (numbers, number.exponent()) {
+    match (numbers, number.exponent) {
         (NumberStyle::Plain, None) => number.to_string(),
         (NumberStyle::Plain, Some(exponent)) => {
-            let sign = if number.is_negative() { "-" } else { "" };
-            format!(r"{sign}{} \times 10^{{{exponent}}}", number.digits())
+            let sign = if number.negative { "-" } else { "" };
+            format!(r"{sign}{} \times 10^{{{exponent}}}", number.digits)
         }
         (NumberStyle::Siunitx, _) => format!(r"\num{{{number}}}"),
     }
