@@ -166,17 +166,15 @@ impl Certificate {
         self.largest_share(|equation| equation.measured.map(|measured| measured.max))
     }
 
-    pub(crate) fn largest_rms_share(&self) -> Option<f64> {
-        self.largest_share(|equation| equation.measured.map(|measured| measured.rms))
-    }
-
-    fn largest_share(&self, error: impl Fn(&EquationCertificate) -> Option<f64>) -> Option<f64> {
-        self.equations()
-            .filter_map(|(_, equation)| {
-                let rms = equation.rms.filter(|&rms| rms > 0.0)?;
-                Some(error(equation)? / rms)
-            })
-            .reduce(f64::max)
+    pub(crate) fn largest_share(
+        &self,
+        error: impl Fn(&EquationCertificate) -> Option<f64>,
+    ) -> Option<f64> {
+        let shares = self.equations().filter_map(|(_, equation)| {
+            let rms = equation.rms.filter(|&rms| rms > 0.0)?;
+            Some(error(equation)? / rms)
+        });
+        shares.reduce(f64::max)
     }
 }
 

@@ -7,8 +7,6 @@ mod ros2_control;
 mod selftest;
 pub(super) mod source;
 
-use std::ops::Deref;
-
 use askama::Template;
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
@@ -47,13 +45,7 @@ struct Facts<'a> {
     rows: &'a StageRows,
 }
 
-impl<'a> Deref for Facts<'a> {
-    type Target = controller::Facts<'a>;
-
-    fn deref(&self) -> &Self::Target {
-        &self.controller
-    }
-}
+extends! { <'a> Facts<'a>: controller::Facts<'a>, controller }
 
 templates! {
     #[derive(askama::Template)]

@@ -17,13 +17,7 @@ struct Facts<'a> {
     columns: String,
 }
 
-impl<'a> Deref for Facts<'a> {
-    type Target = super::Facts<'a>;
-
-    fn deref(&self) -> &super::Facts<'a> {
-        self.controller
-    }
-}
+extends! { <'a> Facts<'a>: super::Facts<'a>, controller }
 
 templates! {
     #[derive(askama::Template)]

@@ -32,13 +32,7 @@ struct SelfTest<'a> {
     others: usize,
 }
 
-impl<'a> Deref for SelfTest<'a> {
-    type Target = Facts<'a>;
-
-    fn deref(&self) -> &Facts<'a> {
-        self.facts
-    }
-}
+extends! { <'a> SelfTest<'a>: Facts<'a>, facts }
 
 pub(super) fn text(
     facts: &Facts<'_>,

@@ -47,13 +47,7 @@ pub(super) struct Source<'a> {
     phases: &'a [PhaseInterface],
 }
 
-impl<'a> Deref for Source<'a> {
-    type Target = Facts<'a>;
-
-    fn deref(&self) -> &Facts<'a> {
-        self.facts
-    }
-}
+extends! { <'a> Source<'a>: Facts<'a>, facts }
 
 impl<'a> Source<'a> {
     pub(super) fn new(

@@ -284,7 +284,7 @@ impl<'a> JointLoss<'a> {
             accelerations.iter_mut().for_each(|value| *value *= factor);
         }
         let at_first = map.backward((tape, &entering), leaving, &[], &mut self.gradient.decoder);
-        let onto = map.onto_input(&at_first) / frame.latent;
+        let onto = product(&at_first, &map.layers[0].weights.transpose()) / frame.latent;
         (reconstruction, ddx, onto)
     }
 

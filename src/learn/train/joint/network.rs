@@ -144,11 +144,6 @@ impl Network {
         adjoint
     }
 
-    /// The adjoint of the input, of that of the first layer's `a`.
-    pub(super) fn onto_input(&self, at_first: &DMatrix<f64>) -> DMatrix<f64> {
-        product(at_first, &self.layers[0].weights.transpose())
-    }
-
     pub(super) fn jacobian(&self, tape: &Tape) -> Jacobians {
         let is_linear = |layer: &Dense| layer.activation == Activation::Linear;
         let n = match self.layers.iter().all(is_linear) {
