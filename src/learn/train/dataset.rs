@@ -84,10 +84,6 @@ impl Jump {
     pub(super) fn samples(&self) -> usize {
         self.time_s.len()
     }
-
-    pub(super) fn torque_samples(&self) -> impl Iterator<Item = usize> {
-        (0..self.samples()).filter(|sample| !self.implausible.contains(sample))
-    }
 }
 
 #[derive(Clone, Debug)]

@@ -158,10 +158,6 @@ impl Knowledge {
         self.standing.iter().find(|of| of.column == column)
     }
 
-    pub(super) fn keeps(&self, term: usize) -> bool {
-        self.kept.row(term).iter().any(|kept| *kept)
-    }
-
     /// What is known of each phase in a frame that holds momentum: the centre of mass as `z1` (forwards) and `z2`
     /// (upwards), the rotation about it as `z3`, then foot positions. The floor is the same everywhere: no term depends
     /// on `z1`. Forces move a centre of mass and losses brake it, wherever it and the legs are: no term of `ddz1` and

@@ -116,7 +116,7 @@ fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
     let (mut predicted, mut recorded) = (Vec::new(), Vec::new());
     for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
         let lift = lift_samples(encoder, &jump.x, &samples.u_lat);
-        for sample in jump.torque_samples() {
+        for sample in (0..jump.samples()).filter(|sample| !jump.implausible.contains(sample)) {
             predicted.extend(recorded_torque(&lift, jump, sample).iter());
             recorded.extend(recorded_torque(&jump.u, jump, sample).iter());
         }

@@ -183,7 +183,8 @@ impl Refiner<'_> {
         monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'r>> {
         let affine = &self.judge.features.affine;
-        let is_chosen = |term| !self.knowledge.iter().any(|phase| phase.keeps(term));
+        let keeps = |known: &Knowledge, term| known.kept.row(term).iter().any(|kept| *kept);
+        let is_chosen = |term| !self.knowledge.iter().any(|known| keeps(known, term));
         let has_nonlinear = (0..affine.len()).any(|term| !affine[term] && is_chosen(term));
         // The affine terms are still to come where full libraries diverge.
         let enough =
