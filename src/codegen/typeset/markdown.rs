@@ -7,7 +7,7 @@ use crate::typeset::words::ends_line;
 /// The file `NAME.md`: equations in `math` fences and the table of coefficients.
 ///
 /// # Errors
-/// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
+/// [`TypesetError::Template`].
 pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &MARKDOWN);
     let path = format!("{}.md", equations.model.identifier());

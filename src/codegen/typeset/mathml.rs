@@ -35,7 +35,7 @@ struct Lines<'a> {
 /// The page `NAME.html`: equations and the table of coefficients, without scripts or anything from elsewhere.
 ///
 /// # Errors
-/// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
+/// [`TypesetError::Template`].
 pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &HTML);
     let path = format!("{}.html", equations.model.identifier());

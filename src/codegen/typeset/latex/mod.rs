@@ -1,4 +1,4 @@
-//! Equations for papers: [`Equations`](crate::equations::Equations) enter, LaTeX files leave.
+//! Equations for papers: [`Equations`] enter, LaTeX files leave.
 //!
 //! Read [`emit`] first: it names the files. Names from a model file pass through `tex_text` and nothing else.
 //!
