@@ -440,7 +440,7 @@ fn compiled_jacobians_equal_symbolic_derivatives_and_finite_differences() {
 
 /// The accelerations of one phase as canonical sums, in a clone of the pool.
 fn sums(equations: &Equations<'_>, phase: usize) -> (ExprPool, Vec<ExprId>) {
-    let mut pool = equations.pool().clone();
+    let mut pool = equations.pool.clone();
     let phase = equations.phase(phase).expect("the phase exists");
     let mut sum = |output| {
         let mut products = Vec::new();

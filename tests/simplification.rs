@@ -72,7 +72,7 @@ fn parsed(text: &str) -> Vec<(f64, String)> {
 }
 
 fn printed(equations: &Equations<'_>) -> String {
-    let terms = equations.phases()[0].summands(equations, 0);
+    let terms = equations.phases[0].summands(equations, 0);
     let terms: Vec<String> = terms
         .map(|(c, term)| format!("{c} {}", term.text))
         .collect();
@@ -112,9 +112,9 @@ fn value(equations: &Equations<'_>, point: &[f64]) -> f64 {
 /// A bound of |coefficient * term|, summed over the terms: 4 units in the last place of it are what
 /// rounding may change. Sums inside terms count by the sizes of their parts.
 fn size(equations: &Equations<'_>, point: &[f64]) -> f64 {
-    let pool = equations.pool();
+    let pool = &equations.pool;
     let value_of = |symbol: SymbolId| point[symbol.index()];
-    let terms = equations.phases()[0].summands(equations, 0);
+    let terms = equations.phases[0].summands(equations, 0);
     terms
         .map(|(c, term)| c.abs() * size_of(pool, term.expr, &value_of))
         .sum()
@@ -372,8 +372,8 @@ fn random_models_keep_their_values_and_never_get_longer() {
         let name = format!("model {number}, {}", printed(&learned));
         // A sum with the coefficient 1 is written as its terms.
         let count = |equations: &Equations<'_>| {
-            let summands = equations.phases()[0].summands(equations, 0);
-            let lengths = summands.map(|(c, term)| match equations.pool().node(term.expr) {
+            let summands = equations.phases[0].summands(equations, 0);
+            let lengths = summands.map(|(c, term)| match equations.pool.node(term.expr) {
                 Node::Sum(terms) if c.abs() == 1.0 => terms.len(),
                 _ => 1,
             });
@@ -434,7 +434,7 @@ fn large_models_of_plain_terms_keep_every_bit() {
         trigonometric: true,
         inputs: true,
     };
-    let library = Library::standard(8, standard).expect("a library");
+    let library = Library::of(8, LibraryChoice::Standard(standard)).expect("a library");
     assert!(matches!(library.choice(), LibraryChoice::Standard(_)));
     let mut random = Random(3);
     let xi = DMatrix::from_fn(library.terms().len(), 8, |_, _| random.unit() - 0.5);
@@ -449,6 +449,6 @@ fn large_models_of_plain_terms_keep_every_bit() {
         .expect("a model");
     let equations = Equations::of(&model);
     assert!(equations.steps.is_empty());
-    let counts = equations.phases().iter().map(PhaseEquations::active_count);
+    let counts = equations.phases.iter().map(PhaseEquations::active_count);
     assert_eq!(counts.sum::<usize>(), n_coefficients);
 }

@@ -147,7 +147,7 @@ pub fn equations(
         let print = &emission.options.print;
         let typeset = Typeset::new(&equations, &print.symbols, print.rounding);
         let width_em = print.width_em.unwrap_or(NOTEBOOK_EM);
-        let phases = typeset.systems.iter().zip(equations.phases());
+        let phases = typeset.systems.iter().zip(&equations.phases);
         let phases = phases
             .zip(model.data.phases())
             .map(|((system, phase), rule)| {

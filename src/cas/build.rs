@@ -24,7 +24,7 @@ impl ExprPool {
 
     /// A constant from a [`Number`].
     pub fn constant(&mut self, number: Number) -> ExprId {
-        let number = match self.is_exact() {
+        let number = match self.is_exact {
             true => half_integer(number),
             false => number,
         };
@@ -119,7 +119,7 @@ impl ExprPool {
                 continue;
             }
             let numbers: Vec<Number> = group.iter().map(|(coefficient, _)| *coefficient).collect();
-            if let Some(sum) = exact_sum(&numbers).filter(|_| !self.is_exact()) {
+            if let Some(sum) = exact_sum(&numbers).filter(|_| !self.is_exact) {
                 collected.push((sum, group[0].1));
                 continue;
             }

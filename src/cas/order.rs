@@ -145,9 +145,12 @@ impl ExprPool {
             Node::Number(_) => 0,
             Node::Symbol(_) => 1,
             Node::Sum(_) | Node::Apply(..) => NOT_POLYNOMIAL + 1,
-            Node::Product(factors) => {
-                (factors.iter()).fold(0, |all, factor| combine_grades(all, self.grade(*factor)))
-            }
+            // Degrees add (and saturate); one factor that is not polynomial makes the product so.
+            Node::Product(factors) => factors.iter().fold(0, |all, factor| {
+                let own = self.grade(*factor);
+                let degree = (all % NOT_POLYNOMIAL) + (own % NOT_POLYNOMIAL);
+                degree.min(NOT_POLYNOMIAL - 1) | ((all | own) & NOT_POLYNOMIAL)
+            }),
             Node::Power(base, exponent) => {
                 let degree = self.as_integer(*exponent).map(u32::try_from);
                 match degree.map(|n| n.map(|n| n.min(NOT_POLYNOMIAL - 1))) {
@@ -158,10 +161,4 @@ impl ExprPool {
             }
         }
     }
-}
-
-/// Degrees add (and saturate); one factor that is not polynomial makes the product so.
-fn combine_grades(a: u32, b: u32) -> u32 {
-    let degree = (a % NOT_POLYNOMIAL) + (b % NOT_POLYNOMIAL);
-    (degree.min(NOT_POLYNOMIAL - 1)) | ((a | b) & NOT_POLYNOMIAL)
 }

@@ -32,10 +32,10 @@ pub struct ExprPool {
     ids: HashMap<Node, ExprId, BuildIdHasher>,
     symbols: Vec<Symbol>,
     symbol_ids: HashMap<String, SymbolId>,
-    is_exact: bool,
+    pub(super) is_exact: bool,
     /// Constructors that were called and steps of about that effort, and how many of them there may be.
     work_done: u64,
-    work_limit: u64,
+    pub(super) work_limit: u64,
     pub(super) derivatives: HashMap<(ExprId, SymbolId), ExprId, BuildIdHasher>,
     pub(super) identities: Option<Arc<[Identity]>>,
     pub(super) slopes: HashMap<(ExprId, SymbolId), Slope, BuildIdHasher>,
@@ -106,10 +106,6 @@ impl ExprPool {
         }
     }
 
-    pub(super) fn is_exact(&self) -> bool {
-        self.is_exact
-    }
-
     /// Does `step` within so much work and within the limit around it; what would exceed that is left as it is.
     pub(super) fn limited<T>(&mut self, work: u64, step: impl FnOnce(&mut Self) -> T) -> T {
         let outer = self.limit_work(work);
@@ -123,10 +119,6 @@ impl ExprPool {
         let outer = self.work_limit;
         self.work_limit = outer.min(self.work_done.saturating_add(work));
         outer
-    }
-
-    pub(super) fn restore_limit(&mut self, limit: u64) {
-        self.work_limit = limit;
     }
 
     pub(super) fn spend(&mut self, steps: usize) -> bool {

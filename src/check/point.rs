@@ -127,7 +127,7 @@ pub(super) fn search(
                     Some(group) if !group.contains(symbol) => {
                         range.map_or(0.0, |[lo, hi]| 0.0_f64.clamp(lo, hi))
                     }
-                    _ => short(value),
+                    _ => format!("{value:.3e}").parse().unwrap_or(value),
                 };
                 (*symbol, value)
             })
@@ -140,21 +140,13 @@ pub(super) fn search(
     search
 }
 
-fn short(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
-}
-
 impl Sides<'_> {
-    fn values_of(&self, exprs: &[ExprId], values: &BTreeMap<SymbolId, f64>) -> Vec<f64> {
-        let value_of = |symbol: SymbolId| values.get(&symbol).copied().unwrap_or(0.0);
-        self.pool.evaluate_all(exprs, &value_of)
-    }
-
     /// NaN for a side that has no value, also if what has none cancelled; an infinity where floats overflow.
     fn at(&self, values: &BTreeMap<SymbolId, f64>) -> Gap {
+        let value_of = |symbol: SymbolId| values.get(&symbol).copied().unwrap_or(0.0);
         let both = [0, 1].map(|side| {
             let all = [&[self.whole[side]], self.guards[side]].concat();
-            let found = self.values_of(&all, values);
+            let found = self.pool.evaluate_all(&all, &value_of);
             if found.iter().all(|value| value.is_finite()) {
                 return found[0];
             }

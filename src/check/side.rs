@@ -117,7 +117,7 @@ impl Side {
 
     pub(crate) fn of_model(file: &str, model: &ReducedModel) -> Self {
         let equations = Equations::as_learned(model);
-        let phases = equations.phases().iter().map(|phase| {
+        let phases = equations.phases.iter().map(|phase| {
             let ddz = (0..model.latent_dim()).map(|output| {
                 let summands = phase.summands(&equations, output);
                 let texts = summands.map(|(c, term)| (c, term.text.clone()));

@@ -95,12 +95,12 @@ fn text(
     equations: &Equations<'_>,
     written: &[(String, usize)],
 ) -> String {
-    let model = equations.model();
+    let model = &*equations.model;
     let table = Table::of(written)
         .column("file", "", |(path, _)| path)
         .column("bytes", "", |(_, bytes)| *bytes)
         .table();
-    let phases: Vec<String> = (equations.phases().iter())
+    let phases: Vec<String> = (equations.phases.iter())
         .map(|phase| format!("{} active terms in {}", phase.active_count(), phase.name))
         .collect();
     let (name, d, phases) = (model.name(), model.latent_dim(), phases.join(", "));
@@ -154,7 +154,7 @@ fn emit(
     arguments: &CompileArguments,
     rounding: Rounding,
 ) -> Result<Vec<EmittedFile>, Error> {
-    let model = equations.model();
+    let model = &*equations.model;
     let (code, print) = (&arguments.code, &arguments.equations);
     let options = EmitOptions {
         precision: code.precision,

@@ -92,7 +92,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     text += &lines("  ", description);
     text += &input_rule(model);
     let coefficients = equations.terms.len() * equations.latent_dim();
-    let phases = equations.phases().iter().map(|phase| {
+    let phases = equations.phases.iter().map(|phase| {
         let (feet, active) = (phase.feet.to_string(), phase.active_count());
         json!({"name": phase.name, "feet": feet, "active_terms": active, "coefficients": coefficients})
     });
@@ -144,7 +144,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
 }
 
 fn phase_table(equations: &Equations<'_>, coefficients: usize) -> Table {
-    Table::of(equations.phases())
+    Table::of(&equations.phases)
         .column("phase", "", |phase| &phase.name)
         .column("feet", "", |phase| phase.feet.to_string())
         .column("active terms", "", |phase| phase.active_count())
@@ -201,7 +201,7 @@ fn input_rule(model: &ReducedModel) -> String {
 }
 
 fn pattern(equations: &Equations<'_>, phase: usize) -> String {
-    let name = &equations.phases()[phase].name;
+    let name = &equations.phases[phase].name;
     let mut text = format!("Xi of {name} (one column per term, + positive, - negative)\n");
     for (output, row) in equations.coefficients(phase).column_iter().enumerate() {
         let cells = row.iter().map(|value| match value {

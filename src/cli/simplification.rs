@@ -31,7 +31,7 @@ pub(super) fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
 ) -> Result<Option<Outcome>, Error> {
-    let (original, files) = (equations.model(), &arguments.domain);
+    let (original, files) = (&*equations.model, &arguments.domain);
     if files.is_empty() {
         return Ok(None);
     }
@@ -268,7 +268,7 @@ fn ladder_table(steps: &[Step], restart_every_s: f64) -> Table {
             measured(made.largest_measured_share())
         })
         .column("measured rms", "", |(_, made, _)| {
-            measured(made.largest_rms_share())
+            measured(made.largest_share(|of| Some(of.measured?.rms)))
         })
         .column("body.x", "m", |(.., [x, _])| x[0])
         .column("body.z", "m", |(.., [_, z])| z[0])

@@ -35,8 +35,8 @@ pub(super) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
 fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
     let parts = arguments.merge.iter().map(|folder| Store::open(folder));
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
-    let plan = parts.first().expect("clap asks for at least one").plan();
-    let store = Store::create(&arguments.out_dir, plan.clone())?;
+    let first = parts.first().expect("clap asks for at least one");
+    let store = Store::create(&arguments.out_dir, first.plan.clone())?;
     for part in &parts {
         store.merge(part)?;
     }
@@ -65,7 +65,7 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     }
     let store = Store::create(&arguments.out_dir, plan)?;
     let bar = spinner("training");
-    let total = store.plan().cells().len();
+    let total = store.plan.cells().len();
     let finished = |_| {
         let left = store.missing().len();
         bar.set_message(format!("{} of {total} models trained", total - left));
@@ -127,7 +127,7 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
         .column("z after 0.1 s", "m", |row| spread(row.prediction_z_m))
         .column("torque R^2", "", |row| spread(row.torque_r2))
         .table();
-    let (missing, total) = (store.missing(), store.plan().cells().len());
+    let (missing, total) = (store.missing(), store.plan.cells().len());
     let (best, folder) = (summary.best(), folder.display().to_string());
     let id = |id: &CellId| format!("d = {} seed {}", id.latent_dim, id.seed);
     let finished = total - missing.len();
@@ -150,7 +150,7 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
     }
     let json = json!({
         "folder": folder,
-        "plan": store.plan(),
+        "plan": store.plan,
         "summary": summary,
         "least_combined_loss_at": best,
         "missing": missing,

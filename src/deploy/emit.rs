@@ -112,7 +112,7 @@ pub fn emit(
     targets: &[Target],
     options: &EmitOptions,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let provenance = provenance(equations.model(), options.print.digest.as_deref());
+    let provenance = provenance(&equations.model, options.print.digest.as_deref());
     let (precision, sines) = (options.precision, options.sines);
     let (form, units) = (options.form, options.units);
     let made = [const { OnceCell::new() }; 2];

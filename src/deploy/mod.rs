@@ -4,6 +4,19 @@
 
 /// Templates of whole files and their paths, in which `NAME` stands for the model's name, and `texts` of them. The
 /// caller writes the derive: askama looks for files from where it stands.
+/// Templates of a type also see the members of one of its fields.
+macro_rules! extends {
+    (<$life:lifetime> $name:ty: $base:ty, $field:ident) => {
+        impl<$life> std::ops::Deref for $name {
+            type Target = $base;
+
+            fn deref(&self) -> &$base {
+                &self.$field
+            }
+        }
+    };
+}
+
 macro_rules! templates {
     (#[$derive:meta] $($path:literal: $template:ident $source:literal),* $(,)?) => {
         templates! { @each [#[$derive]] $($template $source),* }
@@ -27,13 +40,7 @@ macro_rules! templates {
             facts: &'a Facts<'a>,
         }
 
-        impl<'a> std::ops::Deref for $template<'a> {
-            type Target = Facts<'a>;
-
-            fn deref(&self) -> &Facts<'a> {
-                self.facts
-            }
-        }
+        extends! { <'a> $template<'a>: Facts<'a>, facts }
     };
 }
 

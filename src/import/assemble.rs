@@ -2,16 +2,11 @@
 
 mod maps;
 
-use nalgebra::{DMatrix, DVector};
-
 use super::assign::{Assigned, Assignment, assign};
-use super::options::{ImportOptions, PhaseRule, XiLayout, standard_text};
-use super::role::{Part, Role, is_of_optimiser};
-use super::run::{ImportReport, Layout, UnusedTensor, UsedTensor};
-use super::tensors::{TensorFile, TensorInfo, shape_text};
-use super::{ImportError, Read, library};
-use crate::files::Place;
-use crate::model::{InputStatistics, Library, LibraryChoice, ModelError, Phase, Scaling, StateMap};
+use super::run::{Layout, UnusedTensor, UsedTensor};
+use super::tensors::shape_text;
+use super::*;
+use crate::model::{InputStatistics, ModelError, StateMap};
 use crate::robot::STATE_DIM;
 
 #[derive(Debug)]

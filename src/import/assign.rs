@@ -1,11 +1,7 @@
 //! The use of each tensor: as mapped, else by its name.
 
-use super::options::{ImportOptions, PhaseRule};
-use super::role::{ONLY_PHASE, Part, Role, is_of_optimiser, mentions};
-use super::run::Chosen;
-use super::tensors::{TensorFile, TensorInfo};
-use super::{ImportError, Read};
-use crate::files::Place;
+use super::role::mentions;
+use super::*;
 
 #[derive(Clone, Debug)]
 pub(super) struct Assigned<'f> {

@@ -10,10 +10,9 @@
 //! Each section is a phase with `ddz1` to `ddzd`; a text without sections is one phase (`--phase`). `ddz_1` is `ddz1`.
 
 use super::library::tokens;
-use super::{ImportError, Read};
-use crate::files::Place;
-use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::{ExprId, ExprPool, ParseErrorKind};
+use super::*;
+use crate::model::MAX_LATENT_DIM;
+use crate::symbolic::ParseErrorKind;
 
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 

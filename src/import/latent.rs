@@ -4,15 +4,10 @@
 
 use std::collections::HashMap;
 
-use nalgebra::DMatrix;
-
-use super::assemble::Parts;
-use super::equations::{Equation, Section, Sections};
-use super::options::{ImportOptions, PhaseRule};
-use super::run::{ImportReport, ReadEquation};
-use super::{ImportError, Read, library};
-use crate::model::{LatentVariable, Library, Phase};
-use crate::symbolic::{ExprId, ExprPool, Function, Node, Number};
+use super::equations::{Equation, Section};
+use super::run::ReadEquation;
+use super::*;
+use crate::symbolic::{Node, Number};
 
 /// Makes the parts of a model; without a library in the options, it is the union of the terms found.
 pub(super) fn parts(

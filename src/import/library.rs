@@ -1,16 +1,10 @@
 //! The candidate terms of imported coefficients, as PySINDy and its relatives name them: `z1 z2`, `x0 u0`, `z1**2`.
 
 use std::collections::BTreeSet;
-use std::path::Path;
-
-use serde_json::Value;
 
 use super::equations::plain_name;
-use super::options::standard_text;
 use super::run::{check_size, read_file};
-use super::{ImportError, Read};
-use crate::model::{Library, LibraryChoice, LibraryOrder, StandardLibrary};
-use crate::symbolic::Function;
+use super::*;
 
 const MAX_TERMS_BYTES: u64 = 32 << 20;
 

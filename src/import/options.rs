@@ -1,21 +1,11 @@
 //! Options of an import: everything that tensors do not carry.
 #![allow(missing_docs, reason = "the names say it")]
 
-use std::path::Path;
-use std::str::FromStr;
-
 use clap::ValueEnum;
-use nalgebra::DVector;
 
-use super::latex::variables::SymbolNames;
-use super::role::{Mapping, ONLY_PHASE};
-use super::{ImportError, Read};
-use crate::files::Place;
-use crate::files::magic::{self, OtherFormat};
-use crate::model::{
-    Activation, CoordinateOrder, FeetRule, LibraryChoice, LibraryOrder, ScaleFactors, Scaling,
-    StandardLibrary,
-};
+use super::*;
+use crate::files::magic::OtherFormat;
+use crate::model::{Activation, CoordinateOrder, FeetRule, ScaleFactors};
 use crate::robot::{Actuators, ContactFlags, Robot, WrenchFrame};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

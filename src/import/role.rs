@@ -1,10 +1,7 @@
 //! Parts of a model that a tensor can be.
 #![allow(missing_docs, reason = "the names say it")]
 
-use std::fmt;
-use std::str::FromStr;
-
-use super::{ImportError, Read};
+use super::*;
 
 /// One of the two maps between robot and latent coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

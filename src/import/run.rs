@@ -1,24 +1,17 @@
 //! The way from a foreign file to a checked model, and the record of what was decided on it.
 #![allow(missing_docs, reason = "the names say it")]
 
-use std::fmt;
 use std::fs::File;
 use std::io::Read as _;
-use std::path::Path;
 
 use serde::Serialize;
-use serde_json::{Map, Value, json};
-use sha2::{Digest as _, Sha256};
+use serde_json::{Map, json};
+use sha2::Digest as _;
 
-use super::assemble::{self, Parts};
-use super::equations::{self, Sections};
-use super::latex::{self, variables::SymbolNames};
-use super::options::{Format, ImportOptions, refusal};
-use super::tensors::{self, Tensor};
-use super::{ImportError, Read, latent};
-use crate::files::{Place, hex, magic};
+use super::options::refusal;
+use super::*;
+use crate::files::hex;
 use crate::model::{CoordinateNames, ReducedModel};
-use crate::symbolic::ExprPool;
 
 const MAX_FILE_BYTES: u64 = 256 << 20;
 

@@ -7,15 +7,13 @@ use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{self, Cursor, Read as _};
 
-use nalgebra::DMatrix;
 use safetensors::{Dtype, SafeTensors};
+use sha2::Digest as _;
 use sha2::digest::Output;
-use sha2::{Digest as _, Sha256};
 use zip::ZipArchive;
 
 use super::run::{damaged, too_large};
-use super::{ImportError, Read};
-use crate::files::Place;
+use super::*;
 
 /// Largest tensor that is read: the coefficients of the largest library fit twice.
 const MAX_ELEMENTS: usize = 4 << 20;

@@ -41,7 +41,7 @@ pub(crate) fn page(
         tiles: tiles(content),
         coordinates: words.collect(),
         remarks: &content.assessment.remarks,
-        phases: typeset.systems.iter().zip(equations.phases()).collect(),
+        phases: typeset.systems.iter().zip(&equations.phases).collect(),
         rounding: rounding(&HTML, Rounding::default(), &typeset.rounding),
         jumps: &figures.jumps,
         rest: content.assessment.runs.len() - figures.jumps.len(),

@@ -1,7 +1,7 @@
 //! Sections below the equations: words, tables and figures about one thing each, and the tiles at the top.
 
 use super::contents::AllFigures;
-use super::tables::{error_table, verdict_table};
+use super::tables::{verdict_table, with_phases};
 use super::*;
 use crate::evaluate::{AFTER_A_PUSH, Invariance, TORQUES_IN_CONTACT};
 
@@ -106,9 +106,10 @@ pub(super) fn sections<'a>(
     let every_row = verdict_table(content.verdict);
     let every_row =
         every_row.captioned("Every figure with its baseline and the value that it needs");
+    let errors = with_phases(coordinate_table(model, assessment), model, assessment);
     let mut sections = vec![
         Section::new("verdict").folding([every_row]),
-        Section::new("coordinates").folding([error_table(model, assessment).captioned(by_phase)]),
+        Section::new("coordinates").folding([errors.captioned(by_phase)]),
         (Section::new("stability").and(not_told))
             .with([dynamics])
             .with(physics.as_ref().map(invariance_table)),

@@ -20,6 +20,10 @@ fn r2(fit: Option<Fit>) -> Cell {
     r2.map(|r2| format!("{r2:.3}")).into()
 }
 
+fn fit_json(unit: &str, fit: Option<Fit>) -> Value {
+    json!({ "unit": unit, "rms": rms(fit), "r2": fit.and_then(|fit| fit.r2) })
+}
+
 fn coordinates(assessment: &Assessment<'_>) -> Table {
     let mut table = Table::default();
     table.column("coordinate", "", &assessment.names);
@@ -47,15 +51,15 @@ pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>
     table
 }
 
-pub(crate) fn error_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
-    with_phases(coordinate_table(model, assessment), model, assessment)
-}
-
 pub(crate) fn phase_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
     with_phases(coordinates(assessment), model, assessment)
 }
 
-fn with_phases(mut table: Table, model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
+pub(super) fn with_phases(
+    mut table: Table,
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+) -> Table {
     for (index, phase) in model.phases().iter().enumerate() {
         let fits = assessment.restarted.phase_fits(index);
         table.column(&phase.name, "", fits.into_iter().map(rms));
@@ -154,11 +158,7 @@ pub(crate) fn horizon_json(of: &Assessment<'_>, horizon: &Horizon) -> Value {
     let coordinates = of.names.iter().zip(&of.units).enumerate();
     let coordinates = coordinates.map(|(i, (name, unit))| {
         let own = horizon.predictors[0].1.fits()[i];
-        let mut value = json!({
-            "unit": unit,
-            "rms": rms(own),
-            "r2": own.and_then(|fit| fit.r2),
-        });
+        let mut value = fit_json(unit, own);
         for (predictor, sums) in &horizon.predictors[1..] {
             value[predictor.replace(' ', "_")] = json!(rms(sums.fits()[i]));
         }
@@ -392,11 +392,10 @@ fn baseline_json(baseline: &Baseline) -> Value {
 fn rollouts_json(model: &ReducedModel, of: &Assessment<'_>, sums: &CoordinateSums) -> Value {
     let named = |fits: Vec<Option<Fit>>| -> Map<String, Value> {
         let names = of.names.iter().cloned();
-        let fits = of.units.iter().zip(fits).map(|(unit, fit)| {
-            let (rms, r2) = (fit.map(|fit| fit.rms), fit.and_then(|fit| fit.r2));
-            json!({ "unit": unit, "rms": rms, "r2": r2 })
-        });
-        names.zip(fits).collect()
+        let fits = of.units.iter().zip(fits);
+        names
+            .zip(fits.map(|(unit, fit)| fit_json(unit, fit)))
+            .collect()
     };
     json!({
         "rollouts": sums.windows,

@@ -3,14 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Serialize, Serializer};
-use serde_json::{Value, json};
+use serde::Serializer;
 
 use super::measure::Measured;
-use crate::equations::ExactStep;
-use crate::model::LatentVariable;
-use crate::symbolic::Interval;
-use crate::typeset::rounded;
+use super::*;
 
 /// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -170,17 +166,15 @@ impl Certificate {
         self.largest_share(|equation| equation.measured.map(|measured| measured.max))
     }
 
-    pub(crate) fn largest_rms_share(&self) -> Option<f64> {
-        self.largest_share(|equation| equation.measured.map(|measured| measured.rms))
-    }
-
-    fn largest_share(&self, error: impl Fn(&EquationCertificate) -> Option<f64>) -> Option<f64> {
-        self.equations()
-            .filter_map(|(_, equation)| {
-                let rms = equation.rms.filter(|&rms| rms > 0.0)?;
-                Some(error(equation)? / rms)
-            })
-            .reduce(f64::max)
+    pub(crate) fn largest_share(
+        &self,
+        error: impl Fn(&EquationCertificate) -> Option<f64>,
+    ) -> Option<f64> {
+        let shares = self.equations().filter_map(|(_, equation)| {
+            let rms = equation.rms.filter(|&rms| rms > 0.0)?;
+            Some(error(equation)? / rms)
+        });
+        shares.reduce(f64::max)
     }
 }
 

@@ -1,14 +1,9 @@
 //! Where the error is bounded: a box of latent states and inputs for each phase.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::DMatrix;
-
+use super::*;
 use crate::lower::LowerError;
-use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
-use crate::sim::LatentSegment;
-use crate::symbolic::Interval;
 
 /// How far a domain reaches beyond the samples unless given, as a share of each variable's range.
 pub const MARGIN: f64 = 0.1;

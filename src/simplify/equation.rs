@@ -1,10 +1,9 @@
 //! Replacements of a term (nothing, a constant, a straight line), and which changes are made to one equation. Each is
 //! made to the equation as earlier ones left it; its error, enclosed over the box, adds as an interval to the total.
 
-use super::certificate::{Change, ChangeKind, Effect};
-use super::ranges::{Ranges, has_function};
-use crate::symbolic::Interval;
-use crate::typeset::rounded;
+use super::certificate::Effect;
+use super::ranges::has_function;
+use super::*;
 
 /// Share of the tolerance that removing terms may use; the rest is for shorter coefficients.
 const REMOVAL_SHARE: f64 = 0.75;

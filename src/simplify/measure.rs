@@ -1,19 +1,13 @@
 //! Differences of equations, also as printed with rounded coefficients: bounds over a box, size at samples, and the
 //! effect on rollouts over recordings.
 
-use nalgebra::DMatrix;
-use serde::Serialize;
-use serde_json::{Map, Value, json};
+use serde_json::Map;
 
-use super::domain::{Domain, Samples, SimplifyError};
-use super::ranges::{Ranges, Workspace};
-use crate::equations::Equations;
+use super::*;
 use crate::evaluate::{CoordinateSums, EvaluateError};
 use crate::lower::CompiledModel;
-use crate::model::ReducedModel;
 use crate::recording::Segment;
-use crate::sim::{LatentSegment, Restart, Rollout, Window, rollout};
-use crate::symbolic::Interval;
+use crate::sim::{Restart, Rollout, Window, rollout};
 use crate::typeset::{Decimal, Rounding};
 
 /// How large an error is at recorded samples (scaled units per second squared).
@@ -88,7 +82,7 @@ pub(crate) fn printed(
 ) -> Result<Vec<PrintedEquation>, SimplifyError> {
     let workspace = Workspace::new(equations)?;
     let mut all = Vec::new();
-    for (index, phase) in equations.phases().iter().enumerate() {
+    for (index, phase) in equations.phases.iter().enumerate() {
         let theta = domain.theta(index, samples, &workspace.library)?;
         let mut ranges = domain
             .phase(index)

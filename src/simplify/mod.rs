@@ -23,3 +23,18 @@ pub use tables::certificate_page;
 pub(crate) use tables::{
     bound_words, change_table, equation_table, lost_words, markdown, rollout_table,
 };
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::artifact;
+use crate::equations::{Equations, ExactStep};
+use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
+use crate::sim::LatentSegment;
+use crate::symbolic::{Interval, SymbolId};
+use crate::typeset::rounded;
+use certificate::{Change, ChangeKind, PhaseCertificate};
+use ranges::{Ranges, Workspace};

@@ -1,14 +1,8 @@
 //! The terms of equations with those that they may be rewritten to, and ranges of their combinations over a box.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use nalgebra::DMatrix;
-
-use super::domain::SimplifyError;
 use super::equation::Rewrite;
-use crate::equations::Equations;
-use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
-use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
+use super::*;
+use crate::symbolic::{ExprId, ExprPool, Node};
 
 /// Relative error of the algebra's constants, with room to spare: a merged or halved float has an error of 2^-53.
 const CONSTANT_ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
@@ -100,8 +94,8 @@ impl Workspace {
 
 /// `1` and every variable of the terms in use that are no variables themselves, with their texts.
 fn wanted(equations: &Equations<'_>) -> Vec<(ExprId, String)> {
-    let pool = equations.pool();
-    let phases = equations.phases().iter();
+    let pool = &equations.pool;
+    let phases = equations.phases.iter();
     let summands = phases.flat_map(|phase| &phase.ddz).flatten();
     let active: BTreeSet<usize> = summands.map(|summand| summand.term).collect();
     let mut wanted = vec![(ExprId::ONE, "1".to_owned())];

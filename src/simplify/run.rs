@@ -1,24 +1,13 @@
 //! From a model, a domain and a tolerance to a simplified model and its certificate.
 
-use std::collections::BTreeSet;
-
-use nalgebra::DMatrix;
-use serde_json::{Value, json};
-
-use super::certificate::{
-    BeforeAfter, Certificate, EquationCertificate, PhaseCertificate, Tolerance,
-};
-use super::domain::{Domain, Samples, SimplifyError, check_count};
+use super::certificate::{BeforeAfter, EquationCertificate};
+use super::domain::check_count;
 use super::equation::{Equation, is_same_decimal};
 use super::measure::Differences;
-use super::ranges::{Ranges, Workspace};
-use crate::artifact;
-use crate::equations::Equations;
+use super::*;
 use crate::ir::{Program, Statement};
 use crate::lower::{self, Form};
-use crate::model::{LatentVariable, ReducedModel};
 use crate::robot::{BODY_Z, GRAVITY_M_S2};
-use crate::symbolic::{Interval, SymbolId};
 
 /// What the search may use is lowered to this share of itself until the final evaluation confirms the tolerance.
 const RETREAT: f64 = 0.8;
@@ -50,8 +39,8 @@ pub fn simplify(
     if samples.is_none() && matches!(tolerance, Tolerance::ShareOfRms(share) if share != 0.0) {
         return Err(SimplifyError::NoSamples);
     }
-    let original = equations.model();
-    let n_phases = equations.phases().len();
+    let original = &equations.model;
+    let n_phases = equations.phases.len();
     check_count(samples.map_or(n_phases, |s| s.phases.len()), n_phases)?;
     let workspace = Workspace::new(equations)?;
     let mut xi = Vec::new();
@@ -137,10 +126,10 @@ impl<'a> PhaseProblem<'a> {
         phase: usize,
     ) -> Result<Self, SimplifyError> {
         let theta = domain.theta(phase, samples, &workspace.library)?;
-        let factors = equations.model().state_factors();
+        let factors = equations.model.state_factors();
         let recorded = samples.map_or(0, |samples| samples.phases[phase].ncols());
         Ok(Self {
-            name: &equations.phases()[phase].name,
+            name: &equations.phases[phase].name,
             workspace,
             xi: workspace.coefficients(equations, phase),
             domain: domain.phase(phase),
@@ -293,9 +282,9 @@ fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyErr
 
 /// The variables that any `ddz` of a phase depends on, in the order of [`LatentVariable::all`].
 fn variables(system: &Equations<'_>, phase: usize) -> Vec<LatentVariable> {
-    let summands = system.phases()[phase].ddz.iter().flatten();
+    let summands = system.phases[phase].ddz.iter().flatten();
     let exprs = summands.map(|summand| system.terms[summand.term].expr);
-    let symbols: BTreeSet<SymbolId> = exprs.flat_map(|e| system.pool().symbols_of(e)).collect();
+    let symbols: BTreeSet<SymbolId> = exprs.flat_map(|e| system.pool.symbols_of(e)).collect();
     LatentVariable::all(system.latent_dim())
         .filter(|variable| symbols.contains(&system.symbol(*variable)))
         .collect()

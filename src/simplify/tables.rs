@@ -2,12 +2,8 @@
 
 use askama::Template;
 
-use super::certificate::{Certificate, Change, ChangeKind, PhaseCertificate};
-use super::measure::{PrintedEquation, RolloutEffect};
-use crate::artifact;
-use crate::equations::ExactStep;
-use crate::model::ReducedModel;
-use crate::symbolic::Interval;
+use super::measure::PrintedEquation;
+use super::*;
 use crate::typeset::{Cell, Table, rounded_up, significant};
 
 pub(crate) fn equation_table(certificate: &Certificate) -> Table {

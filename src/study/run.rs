@@ -22,9 +22,9 @@ pub(crate) fn run(
     finished: &(dyn Fn(CellId) + Sync),
 ) -> Result<(), StudyError> {
     let missing = store.missing();
-    let mut todo = shard.of(&store.plan().cells());
+    let mut todo = shard.of(&store.plan.cells());
     todo.retain(|id| missing.contains(id));
-    let method = store.plan().method;
+    let method = store.plan.method;
     let next = AtomicUsize::new(0);
     let worker = || {
         while let Some(&id) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {

@@ -14,7 +14,7 @@ const PLAN: &str = "study.json";
 
 pub(crate) struct Store {
     folder: PathBuf,
-    plan: Plan,
+    pub(crate) plan: Plan,
 }
 
 impl Store {
@@ -40,10 +40,6 @@ impl Store {
         plan.check()?;
         let folder = folder.to_owned();
         Ok(Self { folder, plan })
-    }
-
-    pub(crate) fn plan(&self) -> &Plan {
-        &self.plan
     }
 
     pub(crate) fn get(&self, id: CellId) -> Result<Option<Cell>, StudyError> {

@@ -9,8 +9,8 @@ pub use cubic::cubic;
 use nalgebra::{DMatrix, DVector};
 use romc::artifact;
 use romc::model::{
-    Activation, AffineMap, FeetRule, Layer, Library, Phase, ReducedModel, ScaleFactors, Scaling,
-    StandardLibrary, StateMap,
+    Activation, AffineMap, FeetRule, Layer, Library, LibraryChoice, Phase, ReducedModel,
+    ScaleFactors, Scaling, StandardLibrary, StateMap,
 };
 
 use super::functions::Random;
@@ -111,7 +111,7 @@ fn random_standard(random: &mut Random, d: usize, polynomial: bool, inputs: bool
     while standard.term_count(d).is_none_or(|count| count > 170) {
         standard.degree -= 1;
     }
-    Library::standard(d, standard).expect("a short library")
+    Library::of(d, LibraryChoice::Standard(standard)).expect("a short library")
 }
 
 fn random_terms(random: &mut Random, d: usize, polynomial: bool, inputs: bool) -> Library {

@@ -154,7 +154,8 @@ fn fitted() -> (ReducedModel, Vec<DMatrix<f64>>) {
     let original = model("tests/fixtures/import/go1-d4.json");
     let jump = recording::read(jump().as_ref()).expect("checked in");
     let latent = LatentSegment::encode(&original, &jump.segments[0]).expect("a jump");
-    let library = Library::standard(4, StandardLibrary::default()).expect("small");
+    let library =
+        Library::of(4, LibraryChoice::Standard(StandardLibrary::default())).expect("small");
     let xi = (0..original.phases().len()).map(|phase| {
         let samples: Vec<usize> = (0..latent.time_s.len())
             .filter(|&k| latent.phase[k] == phase)

@@ -215,7 +215,7 @@ fn terms_as_pysindy_names_them_are_read_and_equal_ones_are_one_in_equations() {
         0.5 - 6.0 * z + 0.25 * dz + 3.0 * u + 0.125 * z * dz + 1.5 * z.sin() + 2.0 * z * z;
     assert!((ddz - expected).abs() < 1e-14, "{ddz} {expected}");
     let equations = romc::equations::Equations::of(&found);
-    let n_terms = equations.phases()[0].ddz[0].len();
+    let n_terms = equations.phases[0].ddz[0].len();
     assert_eq!(n_terms, 7, "z1 and 1*z1 are one term");
 }
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use nalgebra::{DMatrix, DVector};
 use romc::artifact;
 use romc::model::{
-    AffineMap, FeetRule, InputStatistics, Library, Phase, ReducedModel, Scaling, StandardLibrary,
-    StateMap,
+    AffineMap, FeetRule, InputStatistics, Library, LibraryChoice, Phase, ReducedModel, Scaling,
+    StandardLibrary, StateMap,
 };
 
 /// All of them.
@@ -68,7 +68,7 @@ fn one_coordinate() -> ReducedModel {
         trigonometric: true,
         inputs: true,
     };
-    let library = Library::standard(1, standard).expect("a short library");
+    let library = Library::of(1, LibraryChoice::Standard(standard)).expect("a short library");
     let phase = |feet, name: &str, first: f64| Phase {
         name: name.to_owned(),
         feet,
@@ -140,7 +140,7 @@ fn sixty() -> ReducedModel {
         trigonometric: true,
         inputs: true,
     };
-    let library = Library::standard(d, standard).expect("a library");
+    let library = Library::of(d, LibraryChoice::Standard(standard)).expect("a library");
     let xi = |shift: usize| {
         DMatrix::from_fn(library.terms().len(), d, |row, column| {
             let is_active = (7 * row + 11 * column + shift).is_multiple_of(53);

@@ -133,14 +133,14 @@ impl Wide {
 
 /// The sum of the terms as learned, and the sum of the sizes of the terms.
 fn reference(equations: &Equations<'_>, point: &[f64]) -> (Wide, f64) {
-    let pool: &ExprPool = equations.pool();
+    let pool: &ExprPool = &equations.pool;
     // What the inputs' last digits change is not asked for.
     let input = |symbol: SymbolId| {
         let exact = Wide::of(point[symbol.index()]);
         Wide::new(exact.mantissa, exact.exponent, f64::EPSILON)
     };
     let (mut sum, mut size) = (Wide::of(0.0), 0.0);
-    for (coefficient, term) in equations.phases()[0].summands(equations, 0) {
+    for (coefficient, term) in equations.phases[0].summands(equations, 0) {
         let values = pool.fold_up(&[term.expr], |pool, expr, child| match pool.node(expr) {
             Node::Number(number) => Wide::of(number.to_f64()),
             Node::Symbol(symbol) => input(*symbol),

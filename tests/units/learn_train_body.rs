@@ -6,9 +6,9 @@ use super::*;
 fn rows_of_the_body_have_one_order_whatever_that_of_the_list() {
     let rows: BodyRows = "yaw,pitch,z,x".parse().expect("known rows");
     assert_eq!(rows.to_string(), "x,z,pitch,yaw");
-    assert_eq!(rows.coordinates(), [12, 14, 16, 17]);
+    assert_eq!(rows.coordinates, [12, 14, 16, 17]);
     let all: BodyRows = "all".parse().expect("known rows");
-    assert_eq!(all.coordinates(), [12, 14, 16, 13, 15, 17]);
+    assert_eq!(all.coordinates, [12, 14, 16, 13, 15, 17]);
     assert_eq!("x,y,z,roll,pitch,yaw".parse(), Ok(all.clone()));
     assert_eq!(all.to_string(), "all");
     let spatial = |text: &str| text.parse::<BodyRows>().expect("known rows").is_spatial();

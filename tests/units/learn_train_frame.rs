@@ -23,7 +23,7 @@ fn true_rows() -> DMatrix<f64> {
     let joints: Vec<usize> = (0..JOINT_DIM).collect();
     let mut random = Random::new(7);
     let mut rows = DMatrix::zeros(STATE_DIM, 6);
-    for (mut row, &coordinate) in rows.column_iter_mut().zip(all().coordinates()) {
+    for (mut row, &coordinate) in rows.column_iter_mut().zip(&all().coordinates) {
         let parity = if is_lateral(coordinate) { -1.0 } else { 1.0 };
         let directions = DMatrix::from_columns(&joints_of_pairs(&joints, robot(), parity));
         row += &directions * random.matrix(directions.ncols(), 1, 0.2);
@@ -41,7 +41,7 @@ fn moving(rows: &DMatrix<f64>, is_pushed: bool) -> Dataset {
     if !is_pushed {
         u.fill(0.0);
     }
-    for (row, &coordinate) in rows.column_iter().zip(all().coordinates()) {
+    for (row, &coordinate) in rows.column_iter().zip(&all().coordinates) {
         let fall = match coordinate {
             BODY_Z => -GRAVITY_M_S2 * factors.state[BODY_Z],
             _ => 0.0,
@@ -91,14 +91,14 @@ fn error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
 fn momentum_of_six_coordinates_is_found_in_flights_and_without_them() {
     let rows = true_rows();
     for is_pushed in [false, true] {
-        let found = momentum_rows(&moving(&rows, is_pushed), all().coordinates(), robot());
+        let found = momentum_rows(&moving(&rows, is_pushed), &all().coordinates, robot());
         let missed = error(&found, &rows);
         assert!(missed < 0.03, "{is_pushed}: {missed}");
     }
     // Without the loads in the regression, their effect would be the joints'.
     let mut unseen = moving(&rows, true);
     unseen.jumps[0].u.fill(0.0);
-    let found = momentum_rows(&unseen, all().coordinates(), robot());
+    let found = momentum_rows(&unseen, &all().coordinates, robot());
     assert!(error(&found, &rows) > 0.03);
 }
 
@@ -107,7 +107,7 @@ fn rows_without_flight_need_force_and_moment_in_the_axes_of_the_world() {
     let rows = true_rows();
     let mut published = moving(&rows, true);
     published.rule = InputRule::published(robot());
-    let found = momentum_rows(&published, all().coordinates(), robot());
+    let found = momentum_rows(&published, &all().coordinates, robot());
     assert_eq!(found.rows(0, JOINT_DIM).amax(), 0.0);
 }
 

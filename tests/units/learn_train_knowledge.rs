@@ -1,7 +1,7 @@
 //! Of `src/learn/train/knowledge.rs`.
 
 use super::*;
-use crate::model::{Library, StandardLibrary};
+use crate::model::{Library, LibraryChoice, StandardLibrary};
 use crate::train::features::FeatureValues;
 use crate::train::random::Random;
 
@@ -13,7 +13,7 @@ fn features() -> Features {
         trigonometric: false,
         inputs: true,
     };
-    Features::new(&Library::standard(D, affine).expect("a library"))
+    Features::new(&Library::of(D, LibraryChoice::Standard(affine)).expect("a library"))
 }
 
 /// With any equations of the momentum, feet follow the prior: a damped spring upwards, damping only forwards.

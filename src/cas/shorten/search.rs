@@ -112,7 +112,7 @@ impl<'a> Shortener<'a> {
                 break;
             }
         }
-        self.pool.restore_limit(outer);
+        self.pool.work_limit = outer;
         // What agrees step by step may not in the end: parts were variables of their own.
         let new = blocks.into_iter().filter(|block| {
             let replaced = block.positions.iter().map(|&at| summands[at]).collect();

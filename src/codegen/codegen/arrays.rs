@@ -1,10 +1,8 @@
 //! Array statements as loops and calls, and where their values live: which arrays hold them, in place or copied.
 
-use super::dialect::{Dialect, Index, Role, Span};
-use super::ident::Ident;
-use super::printer::Text;
 use super::translate::Translator;
-use crate::ir::{Binary, LANES, ValueId, Vector, alternating};
+use super::*;
+use crate::ir::{LANES, Vector, alternating};
 
 /// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
 struct MatrixStorage {
@@ -48,8 +46,8 @@ impl Translator<'_> {
     }
 
     fn table(&mut self, id: usize) -> (Ident, usize) {
-        let table = &self.program.tables()[id];
-        (self.tables.name(table), table.cols())
+        let table = &self.program.tables[id];
+        (self.tables.name(table), table.cols)
     }
 
     pub(super) fn accumulate(&mut self, first: usize, table: usize, weights: &[ValueId]) {
@@ -90,8 +88,8 @@ impl Translator<'_> {
         base: Option<&[ValueId]>,
         groups: &[(usize, Option<Vec<ValueId>>)],
     ) {
-        let shape = &self.program.tables()[groups[0].0];
-        let (rows, cols) = (shape.rows(), shape.cols());
+        let shape = &self.program.tables[groups[0].0];
+        let (rows, cols) = (shape.rows, shape.cols);
         let (r, i) = (self.locals.mint("r"), self.locals.mint("i"));
         let dialect = self.printer.dialect;
         let mut sum = base.map(|base| {
@@ -276,7 +274,7 @@ impl Translator<'_> {
 
     /// The output array in which these rows are equally far apart, if nothing in it is still to be read.
     fn output_matrix(&self, first: usize, rows: usize, cols: usize) -> Option<MatrixStorage> {
-        let results = self.program.results();
+        let results = &self.program.results;
         let find = |value: usize| results.iter().position(|e| e.value.index() == value);
         let at = find(first)?;
         let stride = match rows {

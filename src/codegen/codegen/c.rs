@@ -1,17 +1,9 @@
 //! C99: `NAME.h`, `NAME.c`, `NAME_selftest.c` and `CMakeLists.txt`.
 
-use askama::Template;
-
-use super::dialect::{Dialect, Function, Role, braced, comment_lines, tidy};
-use super::interface::{ModelInterface, computes_angles};
-use super::model_text::{KernelText, ModelText};
-use super::options::{CodegenError, Precision, SineCosine};
+use super::dialect::braced;
 use super::script::C;
-use super::test_vectors::{
-    self, FunctionVectors, N_BATCH, N_POINTS, ParameterVectors, TOLERANCE_F64,
-};
-use crate::files::EmittedFile;
-use crate::ir::{Binary, Statement, Unary};
+use super::test_vectors::TOLERANCE_F64;
+use super::*;
 
 #[derive(Template)]
 #[template(config = "templates/askama.toml")]

@@ -2,9 +2,7 @@
 //! broken into lines. `$name` and its like in a pattern stand for what is filled in; `$model`, `$upper`, `$real` and
 //! `$f` (identifier of the model, the same in upper case, type of numbers, suffix of literals) are known everywhere.
 
-use super::ident::Ident;
-use super::options::Precision;
-use crate::ir::{Table, Unary};
+use super::*;
 
 /// The patterns of a language. Those with two entries are for double and single precision.
 pub(crate) struct Spelling {
@@ -171,8 +169,8 @@ impl Dialect {
             let lines: Vec<String> = entries.chunks(8).map(|line| line.join(", ")).collect();
             format!("{open}{}{close}\n", lines.join(between))
         };
-        let entries: String = (0..table.rows()).map(|r| row(table.row(r))).collect();
-        let [rows, cols] = [table.rows(), table.cols()].map(|count| count.to_string());
+        let entries: String = (0..table.rows).map(|r| row(table.row(r))).collect();
+        let [rows, cols] = [table.rows, table.cols].map(|count| count.to_string());
         let words = [
             ("name", name.as_str()),
             ("rows", &rows),

@@ -1,9 +1,8 @@
 //! Words of the generated documentation: equations, arrays and units of each function.
 
-use super::options::Units;
-use crate::equations::{Equations, LatentUnits, Unit, summand_words};
-use crate::lower::LowerError;
-use crate::model::{CoordinateNames, ReducedModel};
+use super::*;
+use crate::equations::{Unit, summand_words};
+use crate::model::CoordinateNames;
 use crate::robot::WrenchFrame;
 use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
 
@@ -246,7 +245,7 @@ pub(super) fn equations(system: &Equations<'_>, phase: usize) -> Result<Vec<Stri
         lines.push(format!("ddz{} = {right}", row + 1));
         let units = system.latent_units();
         if let Some(units) = units.filter(|_| (1..=MOST_TERMS).contains(&terms.len())) {
-            let unit = |term| units.acceleration(row) / units.of_term(system.pool(), term);
+            let unit = |term| units.acceleration(row) / units.of_term(&system.pool, term);
             let each = terms.iter();
             let each = each.map(|(_, term)| format!("{} {}", term.text, unit(term.expr)));
             let each = each.collect::<Vec<_>>().join(", ");

@@ -1,9 +1,9 @@
 //! Names in generated code, and the constant tables that are called by them.
 
-use std::collections::HashMap;
 use std::fmt;
 
-use crate::ir::{FUNCTIONS, Table};
+use super::*;
+use crate::ir::FUNCTIONS;
 
 /// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -1,12 +1,10 @@
 //! What is generated for a model: programs, with names, roles and documentation.
 
-use super::dialect::{Parameter, Role};
 use super::documentation::{equations, of_coordinates, of_inputs, of_maps};
-use super::options::Units;
-use crate::equations::{Equations, LatentUnits};
-use crate::ir::{Program, Statement};
-use crate::lower::{self, Form, JacobianPattern, LowerError, Map};
-use crate::model::{ModelError, ReducedModel};
+use super::*;
+use crate::equations::LatentUnits;
+use crate::lower::{self, Form, Map};
+use crate::model::ModelError;
 
 #[derive(Clone, Debug)]
 pub(crate) struct FunctionSpec {
@@ -43,7 +41,7 @@ pub struct ModelInterface {
 
 impl ModelInterface {
     pub fn new(system: &Equations<'_>, form: Form, units: Units) -> Result<Self, LowerError> {
-        let model = &units.convert(system.model())?;
+        let model = &units.convert(&system.model)?;
         let phases = (0..model.phases().len())
             .map(|phase| phase_entries(system, phase, form))
             .collect::<Result<_, _>>()?;
@@ -139,7 +137,7 @@ fn phase_entries(
     phase: usize,
     form: Form,
 ) -> Result<PhaseInterface, LowerError> {
-    let identifier = system.model().phase_identifier(phase).to_string();
+    let identifier = system.model.phase_identifier(phase).to_string();
     let name = &system.phase(phase)?.name;
     let units = match system.latent_units() {
         None => "scaled units",

@@ -24,3 +24,19 @@ mod translate;
 #[doc(hidden)] // for `deploy`, in the crate above
 pub use dialect::{tidy, wrapped};
 pub use options::{CodegenError, Precision, SineCosine, Units};
+
+use std::collections::HashMap;
+
+use askama::Template;
+
+use crate::equations::{Equations, LatentUnits};
+use crate::files::EmittedFile;
+use crate::ir::{Binary, Program, Slot, Statement, Table, Unary, ValueId};
+use crate::lower::{JacobianPattern, LowerError};
+use crate::model::ReducedModel;
+use dialect::{Dialect, Function, Index, Parameter, Role, Span, comment_lines};
+use ident::{Ident, Namer, Tables};
+use interface::{FunctionSpec, ModelInterface, computes_angles};
+use model_text::{KernelText, ModelText};
+use printer::Text;
+use test_vectors::{FunctionVectors, N_BATCH, N_POINTS, ParameterVectors};

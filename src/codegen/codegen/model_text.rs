@@ -1,14 +1,8 @@
 //! A model in the templates.
 
-use super::dialect::{Dialect, Function};
-use super::ident::{Ident, Namer, Tables};
-use super::interface::{FunctionSpec, ModelInterface, computes_angles};
-use super::options::{Precision, SineCosine};
-use super::printer::Text;
 use super::translate::{function, lanes};
-use crate::ir::Binary;
+use super::*;
 use crate::ir::interpret::{double, single};
-use crate::lower::JacobianPattern;
 
 pub(crate) struct ModelText<'a> {
     pub entries: &'a ModelInterface,

@@ -1,9 +1,7 @@
 //! What a user chooses of generated code: its numbers, sines and units; and why there is none.
 
-use super::interface::{FunctionSpec, ModelInterface};
-use crate::ir::{Program, Statement};
-use crate::lower::LowerError;
-use crate::model::{ReducedModel, Scaling};
+use super::*;
+use crate::model::Scaling;
 
 /// Floating-point numbers of generated code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -75,7 +73,7 @@ fn beyond_single(program: &Program) -> Option<f64> {
         Statement::Constant(value) => Some(*value),
         _ => None,
     });
-    let entries = program.tables().iter().flat_map(|table| table.entries());
+    let entries = program.tables.iter().flat_map(|table| &table.entries);
     let inner = program.callees.iter().find_map(beyond_single);
     constants
         .chain(entries.copied())

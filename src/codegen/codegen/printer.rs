@@ -1,8 +1,6 @@
 //! The one place that owns precedence, parentheses, indentation and line width.
 
-use super::dialect::{Dialect, Index};
-use super::ident::Ident;
-use crate::ir::{Binary, Unary};
+use super::*;
 
 const WIDTH: usize = 100;
 

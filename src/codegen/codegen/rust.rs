@@ -1,14 +1,7 @@
 //! A Rust crate without `std` and allocation: `NAME/Cargo.toml`, `NAME/src/lib.rs` and `NAME/tests/selftest.rs`.
 
-use askama::Template;
-
-use super::dialect::{Dialect, Function, Role, tidy, wrapped};
-use super::interface::{ModelInterface, computes_angles};
-use super::model_text::{KernelText, ModelText};
-use super::options::{CodegenError, Precision, SineCosine};
 use super::script::RUST;
-use super::test_vectors::{self, FunctionVectors, N_BATCH, N_POINTS, ParameterVectors};
-use crate::files::EmittedFile;
+use super::*;
 
 #[derive(Template)]
 #[template(config = "templates/askama.toml")]

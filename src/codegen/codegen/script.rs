@@ -4,15 +4,8 @@
 //! Arrays of scripts are matrices with a column per point (a vector for one), and operations are element by element: a
 //! program's statements serve one state and many. What is written into parameters elsewhere is returned here.
 
-use askama::Template;
-
-use super::dialect::{Dialect, Function, Parameter, Role, Spelling, comment_lines, tidy};
-use super::ident::Namer;
-use super::interface::ModelInterface;
-use super::model_text::ModelText;
-use super::options::{CodegenError, Precision};
-use crate::files::EmittedFile;
-use crate::ir::{Statement, Unary};
+use super::dialect::Spelling;
+use super::*;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Script {

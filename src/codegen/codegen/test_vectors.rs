@@ -1,9 +1,7 @@
 //! Input and output vectors for self-tests of generated code, from the interpreter, at finite results where possible.
 
-use super::dialect::Role;
-use super::interface::{FunctionSpec, ModelInterface};
-use super::options::Precision;
-use crate::ir::{Binary, Interpreter, Slot, Statement, Unary};
+use super::*;
+use crate::ir::Interpreter;
 use crate::robot::JOINT_DIM;
 use crate::robot::LEG_JOINT_DIM;
 use crate::typeset::rounded_up;

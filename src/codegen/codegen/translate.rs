@@ -1,14 +1,9 @@
 //! Programs to the text of a function's body: names and nested expressions; the tree of operations stays.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
-use super::dialect::{Dialect, Function, Index, Parameter, Role, Span};
-use super::ident::{Ident, Namer, Tables};
-use super::interface::{FunctionSpec, computes_angles};
-use super::options::SineCosine;
-use super::printer::{Printer, Text};
-
-use crate::ir::{Binary, Program, Slot, Statement, Unary, ValueId};
+use super::printer::Printer;
+use super::*;
 
 /// Deepest nesting of operations in one expression.
 const DEEPEST: usize = 48;
@@ -122,7 +117,7 @@ impl<'a> Translator<'a> {
         let operands = live
             .filter(|(_, live)| *live)
             .flat_map(|(s, _)| s.operands());
-        let results = program.results().iter().map(|entry| entry.value);
+        let results = program.results.iter().map(|entry| entry.value);
         for value in operands.chain(results) {
             n_uses[value.index()] += 1;
         }
@@ -253,7 +248,7 @@ impl<'a> Translator<'a> {
         let mut outputs = self.outputs.iter();
         let in_place = outputs.any(|output| output.role == Role::InOut);
         let mut assigned = Vec::new();
-        for entry in self.program.results() {
+        for entry in &self.program.results {
             let output = &self.outputs[entry.slot];
             let target = self.parameter(output, entry.index);
             let mut value = self.read(entry.value);

@@ -98,15 +98,15 @@ impl Equations<'_> {
     /// # Errors
     /// [`PhysicalError`] without robot coordinates or units, for nonlinear maps, or for values beyond floats.
     pub fn in_physical_units(&self) -> Result<Equations<'static>, PhysicalError> {
-        let model = self.model();
+        let model = &*self.model;
         if model.encoder_map().is_err() && model.decoder_map().is_err() {
             let model = model.name().to_owned();
             return Err(PhysicalError::LatentOnly { model });
         }
         let scales = scales(model)?;
         let (terms, factors, pool) = self.substituted(&scales);
-        let mut phases = Vec::with_capacity(self.phases().len());
-        for phase in self.phases() {
+        let mut phases = Vec::with_capacity(self.phases.len());
+        for phase in &self.phases {
             let ddz = (phase.ddz.iter().enumerate()).map(|(output, equation)| {
                 let summands = equation.iter().map(|&Summand { coefficient, term }| {
                     let factor = factors[term] / scales[output].position.0;
@@ -135,11 +135,11 @@ impl Equations<'_> {
 
     /// Quantity and unit of each latent coordinate of these equations; empty where the model does not determine them.
     pub fn latent_words(&self) -> Vec<LatentWords> {
-        let scaled = self.in_scaled_units().model().latent_words();
+        let scaled = self.in_scaled_units().model.latent_words();
         let Some(units) = self.latent_units() else {
             return scaled;
         };
-        let all = scaled.into_iter().zip(self.model().latent_words());
+        let all = scaled.into_iter().zip(self.model.latent_words());
         let all = all.zip(&units.position).map(|((scaled, own), unit)| {
             let unit = unit.to_string();
             let has_unit = own.unit.is_empty() || own.unit == unit;
@@ -155,7 +155,7 @@ impl Equations<'_> {
 
     /// Terms of scaled variables, and the numeric factor that went out of each.
     fn substituted(&self, scales: &[Scale]) -> (Vec<CandidateTerm>, Vec<f64>, ExprPool) {
-        let mut pool = self.pool().clone();
+        let mut pool = self.pool.clone();
         let replacements: Vec<(SymbolId, ExprId)> = LatentVariable::all(scales.len())
             .map(|variable| {
                 let factor = match variable {

@@ -35,11 +35,14 @@ pub struct PhaseEquations {
 /// `ddz = Xi^T Theta(z, dz, u_lat)` of all phases, with the model of its maps, names and scale factors.
 #[derive(Clone)]
 pub struct Equations<'a> {
-    pub(super) model: Cow<'a, ReducedModel>,
-    pub(super) pool: ExprPool,
+    /// The model with maps, names and scale factors; its Xi may be that of equal, longer equations.
+    pub model: Cow<'a, ReducedModel>,
+    /// The pool of the terms. Clone it to build on them: ids stay valid in the clone.
+    pub pool: ExprPool,
     /// The terms of all phases.
     pub terms: Vec<CandidateTerm>,
-    pub(super) phases: Vec<PhaseEquations>,
+    /// In the model's order.
+    pub phases: Vec<PhaseEquations>,
     /// What exact simplification did, in the order of phases and equations.
     pub steps: Vec<ExactStep>,
     /// The units of equations in physical units, and what these were made from.
@@ -134,24 +137,9 @@ impl<'a> Equations<'a> {
         self.physical.as_ref().map(|(units, _)| units)
     }
 
-    /// The model with maps, names and scale factors; its Xi may be that of equal, longer equations.
-    pub fn model(&self) -> &ReducedModel {
-        &self.model
-    }
-
     /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
         self.model.latent_dim()
-    }
-
-    /// The pool of the terms. Clone it to build on them: ids stay valid in the clone.
-    pub fn pool(&self) -> &ExprPool {
-        &self.pool
-    }
-
-    /// All phases, in the model's order.
-    pub fn phases(&self) -> &[PhaseEquations] {
-        &self.phases
     }
 
     /// The phase with this index.

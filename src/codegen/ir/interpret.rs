@@ -67,9 +67,9 @@ impl<T: Real> Interpreter<T> {
             outputs: lengths(&program.outputs),
             loads,
             steps,
-            tables: program.tables().iter().map(table).collect(),
+            tables: program.tables.iter().map(table).collect(),
             callees: program.callees.iter().map(Self::new).collect(),
-            stores: program.results().iter().map(|entry| entry.value).collect(),
+            stores: program.results.iter().map(|entry| entry.value).collect(),
             values,
         }
     }

@@ -32,9 +32,9 @@ pub(crate) type Vector = [ValueId; LANES];
 /// A constant matrix, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table<T = f64> {
-    pub(super) rows: usize,
-    pub(super) cols: usize,
-    pub(super) entries: Vec<T>,
+    pub(crate) rows: usize,
+    pub(crate) cols: usize,
+    pub(crate) entries: Vec<T>,
 }
 
 impl<T> Table<T> {
@@ -47,20 +47,8 @@ impl<T> Table<T> {
         }
     }
 
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
-    }
-
-    pub(crate) fn cols(&self) -> usize {
-        self.cols
-    }
-
     pub(crate) fn row(&self, row: usize) -> &[T] {
         &self.entries[row * self.cols..(row + 1) * self.cols]
-    }
-
-    pub(crate) fn entries(&self) -> &[T] {
-        &self.entries
     }
 }
 
@@ -162,22 +150,14 @@ pub struct Program {
     /// All statements, in order of evaluation.
     pub statements: Vec<Statement>,
     pub(super) first: Vec<u32>, // value of each statement, and the number of values at the end
-    pub(super) tables: Vec<Table>,
+    pub(crate) tables: Vec<Table>,
     /// Programs that this one evaluates.
     pub callees: Vec<Program>,
-    pub(super) results: Vec<ResultEntry>,
+    /// What is stored where: each output element once, ordered by slot and index.
+    pub(crate) results: Vec<ResultEntry>,
 }
 
 impl Program {
-    pub(crate) fn tables(&self) -> &[Table] {
-        &self.tables
-    }
-
-    /// What is stored where: each output element once, ordered by slot and index.
-    pub(crate) fn results(&self) -> &[ResultEntry] {
-        &self.results
-    }
-
     pub(crate) fn n_values(&self) -> usize {
         self.first.last().map_or(0, |&count| count as usize)
     }

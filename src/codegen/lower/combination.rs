@@ -75,12 +75,6 @@ impl Combination {
     pub(crate) fn is_zero(&self) -> bool {
         self.items.is_empty() && self.constant == 0.0
     }
-
-    pub(crate) fn non_finite(&self) -> Option<f64> {
-        std::iter::once(self.constant)
-            .chain(self.items.iter().map(|&(coefficient, _)| coefficient))
-            .find(|value| !value.is_finite())
-    }
 }
 
 /// One term `coefficient * value` of a sum.

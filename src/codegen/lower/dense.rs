@@ -141,7 +141,7 @@ impl DenseJacobian {
         let mut tables = [(Function::Sin, 1.0), (Function::Cos, -1.0)].map(|(wanted, sign)| {
             let of = |expr| angle_of(pool, expr).and_then(|(f, v)| (f == wanted).then_some(v));
             let table = coefficients(equations, variables, sign, of);
-            Some(table).filter(|table| table.entries().iter().any(|&entry| entry != 0.0))
+            Some(table).filter(|table| table.entries.iter().any(|&entry| entry != 0.0))
         });
         let is_constant = self.slopes.iter().all(|slope| slope.items.is_empty());
         if tables.iter().all(Option::is_none) {

@@ -86,7 +86,7 @@ fn with_derivatives(
     columns: &[SymbolId],
 ) -> Result<(Program, JacobianPattern), LowerError> {
     let equations = accelerations(system, phase)?;
-    let mut pool = system.pool().clone();
+    let mut pool = system.pool.clone();
     let mut entries = Vec::new();
     let mut pattern = JacobianPattern::default();
     for (row, equation) in equations.iter().enumerate() {
@@ -165,13 +165,15 @@ fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination
     let equation = |row| {
         let summands = phase.summands(system, row);
         let summands = summands.map(|(coefficient, term)| (coefficient, term.expr));
-        finite(phase, row, Combination::collect(system.pool(), summands))
+        finite(phase, row, Combination::collect(&system.pool, summands))
     };
     (0..system.latent_dim()).map(equation).collect()
 }
 
 fn finite(phase: &PhaseEquations, row: usize, sum: Combination) -> Result<Combination, LowerError> {
-    match sum.non_finite() {
+    let coefficients = sum.items.iter().map(|&(coefficient, _)| coefficient);
+    let mut numbers = std::iter::once(sum.constant).chain(coefficients);
+    match numbers.find(|value| !value.is_finite()) {
         None => Ok(sum),
         Some(value) => Err(LowerError::NonFinite {
             phase: phase.name.clone(),

@@ -1,12 +1,7 @@
 //! Numbers as they are printed, and coefficients before terms with a record of what rounding changed.
 
-use std::fmt;
-
-use nalgebra::DMatrix;
-
-use super::equations::{Equation, EquationSystem};
 use super::expression::with_coefficient;
-use super::tree::{Signed, Symbol};
+use super::*;
 
 /// How coefficients are rounded for print.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,9 +20,10 @@ pub enum Rounding {
 /// A decimal number in print: sign, digits and perhaps a power of ten.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decimal {
-    negative: bool,
-    digits: String,
-    exponent: Option<i32>,
+    pub(crate) negative: bool,
+    /// With their point, without sign and power of ten.
+    pub(crate) digits: String,
+    pub(crate) exponent: Option<i32>,
 }
 
 const MOST_DIGITS: usize = 40;
@@ -127,10 +123,6 @@ impl Decimal {
         self.exponent.is_none() && self.value().abs() == 1.0
     }
 
-    pub(crate) fn is_negative(&self) -> bool {
-        self.negative
-    }
-
     pub(crate) fn magnitude(&self) -> Self {
         Self {
             negative: false,
@@ -138,18 +130,9 @@ impl Decimal {
         }
     }
 
-    /// The digits with their point, without sign and power of ten.
-    pub(crate) fn digits(&self) -> &str {
-        &self.digits
-    }
-
     pub(super) fn places(&self) -> (usize, usize) {
         let (before, after) = self.digits.split_once('.').unwrap_or((&self.digits, ""));
         (before.len(), after.len())
-    }
-
-    pub(crate) fn exponent(&self) -> Option<i32> {
-        self.exponent
     }
 }
 
@@ -219,7 +202,7 @@ fn are_whole_exact(rounding: Rounding, coefficients: impl Iterator<Item = f64>) 
     let needs = |value: f64| {
         let number = Decimal::exact(value);
         let (_, after) = number.places();
-        number.exponent().map_or(after, |_| usize::MAX)
+        number.exponent.map_or(after, |_| usize::MAX)
     };
     let needed: Vec<usize> = coefficients.filter(|c| *c != 0.0).map(needs).collect();
     let all = needed.iter().filter(|places| **places == LEAST_DECIMALS);

@@ -1,14 +1,7 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
 #![allow(missing_docs, reason = "the names say it")]
 
-use nalgebra::DMatrix;
-
-use crate::equations::{Equations, Unit};
-
-use super::decimal::{Decimal, Rounder, Rounding, RoundingReport};
-use super::expression::terms;
-use super::symbols::SymbolTable;
-use super::tree::{Math, Signed, Symbol};
+use super::*;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct EquationSystem {
@@ -56,7 +49,7 @@ impl Typeset {
         let output = |output| (symbols.acceleration(output), format!("ddz{}", output + 1));
         let outputs: Vec<(Symbol, String)> = (0..system.latent_dim()).map(output).collect();
         let mut rounder = Rounder::new(rounding, coefficients(system));
-        let phases = system.phases().iter().enumerate();
+        let phases = system.phases.iter().enumerate();
         let phases = phases.map(|(index, phase)| (&phase.name, system.coefficients(index)));
         let phases: Vec<(&String, DMatrix<f64>)> = phases.collect();
         let systems = phases.iter();
@@ -71,7 +64,7 @@ impl Typeset {
 }
 
 pub(super) fn coefficients(system: &Equations<'_>) -> impl Iterator<Item = f64> {
-    let equations = system.phases().iter().flat_map(|phase| &phase.ddz);
+    let equations = system.phases.iter().flat_map(|phase| &phase.ddz);
     equations.flatten().map(|summand| summand.coefficient)
 }
 
@@ -87,7 +80,7 @@ fn table(
     let row = |(row, (_, term)): (usize, &(&str, Signed))| CoefficientRow {
         term: term.clone().into_math(),
         unit: units
-            .map(|units| units.of_term(system.pool(), system.terms[row].expr))
+            .map(|units| units.of_term(&system.pool, system.terms[row].expr))
             .filter(|unit| *unit != Unit::default()),
         coefficients: (phases.iter())
             .flat_map(|(_, xi)| xi.row(row).iter().map(cell).collect::<Vec<_>>())

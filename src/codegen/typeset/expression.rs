@@ -1,12 +1,8 @@
 //! From canonical expressions to the typeset tree, with factors and terms in the order that readers expect.
 
-use crate::equations::Equations;
-use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};
-
-use super::decimal::Decimal;
-use super::symbols::SymbolTable;
-use super::tree::{Glyph, Math, Signed};
+use super::*;
+use crate::model::MAX_LATENT_DIM;
+use crate::symbolic::{ExprId, ExprPool, Node, Number, SymbolId};
 
 /// Lays out an expression over the variables of a latent model.
 ///
@@ -20,7 +16,7 @@ pub(super) fn terms<'e>(
     equations: &'e Equations<'_>,
     symbols: &SymbolTable,
 ) -> Vec<(&'e str, Signed)> {
-    let layout = |expr| expression(equations.pool(), expr, symbols);
+    let layout = |expr| expression(&equations.pool, expr, symbols);
     let terms = equations.terms.iter();
     terms
         .map(|term| (term.text.as_str(), layout(term.expr)))
@@ -42,7 +38,7 @@ pub(super) fn with_coefficient(coefficient: &Decimal, is_omitted: bool, term: Si
         math => product(vec![number, in_brackets(math)]),
     };
     Signed {
-        negative: coefficient.is_negative() != term.negative,
+        negative: coefficient.negative != term.negative,
         math,
     }
 }
@@ -206,7 +202,7 @@ impl Layout<'_> {
     fn base(&self, expr: ExprId) -> Factor {
         let (key, math) = self.factor(expr);
         let is_whole = match &math {
-            Math::Number(number) => number.exponent().is_none(),
+            Math::Number(number) => number.exponent.is_none(),
             Math::Symbol(_) | Math::Dot | Math::Absolute(_) | Math::Group(_) => true,
             _other => false,
         };

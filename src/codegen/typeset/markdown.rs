@@ -1,20 +1,16 @@
 //! Equations for READMEs and lab notebooks, with formulas as GitHub and GitLab draw them.
 
-use askama::Template;
-
-use crate::equations::{Equations, Unit};
-use crate::files::{EmittedFile, is_invisible};
-use crate::typeset::latex::{tex, tex_cases, tex_symbol, tex_unit};
-use crate::typeset::words::{Page, Spelling, code_point, ends_line, rendered};
-use crate::typeset::{Emitted, NumberStyle, PrintOptions};
+use super::*;
+use crate::typeset::latex::{tex, tex_symbol, tex_unit};
+use crate::typeset::words::ends_line;
 
 /// The file `NAME.md`: equations in `math` fences and the table of coefficients.
 ///
 /// # Errors
-/// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
+/// [`TypesetError::Template`].
 pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &MARKDOWN);
-    let path = format!("{}.md", equations.model().identifier());
+    let path = format!("{}.md", equations.model.identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
 

@@ -1,19 +1,7 @@
 //! Pages: equations in MathML Core, which browsers draw without scripts, and the one way in for text from outside.
 
-use std::fmt;
-
-use askama::Template;
-
-use crate::equations::{Equations, Unit};
-use crate::files::{EmittedFile, is_invisible};
-use crate::model::LatentVariable;
-use crate::typeset::latex::tex_cases;
-use crate::typeset::tree::{function_name, greek_letter};
-use crate::typeset::words::{Page, Spelling, code_point, rendered};
-use crate::typeset::{
-    Decimal, EQUALS, Emitted, EquationSystem, Glyph, Math, PrintOptions, Signed, Symbol,
-    SymbolTable, break_lines, symbol_width,
-};
+use super::*;
+use crate::typeset::tree::function_name;
 
 const INDENT: f64 = 2.0; // of a continued line, in em
 
@@ -47,10 +35,10 @@ struct Lines<'a> {
 /// The page `NAME.html`: equations and the table of coefficients, without scripts or anything from elsewhere.
 ///
 /// # Errors
-/// [`TypesetError::Template`](crate::typeset::TypesetError::Template).
+/// [`TypesetError::Template`].
 pub fn emit(equations: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let page = Page::new(equations, options, &HTML);
-    let path = format!("{}.html", equations.model().identifier());
+    let path = format!("{}.html", equations.model.identifier());
     Ok(vec![EmittedFile::new(path, rendered(&Document { page })?)])
 }
 
@@ -247,8 +235,8 @@ pub(crate) fn mathml_terms(terms: &[Signed], continues: bool) -> String {
 }
 
 fn mathml_number(number: &Decimal) -> String {
-    let digits = format!("<mn>{}</mn>", number.digits());
-    let size = match number.exponent() {
+    let digits = format!("<mn>{}</mn>", number.digits);
+    let size = match number.exponent {
         None => digits,
         Some(exponent) => {
             let power = if exponent < 0 {
@@ -260,7 +248,7 @@ fn mathml_number(number: &Decimal) -> String {
             format!("<mrow>{digits}<mo>\u{D7}</mo><msup><mn>10</mn>{power}</msup></mrow>")
         }
     };
-    match number.is_negative() {
+    match number.negative {
         true => format!(r#"<mrow><mo form="prefix">{MINUS}</mo>{size}</mrow>"#),
         false => size,
     }

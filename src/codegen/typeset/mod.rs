@@ -26,3 +26,18 @@ pub use symbols::{Form, NumberStyle, PrintOptions, RenameError, SymbolTable, Typ
 pub use table::{Cell, Table, rounded, rounded_up, significant};
 pub(crate) use tree::{EQUALS, Glyph, break_lines, symbol_width, width};
 pub use tree::{Math, Signed, Symbol};
+
+use std::fmt;
+
+use askama::Template;
+use nalgebra::DMatrix;
+
+use crate::equations::{Equations, Unit};
+use crate::files::{EmittedFile, is_invisible};
+use crate::model::LatentVariable;
+use crate::symbolic::Function;
+use decimal::{Rounder, RoundingReport};
+use expression::terms;
+use latex::tex_cases;
+use tree::greek_letter;
+use words::{Page, Spelling, code_point, rendered};

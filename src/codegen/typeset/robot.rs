@@ -2,16 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
-use crate::equations::Equations;
-use crate::model::{AffineMap, LatentVariable};
-
-use super::decimal::{Decimal, Rounder, Rounding, RoundingReport};
-use super::equations::{EquationSystem, coefficients};
-use super::expression::terms;
-use super::symbols::{SymbolTable, TypesetError, glyph};
-use super::tree::{Glyph, Math, Signed, Symbol};
+use super::equations::coefficients;
+use super::symbols::glyph;
+use super::*;
+use crate::model::AffineMap;
 
 /// Weights below this share of their row's largest are left out of the printed encoder.
 const NEGLIGIBLE: f64 = 0.02;
@@ -39,7 +35,7 @@ impl RobotTypeset {
         symbols: &SymbolTable,
         rounding: Rounding,
     ) -> Result<Option<Self>, TypesetError> {
-        let model = system.model();
+        let model = &*system.model;
         let maps = (model.encoder(), model.decoder(), model.state_factors());
         let (Some(state), (Ok(map), Ok(decoder), Ok(factors))) = (model.state(), maps) else {
             return Ok(None);
@@ -56,7 +52,7 @@ impl RobotTypeset {
         });
         let names = state.names.iter().map(|name| format!("dd({name})"));
         let outputs: Vec<(Symbol, String)> = doubled.zip(names).collect();
-        for (index, phase) in system.phases().iter().enumerate() {
+        for (index, phase) in system.phases.iter().enumerate() {
             let xi = system.coefficients(index);
             let mut ddq = DMatrix::zeros(terms.len(), outputs.len());
             for (row, (_, output)) in outputs.iter().enumerate() {

@@ -3,10 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use super::decimal::Rounding;
-use super::tree::{Glyph, Symbol, greek, greek_letter};
-use crate::files::EmittedFile;
-use crate::model::LatentVariable;
+use super::tree::greek;
+use super::*;
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]

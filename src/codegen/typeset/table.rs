@@ -1,14 +1,9 @@
 //! Tables of results: one set of cells, rendered as text, Markdown, HTML or CSV.
 #![allow(missing_docs, reason = "the names say it")]
 
-use std::fmt;
-
-use askama::Template;
-
 use super::decimal::finite_digits;
 use super::mathml::HtmlProse;
-use super::words::code_point;
-use crate::files::is_invisible;
+use super::*;
 
 /// A number with four significant digits; `diverged` for one that is not finite.
 pub fn significant(value: f64) -> String {

@@ -2,8 +2,7 @@
 //! of Computer Modern, good to a few percent) and where a long equation is broken.
 #![allow(missing_docs, reason = "the names say it")]
 
-use super::decimal::Decimal;
-use crate::symbolic::Function;
+use super::*;
 
 /// One piece of laid-out mathematics: parentheses, dots and signs are in place, a printer chooses spelling alone.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,9 +146,9 @@ const SCRIPT: f64 = 0.8;
 pub(crate) fn width(math: &Math) -> f64 {
     match math {
         Math::Number(number) => {
-            let points = number.digits().bytes().filter(|byte| *byte == b'.').count() as f64;
-            let digits = number.digits().len() as f64 - points;
-            let power = number.exponent().map_or(0.0, |exponent| {
+            let points = number.digits.bytes().filter(|byte| *byte == b'.').count() as f64;
+            let digits = number.digits.len() as f64 - points;
+            let power = number.exponent.map_or(0.0, |exponent| {
                 let sign = if exponent < 0 { MINUS } else { 0.0 };
                 let places = exponent.unsigned_abs().to_string().len() as f64;
                 OPERATOR + 2.0 * DIGIT + SCRIPT * (sign + DIGIT * places)

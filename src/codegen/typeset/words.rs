@@ -1,18 +1,10 @@
 //! Sentences of every printed form of a model, in the form's spelling, and what Markdown and HTML pages are made of.
 
-use askama::Template;
-
+use super::decimal::{LEAST_DECIMALS, Occurrence, RELATIVE_ERROR};
+use super::*;
 use crate::equations::Equations;
 use crate::model::{FeetRule, LatentVariable};
 use crate::robot::{ContactFlags, Leg};
-
-use super::decimal::{
-    Decimal, LEAST_DECIMALS, Occurrence, RELATIVE_ERROR, Rounding, RoundingReport,
-};
-use super::equations::{EquationSystem, Typeset};
-use super::symbols::PrintOptions;
-use super::table::{rounded, rounded_up};
-use super::tree::{Math, Signed, Symbol};
 
 /// How a sentence spells words from outside and mathematics.
 #[derive(Debug)]
@@ -209,7 +201,7 @@ impl<'a> Page<'a> {
         &self,
         math: impl Fn(&EquationSystem, f64) -> String,
     ) -> Vec<(&str, String, String)> {
-        let phases = self.typeset.systems.iter().zip(self.equations.phases());
+        let phases = self.typeset.systems.iter().zip(&self.equations.phases);
         let phases = phases.map(|(system, phase)| {
             let feet = feet(&phase.feet);
             (phase.name.as_str(), feet, math(system, self.width_em))

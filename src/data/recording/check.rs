@@ -1,15 +1,8 @@
 //! Plausibility: what a recording says that a robot cannot have done, with row and column; samples are left out only by
 //! [`without`], when asked. Numbers that are not finite never get here: reading refuses them.
 
-use std::fmt;
-use std::ops::Range;
-
-use super::error::{Outcome, RecordingFault};
-use super::preprocess::median;
-use super::reader::Column;
-use super::segment::{Recording, Segment, stretches};
+use super::*;
 use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{JOINT_DIM, Leg, Robot, STATE_DIM};
 use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
 
 const TORQUE_FACTOR: f64 = 1.1; // torque and speed over a joint's limit that are still accepted

@@ -2,11 +2,9 @@
 //! logger that counts samples says that time passes evenly even where samples came late or were lost; between two the
 //! robot moved by velocity times elapsed time. Coordinates that disagree on the clock are themselves wrong.
 
-use super::error::RecordingError;
 use super::mismatch::falls_of;
-use super::preprocess::{differences, median, resampled};
-use super::segment::Segment;
-use crate::robot::{BODY_DIM, GRAVITY_M_S2, JOINT_DIM};
+use super::preprocess::resampled;
+use super::*;
 
 const LEAST_DISAGREEMENT: f64 = 0.03; // elapsed over stamped time from which a segment's clock is replaced
 const JOINT_WEIGHT: f64 = 0.01; // weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2
@@ -54,7 +52,9 @@ pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
         false => segment.clone(),
     };
     let step_s = segment.mean_step_s();
-    let is_uneven = !is_even(&chosen);
+    let even_s = chosen.mean_step_s();
+    let mut steps = chosen.time_s.windows(2).map(|pair| pair[1] - pair[0]);
+    let is_uneven = steps.any(|step| (step - even_s).abs() > EVEN * even_s);
     let rows = (chosen.duration_s() / step_s).round() as usize + 1;
     let mut segment = match is_uneven {
         false => chosen.clone(),
@@ -136,12 +136,6 @@ fn lost(samples_s: &[f64], time_s: &[f64], step_s: f64) -> Vec<bool> {
         right < samples_s.len() && samples_s[right] - samples_s[right - 1] > LOST_STEPS * step_s
     };
     time_s.iter().map(of).collect()
-}
-
-fn is_even(segment: &Segment) -> bool {
-    let step_s = segment.mean_step_s();
-    let mut steps = segment.time_s.windows(2).map(|pair| pair[1] - pair[0]);
-    steps.all(|step| (step - step_s).abs() <= EVEN * step_s)
 }
 
 /// The samples at times that their motion says, without those that were logged twice.

@@ -6,11 +6,7 @@
 //! between 1 and 10 for 1e-5 times itself: the one that continues the motion is chosen. Where the file was resampled
 //! afterwards, by a cubic spline, its rows mix broken and sound numbers; the samples of the spline are found first.
 
-use nalgebra::DMatrix;
-
-use super::preprocess::differences;
-use super::segment::Segment;
-use crate::robot::JOINT_DIM;
+use super::*;
 
 const FULL_TURN_RAD: f64 = std::f64::consts::TAU; // no joint of a leg turns by more
 const STEPS_S: [f64; 6] = [0.01, 0.005, 0.004, 0.0025, 0.002, 0.001]; // of loggers, before a resampling; longest first

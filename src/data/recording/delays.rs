@@ -1,14 +1,9 @@
 //! Columns that are later than the motion, or held: rates that are filtered, clipped or differences of held samples,
 //! and a body whose place arrives later than the joints. Angles of joints and body are taken to be right.
 
-use std::ops::Range;
-
-use nalgebra::DMatrix;
-
 use super::mismatch::foot_slip_m;
-use super::preprocess::{differences, slopes};
-use super::segment::Segment;
-use crate::robot::{JOINT_DIM, Robot, STATE_DIM};
+use super::preprocess::slopes;
+use super::*;
 
 const HALF_WINDOW_S: f64 = 0.015; // of the slopes that replace rates
 const LONGEST_S: f64 = 0.03; // longest delay that is looked for

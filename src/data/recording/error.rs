@@ -1,10 +1,8 @@
 //! Faults between a file and a segment ready for training.
 
-use std::io;
-use std::path::Path;
-
 use thiserror::Error;
 
+use super::*;
 use crate::files::magic::OtherFormat;
 use crate::files::{Located, Place};
 use crate::robot::RobotError;

@@ -1,19 +1,10 @@
 //! Sets of recordings: read once, checked and conditioned, held in memory. When asked, implausible samples are left
 //! out, accelerations recomputed and rows smoothed.
 
-use std::path::PathBuf;
-
-use clap::ValueEnum;
-use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
-
-use super::check::{Finding, check, without};
-use super::error::{Outcome, RecordingError, RecordingFault};
+use super::check::{Finding, without};
 use super::mismatch::{Balance, Mismatch, contradiction, mismatches};
-use super::preprocess::{SavitzkyGolay, differences};
-use super::reader::{Clocks, Reader, Reading, ReadingNotes};
-use super::segment::{Recording, Segment};
-use crate::robot::Robot;
+use super::preprocess::SavitzkyGolay;
+use super::*;
 
 const HALF_SMOOTHING_S: f64 = 0.015; // half the window over which rows of late samples are smoothed, in s
 const SMOOTHING_ORDER: usize = 3; // degree of the polynomials that smooth them

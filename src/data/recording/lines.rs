@@ -1,12 +1,11 @@
 //! Lines of a file in bounded memory, their cells, and cells as numbers with a decimal point or a decimal comma.
 
 use std::fs::{self, File};
-use std::io::{self, BufRead, BufReader, Read};
-use std::path::Path;
+use std::io::{BufRead, BufReader, Read};
 
 use flate2::bufread::MultiGzDecoder;
 
-use super::error::{Outcome, RecordingError, RecordingFault, io_fault, unexpected};
+use super::*;
 use crate::files::magic::{MAGIC_BYTES, recognised};
 use crate::files::size::{Capped, Format};
 

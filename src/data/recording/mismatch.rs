@@ -6,15 +6,8 @@
 mod feet;
 mod stance;
 
-use std::fmt;
-
-use nalgebra::DMatrix;
-use serde::Serialize;
-
-use super::check::{Breach, check, outside};
-use super::preprocess::{differences, median};
-use super::segment::Recording;
-use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
+use super::check::{Breach, outside};
+use super::*;
 use crate::robot_file;
 pub use stance::Balance;
 use stance::{Slip, best_other_place, best_other_reading, uncarried};

@@ -1,7 +1,7 @@
 //! Recorded jumps: reading, checking, phases, preprocessing, writing. Enters: CSV files of one or several jumps, plain
 //! or gzip, or logs of other programs. Leaves: segments of consecutive samples in SI units, samples as columns; spans
 //! of contact phases; reports of what is implausible, or not this robot. Read [`Segment`] for the data first, then
-//! [`Reader`] for the format, [`check`], [`mismatch`], [`condition()`], [`PhaseRule`] and [`preprocess`] for what is
+//! [`Reader`] for the format, [`mod@check`], [`mismatch`], [`condition()`], [`PhaseRule`] and [`preprocess`] for what is
 //! done with it, and [`write()`].
 //!
 //! ```
@@ -60,3 +60,17 @@ pub use foreign::{
 pub use phases::{CHATTER_SAMPLES, PhasePattern, PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Column, Reader, Reading, ReadingNotes, read, read_from_bytes};
 pub use segment::{Recording, Segment, between, stretches};
+
+use std::fmt;
+use std::io;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use crate::robot::{BODY_DIM, ContactFlags, GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
+use check::check;
+use error::{Outcome, io_fault, listed, text, unexpected};
+use preprocess::{differences, median};

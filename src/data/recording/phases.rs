@@ -2,13 +2,8 @@
 //! wins, as in the model file. With the paper's two phases, samples with one to three feet down count as contact and so
 //! join the launch or the landing they border (section IV-C4). Three phases describe an asynchronous jump.
 
-use std::ops::Range;
-
-use serde::Serialize;
-
-use super::error::{RecordingError, listed, text};
-use super::segment::{Segment, stretches};
-use crate::robot::{ContactFlags, FeetRule};
+use super::*;
+use crate::robot::FeetRule;
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
 pub const CHATTER_SAMPLES: usize = 5;

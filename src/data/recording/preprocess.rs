@@ -4,16 +4,10 @@
 //! Savitzky-Golay smoothing fits a polynomial to each window of equally spaced samples by least squares; its value at
 //! the centre, at the ends off centre, replaces a sample: none is lost, polynomials up to the order pass unchanged.
 
-use std::ops::Range;
-use std::path::Path;
 use std::str::FromStr;
 
-use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
-
-use super::error::{Outcome, RecordingError, RecordingFault, text};
-use super::phases::{PhaseRule, PhaseSpan};
-use super::segment::{Recording, Rows, Segment};
+use super::segment::Rows;
+use super::*;
 
 /// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).
 pub const BATCH_ROWS: usize = 100;

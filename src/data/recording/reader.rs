@@ -2,22 +2,17 @@
 //! text: `;` or tabs with decimal comma or point, or `,` with decimal point, found from the header; columns by name in
 //! any order; gzip found from the first two bytes. Memory is bounded by the samples kept.
 
-use std::path::Path;
 use std::sync::Arc;
 
-use clap::ValueEnum;
-use serde::{Deserialize, Serialize};
-
-use super::clock::{Mended, timed};
+use super::clock::timed;
 use super::decimals::{broken_angle, restored};
 use super::delays::{BODY_RATES, RateFault, faulty_rates, mend_place, replace_rates};
-use super::error::{Outcome, RecordingError, listed, text, unexpected};
 use super::foreign::guess::guess_of;
-use super::foreign::map::ColumnMap;
 use super::foreign::{TextFormat, assemble, is_mcap, read_lines, read_mcap, read_texts};
 use super::lines::Lines;
-use super::segment::{DERIVED_DDX, Recording, Segment, divided};
-use crate::robot::{BODY_DIM, FOOT_DIM, JOINT_DIM, JOINT_NAMES, Leg, Robot, STATE_DIM};
+use super::segment::{DERIVED_DDX, divided};
+use super::*;
+use crate::robot::{FOOT_DIM, JOINT_NAMES};
 
 /// What becomes of clocks that disagree with the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]

@@ -1,14 +1,8 @@
 //! The data: recordings and their segments of consecutive samples.
 
-use std::ops::Range;
-use std::path::PathBuf;
-
-use nalgebra::DMatrix;
-
-use super::error::{Outcome, RecordingError, RecordingFault, unexpected};
-use super::preprocess::{differences, moving_average};
-use super::reader::Column;
-use crate::robot::{BODY_DIM, ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM};
+use super::preprocess::moving_average;
+use super::*;
+use crate::robot::InputRule;
 
 const ACCELERATION_WINDOW_S: f64 = 0.02; // joint accelerations are averaged over it before motor inertia counts
 

@@ -2,19 +2,13 @@
 //! whole or not at all: they are written beside their place and then renamed.
 
 use std::fmt::Write as _;
-use std::io::{self, Write};
-use std::path::Path;
+use std::io::Write;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use nalgebra::DMatrix;
 
-use super::error::{RecordingError, RecordingFault, io_fault};
-use super::foreign;
-use super::reader::Column;
-use super::segment::{Recording, Segment};
+use super::*;
 use crate::files::{Overwrite, write_whole};
-use crate::robot::Robot;
 
 /// Cell separator and decimal mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -66,9 +66,7 @@ impl<'a> Facts<'a> {
             input_names: Robot::input_names().join(" "),
             joint_names: robot.joint_names.join(" "),
             input_is: input_in_words(plant.input_rule(), name),
-            codes: (texts.iter())
-                .map(|(code, text)| (constant(text), *code))
-                .collect(),
+            codes: texts.iter().map(constant).collect(),
             texts,
             settings: SettingText::all(&settings),
             chosen: changed(&settings),
@@ -103,7 +101,7 @@ pub(crate) fn emit(
     provenance: &str,
     plan: Option<&PlannedJump>,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let plant = plant(equations.model())?;
+    let plant = plant(&equations.model)?;
     let entries = &ModelInterface::new(equations, form, Units::Si)?;
     let facts = &Facts::new(entries, &plant, plan);
     let (name, folder) = (facts.name, format!("{}-controller", facts.name));
@@ -191,7 +189,7 @@ fn changed(settings: &Settings) -> String {
 }
 
 /// The name of a code: the words of its text before the colon.
-fn constant(text: &str) -> String {
+fn constant((code, text): &(i32, String)) -> (String, i32) {
     let word = text.split(':').next().unwrap_or(text);
-    word.to_ascii_uppercase().replace(' ', "_")
+    (word.to_ascii_uppercase().replace(' ', "_"), *code)
 }

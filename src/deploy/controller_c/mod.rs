@@ -7,8 +7,6 @@ mod ros2_control;
 mod selftest;
 pub(super) mod source;
 
-use std::ops::Deref;
-
 use askama::Template;
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
@@ -24,6 +22,10 @@ use crate::mpc::interface::{Accepts, SETTINGS, Setting};
 use crate::mpc::problem::StageRows;
 use crate::solver::ROW_NUMBERS;
 use source::{Numbers, Source};
+
+use crate::mpc::{MpcError, MpcSettings};
+use crate::robot::{JOINT_DIM, STATE_DIM};
+use source::nested;
 
 struct Facts<'a> {
     controller: controller::Facts<'a>,
@@ -43,13 +45,7 @@ struct Facts<'a> {
     rows: &'a StageRows,
 }
 
-impl<'a> Deref for Facts<'a> {
-    type Target = controller::Facts<'a>;
-
-    fn deref(&self) -> &Self::Target {
-        &self.controller
-    }
-}
+extends! { <'a> Facts<'a>: controller::Facts<'a>, controller }
 
 templates! {
     #[derive(askama::Template)]
@@ -66,7 +62,7 @@ pub(crate) fn emit(
     options: &EmitOptions,
     provenance: &str,
 ) -> Result<Vec<EmittedFile>, EmitError> {
-    let (model, precision) = (equations.model(), options.precision);
+    let (model, precision) = (&equations.model, options.precision);
     let plant = plant(model)?;
     let rows = StageRows::of_all_kinds(&plant);
     let entries = compiled(equations, options, Units::Si)?;

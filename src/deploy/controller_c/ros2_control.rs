@@ -1,13 +1,12 @@
 //! A plugin of ros2_control around the controller in C: `ros2_control/` beside it.
 
 use std::f64::consts::FRAC_PI_2;
-use std::ops::Deref;
 
-use super::source::nested;
+use super::*;
 use crate::mpc::STEP_SLACK;
 use crate::recording::Column;
 use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
-use crate::robot::{FOOT_DIM, JOINT_DIM, STATE_DIM};
+use crate::robot::FOOT_DIM;
 
 struct Facts<'a> {
     controller: &'a super::Facts<'a>,
@@ -18,13 +17,7 @@ struct Facts<'a> {
     columns: String,
 }
 
-impl<'a> Deref for Facts<'a> {
-    type Target = super::Facts<'a>;
-
-    fn deref(&self) -> &super::Facts<'a> {
-        self.controller
-    }
-}
+extends! { <'a> Facts<'a>: super::Facts<'a>, controller }
 
 templates! {
     #[derive(askama::Template)]

@@ -1,19 +1,12 @@
 //! Steps of romc's own controller that the one in C has to repeat.
 
-use std::ops::Deref;
-
-use askama::Template;
-
-use super::Facts;
-use super::source::{Numbers, integers, nested};
-use crate::codegen::Precision;
-use crate::deploy::{EmitError, PlannedJump};
+use super::source::integers;
+use super::*;
 use crate::model::ReducedModel;
 use crate::mpc::{
-    Command, Lift, Linearisation, Measurement, MissingInput, MpcError, MpcSettings,
-    ReferenceSamples, Solver,
+    Command, Lift, Linearisation, Measurement, MissingInput, ReferenceSamples, Solver,
 };
-use crate::robot::{InputRule, JOINT_DIM, STATE_DIM};
+use crate::robot::InputRule;
 
 /// Most steps of each run of the self-test: the shipped jump to its end, where the horizon is at rest.
 const STEPS: usize = 200;
@@ -39,13 +32,7 @@ struct SelfTest<'a> {
     others: usize,
 }
 
-impl<'a> Deref for SelfTest<'a> {
-    type Target = Facts<'a>;
-
-    fn deref(&self) -> &Facts<'a> {
-        self.facts
-    }
-}
+extends! { <'a> SelfTest<'a>: Facts<'a>, facts }
 
 pub(super) fn text(
     facts: &Facts<'_>,

@@ -1,22 +1,14 @@
 //! `NAME_controller.c`: a model's numbers as initialisers of C, and the texts made from Rust, renamed for an instance.
 
 use std::borrow::Borrow;
-use std::ops::Deref;
 
-use askama::Template;
 use nalgebra::DMatrix;
 
-use super::Facts;
-use crate::codegen::Precision;
-use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::mpc::interface::Accepts;
+use super::*;
 use crate::mpc::problem::{Row, pairs};
 use crate::mpc::structured::{LINK_SOFTNESS, LINK_TOLERANCE, TOLERANCE};
-use crate::mpc::{
-    ControlModel, ControlPhase, FallbackSettings, InputGivenState, MpcError, MpcSettings, NO_PHASE,
-    torque_deviation,
-};
-use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, LegShape, STATE_DIM, WrenchFrame};
+use crate::mpc::{ControlPhase, FallbackSettings, InputGivenState, NO_PHASE, torque_deviation};
+use crate::robot::{GRAVITY_M_S2, Leg, LegShape, WrenchFrame};
 
 #[derive(Template)]
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]
@@ -55,13 +47,7 @@ pub(super) struct Source<'a> {
     phases: &'a [PhaseInterface],
 }
 
-impl<'a> Deref for Source<'a> {
-    type Target = Facts<'a>;
-
-    fn deref(&self) -> &Facts<'a> {
-        self.facts
-    }
-}
+extends! { <'a> Source<'a>: Facts<'a>, facts }
 
 impl<'a> Source<'a> {
     pub(super) fn new(

@@ -2,10 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::super::Read;
-use super::expander::{Expander, Meaning, Refusal};
-use super::sections::is_one_of;
-use super::token::{Kind, Token, is_in, spelled};
+use super::*;
 
 type Printed = Read<Option<Token>>;
 

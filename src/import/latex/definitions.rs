@@ -1,10 +1,7 @@
 //! Definitions of macros and environments.
 
-use std::rc::Rc;
-
-use super::expander::{Expander, Macro, Meaning, Refusal};
-use super::sections::is_one_of;
-use super::token::{Kind, Token, has, is_in, spelled};
+use super::expander::Macro;
+use super::*;
 
 const UNREAD_FORM: Refusal = (
     ", a macro of a form that is not read",

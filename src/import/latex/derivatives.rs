@@ -1,8 +1,7 @@
 //! Derivatives with respect to time, however they are written, as dots.
 
-use super::super::equations::Position;
-use super::token::{Kind, Token, group_length, has, is_in};
 use super::variables::is_greek;
+use super::*;
 
 const MAX_DOTS: usize = 3;
 /// Longest group that is looked at: a variable or a differential.

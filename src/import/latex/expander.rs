@@ -1,11 +1,6 @@
 //! What TeX makes of a document before it prints: macros replaced, definitions held until their scope ends.
 
-use std::collections::HashMap;
-use std::rc::Rc;
-
-use super::super::{ImportError, Read};
-use super::sections::is_one_of;
-use super::token::{Kind, Lexer, Token};
+use super::*;
 
 const MAX_EXPANDED: usize = 500_000;
 

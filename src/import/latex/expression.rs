@@ -2,12 +2,9 @@
 //! is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash (`2/3z_1`, `z_1/2u_1`), a number
 //! after a variable. Nesting is limited, so the machine's stack is safe.
 
-use super::super::Read;
-use super::super::equations::{Equation, Position};
-use super::reader::{BARE, Last, Reader};
-use super::token::{Kind, Token, has, is_in};
-use super::variables::{Symbol, function};
-use crate::model::LatentVariable;
+use super::super::equations::Equation;
+use super::variables::Symbol;
+use super::*;
 
 const FACTOR: &str = "a number, a variable, a function or a group";
 const BARS: &[&str] = &["|", "\\rvert", "\\vert", "\\|"];

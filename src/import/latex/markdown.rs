@@ -1,9 +1,6 @@
 //! The mathematics of a Markdown file as tokens.
 
-use std::ops::Range;
-
-use super::super::equations::Position;
-use super::token::{Kind, Lexer, Token};
+use super::*;
 
 /// What stretches over lines, with its ends: displays, and what is not printed as mathematics.
 const STRETCHES: [(&str, &str); 6] = [

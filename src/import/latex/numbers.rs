@@ -2,14 +2,8 @@
 //! macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single digit as an argument (`x^12`,
 //! `\frac12`), the number ends behind it.
 
-use std::ops::Range;
-
-use super::super::Read;
-use super::super::equations::Position;
 use super::definitions::changes_digits;
-use super::reader::{Digits, Last, Reader};
-use super::token::{Kind, Token, has, is_in};
-use super::variables::function;
+use super::*;
 
 /// Most pieces under an odd root, which are written twice, and so again in each root around it.
 const MAX_ODD_RADICAND: usize = 1000;

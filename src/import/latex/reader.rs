@@ -1,13 +1,8 @@
 //! A display being read: its tokens, groups, and the pieces made of it.
 
-use std::ops::Range;
-
-use super::super::equations::{Piece, Position};
-use super::super::{ImportError, Read};
-use super::expression::LeftSide;
+use super::super::equations::Piece;
 use super::numbers::around_digits;
-use super::token::{Kind, Token, is_in};
-use super::variables::SymbolNames;
+use super::*;
 
 const MAX_DEPTH: usize = 60;
 

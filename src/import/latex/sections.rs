@@ -1,15 +1,9 @@
 //! From a document's displays to sections of equations: one per phase.
 
-use super::super::equations::{Position, Section, Sections, complete, text_of};
-use super::super::{ImportError, Read};
+use super::super::equations::{Section, complete, text_of};
 use super::derivatives::with_dots;
-use super::expander::Expander;
-use super::expression::LeftSide;
-use super::markdown;
 use super::numbers::without_operator_braces;
-use super::reader::{Digits, Reader};
-use super::token::{Kind, Token, group_length, is_in};
-use super::variables::SymbolNames;
+use super::*;
 
 /// Reads a document's equations; comments `Phase NAME` and headings rank before labels that end in `known` phases.
 pub(in crate::import) fn read(

@@ -1,9 +1,9 @@
 //! Tokens of LaTeX with their places, as TeX takes them from a file: one after the other.
 
-use std::collections::{HashMap, HashSet, VecDeque};
+use std::collections::{HashSet, VecDeque};
 use std::sync::LazyLock;
 
-use super::super::equations::Position;
+use super::*;
 
 const MINUS: char = '\u{2212}';
 const RAISED: &str = "⁰¹²³⁴⁵⁶⁷⁸⁹";

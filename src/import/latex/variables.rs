@@ -2,12 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::super::equations::Position;
-use super::super::{ImportError, Read};
-use super::reader::{BARE, Last, Reader};
-use super::token::{Kind, has, is_in};
-use crate::model::{LatentVariable, MAX_LATENT_DIM};
-use crate::symbolic::Function;
+use super::*;
+use crate::model::MAX_LATENT_DIM;
 
 pub(super) struct Symbol {
     pub(super) name: String,

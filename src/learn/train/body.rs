@@ -1,11 +1,6 @@
 //! Coordinates of the body whose momentum is a row of the encoder.
 
-use std::fmt;
-use std::str::FromStr;
-
-use serde::{Deserialize, Serialize};
-
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM};
+use super::*;
 
 pub(super) const PITCH: usize = JOINT_DIM + 4;
 /// In the order of their rows: those in the plane of a symmetric motion, then those that change sign in a mirror image.
@@ -25,7 +20,7 @@ const ALL: &str = "all";
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct BodyRows {
-    coordinates: Vec<usize>, // indices of the state, in the order of `NAMED`
+    pub(super) coordinates: Vec<usize>, // indices of the state, in the order of `NAMED`
 }
 
 impl BodyRows {
@@ -40,15 +35,6 @@ impl BodyRows {
         Self {
             coordinates: NAMED[..count].iter().map(|(_, of)| *of).collect(),
         }
-    }
-
-    /// Indices of the state, in the order of the rows.
-    pub(super) fn coordinates(&self) -> &[usize] {
-        &self.coordinates
-    }
-
-    pub(super) fn has_pitch(&self) -> bool {
-        self.coordinates.contains(&PITCH)
     }
 
     /// Whether a row changes sign in a mirror image: there is more than the motion in the plane.

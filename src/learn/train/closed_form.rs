@@ -1,14 +1,9 @@
 //! Training without descent over the dynamics: encoder, decoder and Xi one after the other, in seconds.
 
-use super::error::TrainError;
 use super::latent::least_squares_decoder;
-use super::metrics::Trained;
-use super::options::TrainOptions;
-use super::progress::Monitor;
 use super::seeds::{Outcome, Seeds};
 use super::subspace::find_subspace;
-use super::task::{Origin, Recordings, Task};
-use crate::robot::Robot;
+use super::*;
 
 /// Learns a model: encoder by its row space (`subspace`), decoder by least squares, Xi by sparse regression, chosen
 /// among many by rollouts (`select`). A cancelled training ends with the seeds begun by then. Deterministic.

@@ -1,20 +1,10 @@
 //! Recordings as training data: scaled, cut into the phases of the model, divided into sets.
 
-use std::fmt;
-use std::ops::Range;
-use std::path::PathBuf;
-use std::str::FromStr;
-
-use nalgebra::{DMatrix, DVector};
-
-use super::error::TrainError;
-use super::random::Random;
-use super::subspace::Moments;
+use super::*;
 use crate::evaluate::is_plausible;
-use crate::model::InputStatistics;
+use crate::recording::Segment;
 use crate::recording::preprocess::moving_average;
-use crate::recording::{PhaseRule, Recording, Segment};
-use crate::robot::{ContactFlags, FeetRule, InputRule, JOINT_DIM, STATE_DIM, WrenchFrame};
+use crate::robot::ContactFlags;
 
 /// Fewest samples of a segment, and of a phase over all segments.
 pub const MIN_SAMPLES: usize = 50;
@@ -93,10 +83,6 @@ pub(super) struct Jump {
 impl Jump {
     pub(super) fn samples(&self) -> usize {
         self.time_s.len()
-    }
-
-    pub(super) fn torque_samples(&self) -> impl Iterator<Item = usize> {
-        (0..self.samples()).filter(|sample| !self.implausible.contains(sample))
     }
 }
 

@@ -1,11 +1,9 @@
 //! What can keep a model from being trained.
 
-use std::path::PathBuf;
-
 use thiserror::Error;
 
+use super::*;
 use crate::limits::OutOfRange;
-use crate::model::ModelError;
 use crate::recording::RecordingError;
 
 #[derive(Debug, Error)]

@@ -2,10 +2,9 @@
 //!
 //! Each step of the library's tape is computed for all samples of a batch before the next one starts.
 
-use nalgebra::DMatrix;
-
+use super::*;
 use crate::ir::{LIMIT, reduced_sin_cos, sin_cos};
-use crate::model::{LatentVariable, Library, Step, Tape};
+use crate::model::{Step, Tape};
 use crate::symbolic::SymbolId;
 
 /// Declares a function without result that runs with the widest vectors that the processor has.

@@ -1,19 +1,10 @@
 //! Encoder rows known from physics: momentum of the robot, and feet that stand still.
 
-use std::ops::Range;
-
-use nalgebra::{DMatrix, DVector};
-
-use super::body::{BodyRows, PITCH, is_lateral};
-use super::dataset::{Dataset, Jump, centred, mean};
-use super::latent::input_projection;
-use super::options::Coordinates;
+use super::body::PITCH;
+use super::*;
 use crate::model::complement;
 use crate::recording::stretches;
-use crate::robot::{
-    BODY_X, BODY_Z, FOOT_DIM, FeetRule, GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot,
-    STATE_DIM, WrenchFrame,
-};
+use crate::robot::{FOOT_DIM, LEG_JOINT_DIM, Leg};
 
 pub(super) const TURN: usize = 2; // the row of pitch, where there is one
 /// Rows of the legs: feet forwards and upwards, of the front pair and of the rear pair.
@@ -76,7 +67,7 @@ impl Frame {
             return Self::plain(active);
         }
         let spatial = body.is_spatial();
-        let rows = body.coordinates().to_vec();
+        let rows = body.coordinates.clone();
         let momentum = momentum_rows(training, &rows, robot);
         let mut held: Vec<DVector<f64>> =
             momentum.column_iter().map(|row| row.into_owned()).collect();
@@ -200,7 +191,7 @@ fn without(free: DMatrix<f64>, rows: &[DVector<f64>]) -> DMatrix<f64> {
 
 /// Whether the rows of the legs are among those that are held, as far as the recordings identify them.
 pub(super) fn has_leg_rows(body: &BodyRows, latent_dim: usize) -> bool {
-    body.has_pitch() && latent_dim >= body.coordinates().len() + LEG_ROWS
+    body.coordinates.contains(&PITCH) && latent_dim >= body.coordinates.len() + LEG_ROWS
 }
 
 /// Orthonormal directions of the pairs of a left and a right joint with one among `active`: with `parity` 1 those that a

@@ -271,12 +271,12 @@ impl Data<'_> {
                 let offset = self.features.constant_term().filter(|_| is_flight);
                 families.push(Family::share(&xi, offset).shifted(control.remove(&k)));
             }
-            let changes = families
+            let mut changes = families
                 .iter()
                 .filter_map(|family| Some((family, family.change(&all, &parts, k, &xi)?)));
             // In flight the equation as a whole, if it changes: of few flights single terms are guesses.
             let best = match is_flight {
-                true => changes.last(),
+                true => changes.next_back(),
                 false => changes.max_by(|(_, a), (_, b)| a.gain.total_cmp(&b.gain)),
             };
             let Some((family, change)) = best else {

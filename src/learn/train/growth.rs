@@ -3,15 +3,9 @@
 //! phases of durations `T_1 ... T_k` it is multiplied by `M = e^(A_k T_k) ... e^(A_1 T_1)`, whose eigenvalues `mu` have
 //! rates `ln|mu| / sum T`: feedback that is stable in every phase may still grow through their sequence.
 
-use std::collections::BTreeMap;
-use std::ops::Range;
+use nalgebra::Complex;
 
-use nalgebra::{Complex, DMatrix, DVector};
-
-use super::dataset::Dataset;
-use super::features::{FeatureValues, Features};
-use super::latent::EncodedSet;
-use super::rollout::Xi;
+use super::*;
 use crate::evaluate::{eigenvalues, state_matrix};
 
 const STEPS: usize = 30; // of least change, before coefficients are scaled down instead

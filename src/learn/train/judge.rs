@@ -1,13 +1,7 @@
 //! Scores of candidate dynamics: the error of their rollouts on a set of jumps.
 
-use std::ops::Range;
-
-use nalgebra::{DMatrix, DVector};
-
-use super::features::Features;
-use super::latent::{EncodedSet, Latent};
-use super::rollout::{Candidate, Change, Window, Xi, plain, predict, predict_changed, windows};
-use crate::sim::Restart;
+use super::rollout::predict_changed;
+use super::*;
 
 const ROLLOUT_WEIGHT: f64 = 0.2; // of whole-jump rollouts against predictions of 0.1 s
 const THINNED: usize = 5; // samples between errors that coefficients are refined by

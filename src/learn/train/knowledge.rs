@@ -1,19 +1,8 @@
 //! What is known of the latent dynamics before a regression, in the coordinates of a [`Frame`].
 
-use std::ops::Range;
-
-use nalgebra::{DMatrix, DVector};
-
-use super::body::is_lateral;
-use super::dataset::Dataset;
-use super::features::Features;
-use super::frame::{Frame, LegRow, TURN};
-use super::latent::EncodedSet;
-use super::metrics::PLACE;
-use super::options::BodyEquations;
-use super::sparse::Regression;
+use super::frame::{LegRow, TURN};
 use super::weak_form::flight_samples;
-use crate::robot::{BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2};
+use super::*;
 
 const Y: usize = BODY_X + 1;
 const HEIGHT: usize = 1; // the momentum row upwards
@@ -167,10 +156,6 @@ impl Knowledge {
 
     pub(super) fn standing(&self, column: usize) -> Option<&Standing> {
         self.standing.iter().find(|of| of.column == column)
-    }
-
-    pub(super) fn keeps(&self, term: usize) -> bool {
-        self.kept.row(term).iter().any(|kept| *kept)
     }
 
     /// What is known of each phase in a frame that holds momentum: the centre of mass as `z1` (forwards) and `z2`

@@ -1,12 +1,8 @@
 //! Latent samples of a dataset under an encoder, and the decoder that fits them best.
 
-use std::ops::Range;
+use nalgebra::DMatrixViewMut;
 
-use nalgebra::{DMatrix, DMatrixViewMut};
-
-use super::dataset::{Dataset, Jump, centred, mean};
-use super::error::TrainError;
-use crate::model::{AffineMap, StateMap};
+use super::*;
 
 const FITS: &str = "invariant: a trained or checked map takes the robot's coordinates";
 

@@ -1,19 +1,9 @@
 //! How good a model is on a set of jumps, and the report of a training.
 
-use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
-
-use super::dataset::{Dataset, Jump, Scaling, mean};
-use super::error::TrainError;
-use super::features::{FeatureValues, Features};
-use super::joint::Losses;
-use super::latent::{EncodedSet, Latent, lift_samples, map_samples};
-use super::rollout::{Candidate, Window, plain, predict, windows};
-use super::select::Choice;
-use crate::model::{ReducedModel, StateMap};
-use crate::recording::Recording;
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM};
-use crate::sim::{Restart, phase_rule};
+use super::dataset::Scaling;
+use super::latent::map_samples;
+use super::*;
+use crate::sim::phase_rule;
 
 pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5]; // place and heading: x, y, yaw
 const SHORT_S: f64 = 0.1;
@@ -126,7 +116,7 @@ fn torque_r2(encoder: &StateMap, set: EncodedSet<'_>) -> f64 {
     let (mut predicted, mut recorded) = (Vec::new(), Vec::new());
     for (jump, samples) in set.dataset.jumps.iter().zip(set.latent) {
         let lift = lift_samples(encoder, &jump.x, &samples.u_lat);
-        for sample in jump.torque_samples() {
+        for sample in (0..jump.samples()).filter(|sample| !jump.implausible.contains(sample)) {
             predicted.extend(recorded_torque(&lift, jump, sample).iter());
             recorded.extend(recorded_torque(&jump.u, jump, sample).iter());
         }

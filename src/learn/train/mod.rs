@@ -50,3 +50,37 @@ pub use options::{
 };
 pub use progress::{Monitor, Progress};
 pub use task::{Origin, Recordings, SourceFile, sha256};
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use serde::{Deserialize, Serialize};
+
+use crate::model::{
+    AffineMap, InputStatistics, LatentVariable, Library, ModelError, ReducedModel, StateMap,
+};
+use crate::recording::{PhaseRule, Recording};
+use crate::robot::{
+    BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, InputRule, JOINT_DIM, Robot, STATE_DIM, WrenchFrame,
+};
+use crate::sim::Restart;
+use body::is_lateral;
+use dataset::{Dataset, Jump, centred, mean};
+use features::{FeatureValues, Features};
+use frame::Frame;
+use growth::Growth;
+use joint::Losses;
+use judge::Judge;
+use knowledge::Knowledge;
+use latent::{EncodedSet, Latent, input_projection, lift_samples};
+use metrics::PLACE;
+use random::Random;
+use rollout::{Candidate, Change, Window, Xi, plain, predict, windows};
+use select::Choice;
+use sparse::{Regression, active_terms};
+use subspace::Moments;
+use task::Task;

@@ -1,26 +1,15 @@
 //! What to train and how.
 
 use clap::ValueEnum;
-use nalgebra::DVector;
-use serde::{Deserialize, Serialize};
 
-use super::body::BodyRows;
-use super::closed_form::closed_form;
-use super::dataset::ScaleOptions;
-use super::error::TrainError;
 use super::frame::has_leg_rows;
-use super::joint::{LossWeights, Schedule, run::joint, unroll::Integrator, unroll::Unroll};
-use super::metrics::Trained;
-use super::progress::Monitor;
-use super::task::{Origin, Recordings};
+use super::joint::{LossWeights, Schedule};
+use super::*;
 use crate::limits::table;
-use crate::model::{Activation, Library, LibraryChoice, MAX_LAYERS, StandardLibrary, check_name};
+use crate::model::{Activation, LibraryChoice, MAX_LAYERS, StandardLibrary, check_name};
 use crate::recording::CHATTER_SAMPLES;
-use crate::recording::PhaseRule;
 use crate::recording::preprocess::BATCH_ROWS;
-use crate::robot::{
-    Actuators, BODY_X, BODY_Z, InputRule, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame,
-};
+use crate::robot::{Actuators, JOINT_NAMES};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -277,7 +266,7 @@ impl TrainOptions {
         table::MASK_STD.check(encoder.least_std)?;
         table::MASK_INPUT_SHARE.check(encoder.least_input_share)?;
         table::SEEDS.check_count(self.n_seeds.max(1))?;
-        let rows = self.body().coordinates().len();
+        let rows = self.body().coordinates.len();
         if rows > self.latent_dim {
             return Err(TrainError::Option {
                 option: "body",

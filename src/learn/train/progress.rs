@@ -16,7 +16,7 @@ pub enum Progress {
 /// Listens to a training and may stop it.
 pub struct Monitor<'a> {
     listener: &'a mut dyn FnMut(Progress),
-    cancel: &'a AtomicBool,
+    pub(super) cancel: &'a AtomicBool,
 }
 
 impl<'a> Monitor<'a> {
@@ -27,10 +27,6 @@ impl<'a> Monitor<'a> {
 
     pub(crate) fn cancelled(&self) -> bool {
         self.cancel.load(Ordering::Relaxed)
-    }
-
-    pub(super) fn cancel_flag(&self) -> &'a AtomicBool {
-        self.cancel
     }
 
     pub(crate) fn stage(&mut self, name: &'static str) {

@@ -2,7 +2,8 @@
 
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
-use nalgebra::DMatrix;
+
+use super::*;
 
 #[derive(Debug)]
 pub(super) struct Random(ChaCha8Rng);

@@ -3,14 +3,9 @@
 //! dropped that these rollouts do not miss, by the quadratic form of the errors (the optimal brain surgeon, Hassibi and
 //! Stork, Second order derivatives for network pruning, NIPS 1992).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-
-use super::growth::Growth;
-use super::judge::Judge;
-use super::knowledge::{Knowledge, brake};
-use super::progress::Monitor;
-use super::rollout::{Change, CoefficientIndex, Xi};
-use super::sparse::active_terms;
+use super::knowledge::brake;
+use super::rollout::CoefficientIndex;
+use super::*;
 
 /// Weight of relative changes of the coefficients, against squared errors that start at 1 for both kinds of windows.
 const PRIOR: f64 = 1e-3;

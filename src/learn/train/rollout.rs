@@ -3,12 +3,9 @@
 
 use std::cmp::Reverse;
 
-use nalgebra::DMatrix;
-
-use super::dataset::Dataset;
-use super::features::{FeatureValues, Features, vectorised};
-use super::latent::EncodedSet;
-use crate::sim::{Restart, restart_windows};
+use super::features::vectorised;
+use super::*;
+use crate::sim::restart_windows;
 
 const DIVERGED: f64 = 1e6; // magnitude of a state from which a rollout counts as diverged
 /// Input of the step (start, middle, end) that each stage has, and its share of the step.

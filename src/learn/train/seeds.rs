@@ -1,16 +1,8 @@
 //! The seeds of a training: the best is kept, those without a model are left out; how far they agree on the terms.
 
-use std::collections::BTreeMap;
-
-use nalgebra::DMatrix;
-
-use super::error::TrainError;
 use super::jumps::{Dynamics, learn_jumps};
-use super::metrics::{SeedReport, Trained};
-use super::progress::Monitor;
-use super::rollout::{Candidate, Xi};
-use super::task::{Fitted, Origin, Task, provenance};
-use crate::model::{LatentVariable, Library, ModelError};
+use super::task::{Fitted, provenance};
+use super::*;
 
 pub(super) type Outcome = Result<(SeedReport, Fitted), TrainError>;
 

@@ -2,20 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::DMatrix;
-use serde::Serialize;
-
-use super::error::TrainError;
-use super::growth::Growth;
-use super::judge::Judge;
-use super::knowledge::Knowledge;
-use super::latent::EncodedSet;
-use super::options::RegressionOptions;
-use super::progress::Monitor;
 use super::refine::{Coefficients, Refiner};
-use super::rollout::Xi;
-use super::sparse::{Pruning, Regression};
+use super::sparse::Pruning;
 use super::weak_form::windowed_samples;
+use super::*;
 
 /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
 const WINDOWS: [usize; 3] = [0, 25, 50];
@@ -193,7 +183,8 @@ impl Refiner<'_> {
         monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'r>> {
         let affine = &self.judge.features.affine;
-        let is_chosen = |term| !self.knowledge.iter().any(|phase| phase.keeps(term));
+        let keeps = |known: &Knowledge, term| known.kept.row(term).iter().any(|kept| *kept);
+        let is_chosen = |term| !self.knowledge.iter().any(|known| keeps(known, term));
         let has_nonlinear = (0..affine.len()).any(|term| !affine[term] && is_chosen(term));
         // The affine terms are still to come where full libraries diverge.
         let enough =

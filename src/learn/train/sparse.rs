@@ -1,9 +1,6 @@
 //! Sparse regression of the latent accelerations.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use serde::Serialize;
-
-use super::knowledge::Knowledge;
+use super::*;
 
 const LEAST_RIDGE: f64 = 1e-10; // on the normalised columns: far above rounding
 const CHANGE_RIDGE: f64 = 1e-2; // of changes from a prior

@@ -2,12 +2,10 @@
 //! runs over orthonormal bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`) of the directions of a [`Frame`];
 //! [`varimax`] then chooses the basis inside the space: as few coordinates per latent as possible.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::SymmetricEigen;
 
 use super::dataset::scaled;
-use super::frame::Frame;
-use super::options::EncoderOptions;
-use super::random::Random;
+use super::*;
 
 #[derive(Clone, Debug)]
 pub(super) struct Moments {

@@ -2,34 +2,18 @@
 
 use std::path::Path;
 
-use nalgebra::DMatrix;
-use serde::Serialize;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
-use super::dataset::{Dataset, mean};
-use super::error::TrainError;
-use super::features::{FeatureValues, Features};
-use super::frame::{Frame, parities, symmetry_classes};
-use super::joint::Losses;
-use super::judge::Judge;
-use super::knowledge::Knowledge;
-use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jacobian};
-use super::metrics::{PLACE, PhaseTerms, SeedReport, SetMetrics, TrainReport, measure};
-use super::options::{EncoderOptions, MirrorImages, TrainOptions};
-use super::progress::Monitor;
-use super::rollout::{Candidate, Xi};
-use super::select::{Choice, select};
-use super::sparse::active_terms;
-use super::subspace::{Moments, order_and_sign, varimax};
+use super::frame::{parities, symmetry_classes};
+use super::latent::mean_jacobian;
+use super::metrics::measure;
+use super::select::select;
+use super::subspace::{order_and_sign, varimax};
 use super::weak_form::check_terms;
+use super::*;
 use crate::files::hex;
-use crate::model::{
-    AffineMap, CoordinateNames, InputGivenState, InputStatistics, JumpPrior, Library, Phase,
-    ReducedModel, ScaleFactors, Scaling, StateMap,
-};
-use crate::recording::Recording;
-use crate::robot::{BODY_X, BODY_Z, Robot};
+use crate::model::{CoordinateNames, InputGivenState, JumpPrior, Phase, ScaleFactors, Scaling};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Recordings<'a> {

@@ -1,11 +1,6 @@
 //! Regression targets over windows: what an acceleration does in the time that a prediction takes.
 
-use nalgebra::DMatrix;
-
-use super::error::TrainError;
-use super::features::{FeatureValues, Features};
-use super::latent::EncodedSet;
-use crate::model::Library;
+use super::*;
 
 const STRIDE: usize = 5; // samples between the starts of two windows
 const FLIGHT_WINDOW: usize = 50; // samples

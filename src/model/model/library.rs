@@ -98,10 +98,6 @@ impl Library {
         Self::of(latent_dim, LibraryChoice::Terms(texts.to_vec()))
     }
 
-    pub fn standard(latent_dim: usize, standard: StandardLibrary) -> Result<Self> {
-        Self::of(latent_dim, LibraryChoice::Standard(standard))
-    }
-
     /// Refuses terms that are zero everywhere or have a constant part beyond the range of floats.
     pub fn of(latent_dim: usize, choice: LibraryChoice) -> Result<Self> {
         check_count("`latent_dim`", latent_dim, "", 1..=MAX_LATENT_DIM)?;

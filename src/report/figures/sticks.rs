@@ -191,12 +191,6 @@ fn points(line: impl IntoIterator<Item = (f64, f64)>) -> String {
     points.collect::<Vec<_>>().join(" ")
 }
 
-fn joined(sticks: &Option<Sticks>) -> String {
-    let lines = sticks.iter().flat_map(|sticks| &sticks.lines);
-    let lines = lines.map(|line| points(line.iter().copied()));
-    lines.collect::<Vec<_>>().join(";")
-}
-
 fn middle(sticks: &Sticks) -> (f64, f64) {
     let (one, other) = (sticks.lines[0][0], sticks.lines[0][2]);
     (0.5 * (one.0 + other.0), 0.5 * (one.1 + other.1))
@@ -222,10 +216,15 @@ pub(crate) fn film(
     let start_s = time_s.first().copied().unwrap_or(0.0);
     let times = (chosen.clone()).map(|k| (1e3 * (time_s[k] - start_s)).round() / 1e3);
     let times: Vec<f64> = times.collect();
-    let lines: Vec<Vec<String>> = (sticks.iter())
-        .map(|motion| motion.iter().map(joined).collect())
-        .collect();
-
+    let joined = |sticks: &Option<Sticks>| {
+        let lines = sticks.iter().flat_map(|sticks| &sticks.lines);
+        let lines = lines.map(|line| points(line.iter().copied()));
+        lines.collect::<Vec<_>>().join(";")
+    };
+    let lines = sticks
+        .iter()
+        .map(|motion| motion.iter().map(joined).collect());
+    let lines: Vec<Vec<String>> = lines.collect();
     let [x, z] = extent_m(sticks.iter().flatten().flatten(), floor_m);
     let millimetres = |value: f64| (1e3 * value).round();
     let (left, top) = (millimetres(x.0), -millimetres(z.1));

@@ -1,14 +1,6 @@
 //! Calls: which function of the sources they mean, and its const arguments.
 
-use std::collections::BTreeMap;
-
-use syn::Expr;
-
-use crate::Found;
-use crate::expression::Value;
-use crate::function::{Instance, Writer};
-use crate::items::Function;
-use crate::types::Type;
+use super::*;
 
 impl Writer<'_> {
     pub(crate) fn call(

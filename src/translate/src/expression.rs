@@ -1,13 +1,8 @@
 //! Expressions, their types, and the functions that they call.
 
-use std::collections::BTreeMap;
+use syn::{BinOp, Lit, UnOp};
 
-use syn::{BinOp, Expr, Lit, UnOp};
-
-use crate::Found;
-use crate::function::{Instance, Writer};
-use crate::items::Items;
-use crate::types::Type;
+use super::*;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Value {

@@ -1,12 +1,8 @@
 //! Functions: which are needed, and their order.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use crate::Found;
-use crate::items::{Function, Items};
+use super::*;
 use crate::statement::Lines;
-use crate::text::{comment, wrapped};
-use crate::types::Type;
+use crate::text::wrapped;
 
 /// What the functions need, and their text, callees first.
 pub(crate) struct Writer<'a> {

@@ -1,15 +1,10 @@
 //! Structs, enums, constants and functions of the sources by name; needed types and constants come before functions.
 
-use std::collections::{BTreeMap, BTreeSet};
+use syn::{Attribute, FnArg, ImplItem, Item, ReturnType, Signature, TraitItem};
 
-use syn::spanned::Spanned;
-use syn::{Attribute, Block, Expr, FnArg, ImplItem, Item, Pat, ReturnType, Signature, TraitItem};
-
+use super::*;
 use crate::expression::operator;
-use crate::function::Writer;
-use crate::text::{comment, snake};
-use crate::types::Type;
-use crate::{Fault, Found, Source, Translated, Unit};
+use crate::text::snake;
 
 /// Const parameters that stay names in C.
 pub(crate) const SIZES: [&str; 2] = ["NX", "NU"];

@@ -28,9 +28,17 @@ mod statement;
 mod text;
 mod types;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::{fmt, fs};
+
+use syn::{Block, Expr, Pat, spanned::Spanned};
+
+use expression::Value;
+use function::{Instance, Writer};
+use items::{Function, Items};
+use text::comment;
+use types::Type;
 
 /// A source: its path for faults, and its text.
 #[derive(Debug, Clone)]
@@ -52,7 +60,7 @@ pub struct Fault {
     pub message: String,
 }
 
-pub(crate) type Found<T = expression::Value> = Result<T, Fault>;
+pub(crate) type Found<T = Value> = Result<T, Fault>;
 
 impl Fault {
     fn at(path: &str, line: usize, message: impl ToString) -> Self {
@@ -125,8 +133,8 @@ fn words(users: &[Source]) -> BTreeMap<&str, (&str, usize)> {
 
 /// Translates the functions that a unit is for, and all that they need.
 pub fn translate(sources: &[Source], unit: &Unit<'_>) -> Result<Translated, Fault> {
-    let items = items::Items::read(sources, unit)?;
-    let mut writer = function::Writer::new(&items);
+    let items = Items::read(sources, unit)?;
+    let mut writer = Writer::new(&items);
     let words = words(unit.users);
     for ((owner, name), function) in &items.functions {
         let is_called = words.contains_key(format!("{}(", items.method(owner, name)).as_str());

@@ -1,15 +1,8 @@
 //! Statements.
 
-use std::collections::BTreeMap;
+use syn::{Local, Stmt};
 
-use syn::spanned::Spanned;
-use syn::{Block, Expr, Local, Pat, Stmt};
-
-use crate::expression::Value;
-use crate::function::{Instance, Writer};
-use crate::text::comment;
-use crate::types::Type;
-use crate::{Fault, Found};
+use super::*;
 
 #[derive(Default)]
 pub(crate) struct Lines {

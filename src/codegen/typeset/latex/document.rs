@@ -1,22 +1,10 @@
 //! The files of the LaTeX backend.
 
-use std::fmt;
-
-use askama::Template;
-
-use super::math::{
-    self, Block, comment_text, label, tex, tex_number, tex_symbol, tex_text, tex_unit,
-};
-use super::table::{self, TableBlock};
-use crate::equations::{Equations, Unit};
-use crate::files::EmittedFile;
-use crate::model::{Activation, Identifier, LatentVariable, ReducedModel, ScaleFactors, StateMap};
-use crate::typeset::decimal::RoundingReport;
-use crate::typeset::words::{self, Spelling};
-use crate::typeset::{
-    Decimal, Emitted, EquationSystem, Form, NumberStyle, PrintOptions, RobotTypeset, Rounding,
-    Typeset, TypesetError, words::rendered,
-};
+use super::math::{Block, comment_text};
+use super::table::TableBlock;
+use super::*;
+use crate::model::{Activation, Identifier, ReducedModel, ScaleFactors, StateMap};
+use crate::typeset::words;
 
 /// The LaTeX files of a model; NAME is its identifier:
 ///
@@ -28,7 +16,7 @@ use crate::typeset::{
 /// # Errors
 /// [`TypesetError`] if a coefficient is too large for a float in robot coordinates.
 pub fn emit(system: &Equations<'_>, options: &PrintOptions) -> Emitted {
-    let model = system.model();
+    let model = &*system.model;
     let typeset = Typeset::new(system, &options.symbols, options.rounding);
     let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
     let stem = model.identifier().as_str();
@@ -259,7 +247,7 @@ const STRONGEST: usize = 3; // of an encoder row's weights are named
 const NEGLIGIBLE: f64 = 0.1; // share of the row's largest weight below which none is named
 
 fn symbol_list<'a>(system: &Equations<'_>, header: String, options: &PrintOptions) -> Document<'a> {
-    let (model, units) = (system.model(), system.latent_units());
+    let (model, units) = (&*system.model, system.latent_units());
     let (dim, numbers) = (model.latent_dim(), options.numbers);
     let symbol = |variable| format!("${}$", tex_symbol(&options.symbols.symbol(variable)));
     // `$z_1, \dots, z_6$`, or all of up to three.

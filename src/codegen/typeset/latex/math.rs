@@ -1,14 +1,7 @@
 //! The LaTeX spelling of the typeset tree, of equations in `cases` or `align`, and of text from outside.
 
-use crate::equations::Unit;
-use crate::files::is_invisible;
-use crate::symbolic::Function;
-use crate::typeset::tree::{function_name, greek_letter};
-use crate::typeset::words::code_point;
-use crate::typeset::{
-    Decimal, EQUALS, Equation, EquationSystem, Form, Glyph, Math, NumberStyle, PrintOptions,
-    Signed, Symbol, break_lines, symbol_width,
-};
+use super::*;
+use crate::typeset::tree::function_name;
 
 pub(crate) fn tex(math: &Math, numbers: NumberStyle) -> String {
     let inner = |math: &Math| tex(math, numbers);
@@ -63,11 +56,11 @@ pub(crate) fn tex_terms(terms: &[Signed], numbers: NumberStyle, continues: bool)
 }
 
 pub(crate) fn tex_number(number: &Decimal, numbers: NumberStyle) -> String {
-    match (numbers, number.exponent()) {
+    match (numbers, number.exponent) {
         (NumberStyle::Plain, None) => number.to_string(),
         (NumberStyle::Plain, Some(exponent)) => {
-            let sign = if number.is_negative() { "-" } else { "" };
-            format!(r"{sign}{} \times 10^{{{exponent}}}", number.digits())
+            let sign = if number.negative { "-" } else { "" };
+            format!(r"{sign}{} \times 10^{{{exponent}}}", number.digits)
         }
         (NumberStyle::Siunitx, _) => format!(r"\num{{{number}}}"),
     }

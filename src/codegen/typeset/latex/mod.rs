@@ -1,4 +1,4 @@
-//! Equations for papers: [`Equations`](crate::equations::Equations) enter, LaTeX files leave.
+//! Equations for papers: [`Equations`] enter, LaTeX files leave.
 //!
 //! Read [`emit`] first: it names the files. Names from a model file pass through `tex_text` and nothing else.
 //!
@@ -27,3 +27,6 @@ mod table;
 pub use document::emit;
 pub use math::tex_cases;
 pub(crate) use math::{tex, tex_symbol, tex_unit};
+
+use super::*;
+use math::{label, tex_number, tex_text};

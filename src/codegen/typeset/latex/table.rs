@@ -1,9 +1,7 @@
 //! The coefficients as booktabs tables.
 
-use crate::typeset::{CoefficientRow, CoefficientTable, Decimal, NumberStyle, width};
-
 use super::document::is_narrow;
-use super::math::{label, tex, tex_number, tex_symbol, tex_text, tex_unit};
+use super::*;
 
 const TERM_HEAD_EM: f64 = 2.31;
 const COLUMN_SPACE_EM: f64 = 1.2; // around a column: twice LaTeX's `\tabcolsep` at 10 pt
@@ -177,7 +175,7 @@ fn cell(number: &Decimal, width: &ColumnWidth, numbers: NumberStyle) -> String {
     // Points stand below each other when the missing digits take their space.
     let (_, decimals) = number.places();
     let point = if decimals == 0 { "." } else { "" };
-    let pad = match (number.exponent(), width.decimals - decimals) {
+    let pad = match (number.exponent, width.decimals - decimals) {
         (Some(_), _) | (None, 0) => String::new(),
         (None, missing) => format!(r"\phantom{{{point}{}}}", "0".repeat(missing)),
     };
@@ -199,10 +197,10 @@ impl ColumnWidth {
         let mut width = Self::default();
         for number in rows.filter_map(|row| row.coefficients[column].as_ref()) {
             let (integers, decimals) = number.places();
-            width.negative |= number.is_negative();
+            width.negative |= number.negative;
             width.integers = width.integers.max(integers);
             width.decimals = width.decimals.max(decimals);
-            if let Some(exponent) = number.exponent() {
+            if let Some(exponent) = number.exponent {
                 let digits = exponent.unsigned_abs().to_string().len();
                 width.exponent = width.exponent.max(digits);
                 width.negative_exponent |= exponent < 0;

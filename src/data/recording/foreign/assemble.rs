@@ -1,19 +1,11 @@
 //! Quantities of a log, each with its clock, to the segments of a recording.
 
-use std::borrow::Cow;
-use std::collections::BTreeMap;
-use std::ops::Range;
-use std::path::Path;
-
-use nalgebra::DMatrix;
-
-use super::elements::{QUATERNION, Quantity, angle_rates, angles_of_quaternions, in_world, unwrap};
-use super::map::{ColumnMap, Frame, Origin};
-use super::signal::{Log, Signal, Source};
-use crate::recording::error::{Outcome, RecordingFault, unexpected};
-use crate::recording::preprocess::{differences, differences_within, place};
-use crate::recording::reader::{Column, Reading};
-use crate::recording::segment::{DERIVED_DDX, EPOCH_S, Recording, Rows, Segment, divided, ranges};
+use super::elements::{angle_rates, in_world, unwrap};
+use super::map::Origin;
+use super::signal::{Signal, Source};
+use super::*;
+use crate::recording::preprocess::{differences_within, place};
+use crate::recording::segment::{DERIVED_DDX, EPOCH_S, divided, ranges};
 use crate::robot::FOOT_DIM;
 
 const MAX_GAP_S: f64 = 0.05; // largest distance between samples of a topic that is interpolated, in s

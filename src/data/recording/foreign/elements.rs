@@ -3,13 +3,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::Matrix3;
 
-use super::map::Frame;
-use crate::recording::reader::Column;
-use crate::recording::segment::Rows;
-use crate::robot::rotation;
-use crate::robot::{JOINT_DIM as BODY, JOINT_NAMES};
+use super::*;
+use crate::robot::JOINT_DIM as BODY;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Quantity {

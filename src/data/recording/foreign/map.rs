@@ -10,14 +10,8 @@
 //! unit = "deg"
 //! ```
 
-use std::collections::BTreeMap;
-use std::path::Path;
-
-use serde::Deserialize;
-
-use super::elements::Quantity;
+use super::*;
 use crate::files::size::read_toml;
-use crate::recording::error::{Outcome, RecordingError, io_fault, text, unexpected};
 
 const MOST: usize = 10_000; // most columns that a range stands for
 

@@ -2,21 +2,18 @@
 //! one by one and chunks unpacked one at a time. A file that ends early gives what its whole records and chunks hold.
 //! Folders of ROS 2 bags have the MCAP files that one recording was split into.
 
-use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
 
+use ::mcap::read::parse_record;
+use ::mcap::records::{ChunkHeader, Record, op};
 use flate2::Crc;
-use mcap::read::parse_record;
-use mcap::records::{ChunkHeader, Record, op};
 use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
 
-use super::signal::Log;
 use super::topics::Topics;
+use super::*;
 use crate::files::magic::{MAGIC_BYTES, MCAP, recognised};
 use crate::files::size::{Capped, Format, read_text_capped};
-use crate::recording::error::{Checked, Outcome, RecordingFault, io_fault, text, unexpected};
 
 const RECORD_HEADER: usize = 9; // bytes of a record before its contents: its kind and their length
 const LEAST_WINDOW: u64 = 1 << 23; // window of a zstd frame that every chunk may have, in bytes
@@ -30,7 +27,8 @@ pub(crate) fn is_mcap(path: &Path) -> bool {
         let read = file.and_then(|mut file| file.read_to_end(&mut start));
         read.is_ok() && start == MCAP
     };
-    is_bag(path)
+    // A bag is the folder of its files and, mostly, the list of them.
+    (path.is_dir() && (path.join(METADATA).is_file() || !parts(path).is_empty()))
         || ending.is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"))
         || (path.is_file() && begins())
 }
@@ -313,10 +311,6 @@ fn unpacked<'a>(header: &ChunkHeader, data: Bytes<'a>, left: u64) -> Result<Byte
 
 const METADATA: &str = "metadata.yaml"; // the list of files in a bag's folder
 const ENDINGS: [&str; 4] = [".mcap", ".db3", ".mcap.zstd", ".mcap.zst"]; // endings of files that bags are made of
-
-fn is_bag(path: &Path) -> bool {
-    path.is_dir() && (path.join(METADATA).is_file() || !parts(path).is_empty())
-}
 
 /// The files of a log: the path itself, or those of the bag that the folder is; and notes on files that are left out.
 fn files(path: &Path) -> Outcome<(Vec<PathBuf>, Vec<String>)> {

@@ -1,15 +1,12 @@
 //! A recording as an MCAP file of ROS 2 messages, which robots' own tools open and romc reads back.
 
-use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
-use mcap::records::MessageHeader;
-use mcap::{WriteOptions, Writer};
-use nalgebra::{DMatrix, UnitQuaternion, Vector3};
+use ::mcap::records::MessageHeader;
+use ::mcap::{WriteOptions, Writer};
+use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::recording::segment::Segment;
-use crate::robot::rotation;
-use crate::robot::{JOINT_DIM, JOINT_NAMES, Leg, Robot};
+use super::*;
 
 const JOINT_STATE: &str = "std_msgs/Header header\n
 string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
@@ -46,7 +43,7 @@ pub(crate) fn write_mcap(
     destination: impl Write + Seek,
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,
-) -> Result<(), mcap::McapError> {
+) -> Result<(), ::mcap::McapError> {
     const LIBRARY: &str = concat!("romc ", env!("CARGO_PKG_VERSION"));
     let options = WriteOptions::new().compression(None).profile("ros2");
     let options = options.library(LIBRARY);
@@ -59,7 +56,7 @@ pub(crate) fn write_mcap(
     let mut topic = |schema, topic| writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
     let (joints, odom) = (topic(joint, JOINT_TOPIC)?, topic(body, BODY_TOPIC)?);
     let contacts = topic(joint, FEET_TOPIC)?;
-    let with_topic = |inputs| Ok::<_, mcap::McapError>((topic(joint, INPUT_TOPIC)?, inputs));
+    let with_topic = |inputs| Ok::<_, ::mcap::McapError>((topic(joint, INPUT_TOPIC)?, inputs));
     let inputs = inputs.map(with_topic).transpose()?;
     let names = JOINT_NAMES.map(str::to_owned);
     let feet = Leg::ALL.map(|leg| leg.to_string());

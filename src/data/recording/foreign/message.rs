@@ -1,8 +1,6 @@
 //! Messages of ROS 1 and 2 as numbers with names, by the definition that a log carries. Faults are words.
 
-use std::collections::BTreeMap;
-
-use crate::recording::clock::Instant;
+use super::*;
 
 const MOST_ENTRIES: usize = 64; // longest array whose entries become columns: an image is no column
 const MOST_NUMBERS: usize = 4096; // most numbers of a message
@@ -96,8 +94,9 @@ impl Definition {
             let fault = || format!("definition: found `{line}`, expected a type and a name");
             let (kind, rest) = line.split_once(char::is_whitespace).ok_or_else(fault)?;
             let field = rest.split_whitespace().next().ok_or_else(fault)?;
-            if is_constant(rest) {
-                continue;
+            let first = rest.split(['=', ' ', '\t']).next().unwrap_or_default();
+            if rest[first.len()..].trim_start().starts_with('=') {
+                continue; // a constant: `NAME=value`, or `NAME = value`
             }
             let (base, count) = counted(kind).ok_or_else(fault)?;
             let full = match base {
@@ -139,12 +138,6 @@ fn ends_early(bytes: &[u8]) -> String {
 /// `sensor_msgs/msg/JointState` and `sensor_msgs/JointState` are the same type.
 fn short(name: &str) -> String {
     name.replace("/msg/", "/")
-}
-
-/// `NAME=value`, or `NAME = value`.
-fn is_constant(rest: &str) -> bool {
-    let name = rest.split(['=', ' ', '\t']).next().unwrap_or_default();
-    rest[name.len()..].trim_start().starts_with('=')
 }
 
 fn counted(kind: &str) -> Option<(&str, Count)> {
@@ -251,7 +244,9 @@ impl<'a> Cursor<'a> {
             }
             let has_names = is_named && known == count;
             for entry in 0..count {
-                self.count_field()?;
+                // Each field has a byte at least, but for empty messages.
+                self.fields += 1;
+                self.require(self.fields <= self.bytes.len() + MOST_EMPTY)?;
                 if self.named {
                     self.path.truncate(before);
                     self.append(field, entry, has_names.then(|| &names[entry][..]));
@@ -286,12 +281,6 @@ impl<'a> Cursor<'a> {
         self.out.names.extend(self.named.then(|| self.path.clone()));
         self.out.values.push(value);
         Ok(())
-    }
-
-    /// Counts a field: each has a byte at least, but for empty messages.
-    fn count_field(&mut self) -> Result<(), String> {
-        self.fields += 1;
-        self.require(self.fields <= self.bytes.len() + MOST_EMPTY)
     }
 
     fn require(&self, is_there: bool) -> Result<(), String> {

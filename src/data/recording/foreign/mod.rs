@@ -20,3 +20,14 @@ pub(super) use map::TextFormat;
 pub(super) use mcap::{is_mcap, read_mcap};
 pub(super) use mcap_write::write_mcap;
 pub(super) use text::{read_lines, read_texts};
+
+use super::*;
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use crate::recording::{clock::Instant, error::Checked, lines::MAX_ROWS, segment::Rows};
+use crate::robot::{JOINT_NAMES, rotation};
+use elements::{QUATERNION, Quantity};
+use map::Frame;
+use signal::{Channel, Log};

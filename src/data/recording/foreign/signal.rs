@@ -1,13 +1,8 @@
 //! A log as it was read: named columns of numbers; and one quantity taken from it, in SI units and romc's order.
 
-use std::path::PathBuf;
-
-use nalgebra::DMatrix;
-
-use super::elements::{Dimension, QUATERNION, Quantity, named, ordered};
-use super::map::{ColumnMap, Factors, List, Name, Table};
-use crate::recording::clock::Instant;
-use crate::recording::error::{Outcome, RecordingError, RecordingFault};
+use super::elements::{Dimension, named, ordered};
+use super::map::{Factors, List, Name, Table};
+use super::*;
 use crate::recording::reader::folded;
 
 #[derive(Debug, Clone)]

@@ -1,15 +1,9 @@
 //! Text files as logs: any separator, with or without header; or romc's own format.
 
-use std::path::Path;
-
-use super::map::{ColumnMap, Delimiter, TextFormat};
-use super::signal::{Channel, Log};
-use crate::recording::clock::Instant;
-use crate::recording::error::{
-    Checked, Outcome, RecordingError, RecordingFault, shortened, text, unexpected,
-};
-use crate::recording::lines::{self, Lines, MAX_ROWS, NumberReader};
-use crate::recording::reader::Column;
+use super::map::Delimiter;
+use super::*;
+use crate::recording::error::shortened;
+use crate::recording::lines::{self, Lines, NumberReader};
 
 const LARGE: f64 = 1e8; // numbers from which a column is kept as times: beyond, one number does not hold a microsecond
 

@@ -2,15 +2,10 @@
 //! whose lists have other names or lengths belong to another table of the topic. Rows are sorted by the time of
 //! recording, late stamps into their place, and exact repeats are dropped; a note says so.
 
-use std::collections::BTreeMap;
-
-use mcap::records::{Channel as Declared, SchemaHeader};
+use ::mcap::records::{Channel as Declared, SchemaHeader};
 
 use super::message::{Definition, Layout, Value, undefined, unknown_encoding};
-use super::signal::{Channel, Log};
-use crate::recording::clock::Instant;
-use crate::recording::error::{RecordingFault, text};
-use crate::recording::lines::MAX_ROWS;
+use super::*;
 
 const MOST_TABLES: usize = 16; // most tables of a topic
 const MOST_ARRANGEMENTS: usize = 64; // most arrangements of lists that are kept in mind

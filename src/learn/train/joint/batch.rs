@@ -1,12 +1,9 @@
 //! Batches of consecutive samples.
 
-use nalgebra::DMatrix;
-
 use super::parameters::Frame;
-use crate::recording::Recording;
+use super::*;
 use crate::recording::preprocess::{BATCH_ROWS, moving_average, prepare};
-use crate::train::dataset::{Dataset, scaled};
-use crate::train::error::TrainError;
+use crate::train::dataset::scaled;
 
 /// Consecutive samples of one phase, rows are samples, scaled units.
 pub(super) struct Batch {

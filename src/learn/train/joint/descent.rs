@@ -2,9 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::batch::Batch;
-use super::loss::{JointLoss, Losses};
-use super::parameters::Parameters;
+use super::*;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
@@ -87,8 +85,8 @@ pub(super) fn descend(
                 coefficients[phase].step(xi, gradient.xi[phase].as_slice());
             }
         }
-        let active = phases.iter().map(|&phase| coefficients[phase].active());
-        if !listener(epoch + 1, &mean, active.sum()) {
+        let kept = phases.iter().flat_map(|&phase| &coefficients[phase].kept);
+        if !listener(epoch + 1, &mean, kept.filter(|kept| **kept).count()) {
             break;
         }
     }
@@ -125,10 +123,6 @@ impl Adam {
             *kept &= value.abs() >= least;
             *value = if *kept { *value } else { 0.0 };
         }
-    }
-
-    fn active(&self) -> usize {
-        self.kept.iter().filter(|kept| **kept).count()
     }
 
     fn step(&mut self, values: &mut [f64], gradient: &[f64]) {

@@ -3,15 +3,10 @@
 //! With the encoder's Jacobian `J` at each sample: `z = phi(x)`, `dz = J dx`, `ddz = J ddx + (dJ/dt) dx`, `u_lat =
 //! pinv(J^T) u`; the decoder takes `(z, dz, Theta Xi)` to the decoded position and acceleration the same way.
 
-use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
-
-use super::batch::Batch;
-use super::descent::Moved;
-use super::network::{Jacobians, Tape, add_transposed, dot, product};
-use super::parameters::{Frame, InputProjections, Parameters};
-use super::unroll::{Unroll, Window};
-use crate::train::features::{FeatureValues, Features};
+use super::network::{Jacobians, Tape, add_transposed};
+use super::parameters::{Frame, InputProjections};
+use super::unroll::Window;
+use super::*;
 
 /// Weights of the terms of the loss (equation 20).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -289,7 +284,7 @@ impl<'a> JointLoss<'a> {
             accelerations.iter_mut().for_each(|value| *value *= factor);
         }
         let at_first = map.backward((tape, &entering), leaving, &[], &mut self.gradient.decoder);
-        let onto = map.onto_input(&at_first) / frame.latent;
+        let onto = product(&at_first, &map.layers[0].weights.transpose()) / frame.latent;
         (reconstruction, ddx, onto)
     }
 

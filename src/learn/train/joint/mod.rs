@@ -13,3 +13,11 @@ pub(super) mod unroll;
 
 pub(super) use descent::Schedule;
 pub(super) use loss::{LossWeights, Losses};
+
+use super::*;
+use crate::model::{Activation, Layer};
+use batch::Batch;
+use descent::Moved;
+use loss::JointLoss;
+use network::{dot, product};
+use parameters::Parameters;

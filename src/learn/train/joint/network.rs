@@ -3,11 +3,8 @@
 //! three stand below one another (a *stack* of 3 n rows), so that a layer is one product; rows of the Jacobian, one for
 //! each output, are stacked the same way. Of elu at zero derivatives are those of the negative side.
 
-use nalgebra::{DMatrix, DVector};
-
-use crate::model::Activation;
+use super::*;
 use crate::train::features::vectorised;
-use crate::train::random::Random;
 
 const LANES: usize = 16;
 
@@ -145,11 +142,6 @@ impl Network {
             }
         }
         adjoint
-    }
-
-    /// The adjoint of the input, of that of the first layer's `a`.
-    pub(super) fn onto_input(&self, at_first: &DMatrix<f64>) -> DMatrix<f64> {
-        product(at_first, &self.layers[0].weights.transpose())
     }
 
     pub(super) fn jacobian(&self, tape: &Tape) -> Jacobians {

@@ -1,11 +1,8 @@
 //! What Adam moves, the fixed units around the maps, and the maps of a model that these and a latent basis are folded
 //! into; latent inputs `u_lat = (J J^T)^-1 J u` of a batch, forwards and backwards.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::network::{Network, dot, product};
-use crate::model::{Activation, AffineMap, Layer, ModelError, StateMap};
-use crate::train::random::Random;
+use super::network::Network;
+use super::*;
 
 /// Parameters, or gradients with respect to them; linear maps are networks of one layer.
 #[derive(Clone, Debug, PartialEq)]

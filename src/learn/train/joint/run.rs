@@ -3,22 +3,13 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
-use nalgebra::{DMatrix, DVector};
-
-use super::batch::{Batch, batches};
-use super::descent::{Listener, Moved, descend};
-use super::loss::{JointLoss, LossWeights, Losses};
-use super::parameters::{Frame, LatentBasis, Parameters, folded};
-use crate::model::{Layer, ModelError, StateMap};
-use crate::robot::{Robot, STATE_DIM};
-use crate::train::error::TrainError;
-use crate::train::latent::{EncodedSet, Latent, least_squares_decoder, map_samples, mean_jacobian};
-use crate::train::metrics::Trained;
-use crate::train::options::{TrainOptions, Transfer};
-use crate::train::progress::Monitor;
-use crate::train::random::Random;
+use super::batch::batches;
+use super::descent::{Listener, descend};
+use super::parameters::{Frame, LatentBasis, folded};
+use super::*;
+use crate::train::latent::{least_squares_decoder, map_samples, mean_jacobian};
 use crate::train::seeds::{Outcome, Seeds};
-use crate::train::task::{Fitted, Origin, Recordings, Task};
+use crate::train::task::Fitted;
 use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
@@ -102,7 +93,7 @@ impl Trainer<'_> {
     /// Trains all seeds, in rounds of as many as there are threads, none of which begins after a cancellation.
     fn run_seeds(&self, monitor: &mut Monitor<'_>) -> Vec<Run> {
         let options = &self.task.options.joint;
-        let (seeds, cancel) = (self.task.options.seeds(), monitor.cancel_flag());
+        let (seeds, cancel) = (self.task.options.seeds(), monitor.cancel);
         monitor.stage("training encoder, decoder and dynamics");
         let mut runs = Vec::new();
         for group in seeds.chunks(options.threads.max(1)) {

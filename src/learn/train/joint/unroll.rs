@@ -1,10 +1,7 @@
 //! The loss over a window of predictions from every sample of a batch (appendix D of the paper, equations 40 and 41),
 //! and its exact gradient.
 
-use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
-
-use crate::train::features::{FeatureValues, Features};
+use super::*;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -4,15 +4,9 @@
 //! equation that a plan is made of. Shifting the robot forwards changes nothing: that direction of `delta z` is left
 //! out.
 
-use std::ops::Range;
-
-use nalgebra::{DMatrix, DVector};
-
-use super::super::dataset::{Dataset, Jump};
-use super::super::latent::Latent;
-use super::Sampled;
-use crate::model::{FEATURE_DIM, GOAL_DIM, GoalRange};
-use crate::robot::{BODY_Z, ContactFlags, FeetRule};
+use super::*;
+use crate::model::FEATURE_DIM;
+use crate::robot::ContactFlags;
 
 /// The thrust begins when the body last rises more slowly than this before the feet leave, m/s.
 const THRUST_SPEED_M_S: f64 = 0.1;

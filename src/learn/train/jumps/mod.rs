@@ -4,17 +4,10 @@
 
 mod landmarks;
 
-use nalgebra::{DMatrix, DVector, RowDVector};
+use nalgebra::RowDVector;
 
-use super::dataset::{Dataset, centred, mean};
-use super::features::FeatureValues;
-use super::latent::{EncodedSet, Latent};
-use super::metrics::PartScore;
-use super::rollout::Candidate;
-use crate::model::{
-    self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, StateMap, complement,
-};
-use crate::robot::{BODY_X, BODY_Z};
+use super::*;
+use crate::model::{self, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmarks, complement};
 use landmarks::{Cut, Fit, GoalRegression, PartNodes, intervals, of_commonest_kind, sample};
 
 pub(super) const LEAST_JUMPS: usize = 6; // of one kind, to show how jumps depend on their goal

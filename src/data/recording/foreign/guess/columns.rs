@@ -2,11 +2,9 @@
 
 use std::cmp::Reverse;
 
-use super::super::elements::{Dimension, QUATERNION, Quantity};
-use super::super::signal::{Channel, Log};
-use super::names::{Reading, is_quantity, is_time, is_wanted, read, unit};
+use super::names::{Reading, is_quantity, is_time, is_wanted, read};
+use super::*;
 use crate::recording::preprocess::median;
-use crate::robot::Robot;
 
 #[derive(Debug, Clone)]
 pub(super) struct Group {
@@ -45,7 +43,9 @@ pub(super) struct Clock {
 
 /// The quantities that the names say, of several families the measured one that fits the others and is sampled most.
 pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
-    let rates: Vec<Option<i32>> = logs.iter().map(rate_class).collect();
+    // Rates that differ by less than a tenth are of the same class.
+    let class = |rate: f64| (10.0 * rate.ln()).round() as i32;
+    let rates: Vec<_> = logs.iter().map(|log| rate_hz(log).map(class)).collect();
     let all = complete(logs, robot);
     let of = |quantity: Quantity| all.iter().filter(move |group| group.quantity == quantity);
     // Quantities of joints, or of the body, in the same words: of `q_sim`, `q` and `tau` the last two belong together.
@@ -74,7 +74,8 @@ pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
         // The base is alike to nothing but itself.
         let rank = |group: &Group, base: Option<&Group>| {
             let same_log = base.is_some_and(|base| base.log == group.log);
-            let words = base.map_or(0, |base| shared(base, group));
+            let words = base.iter().flat_map(|base| &base.family);
+            let words = words.filter(|word| group.family.contains(word)).count();
             let plain = (group.is_quaternion, group.family.len());
             let (log, words) = (Reverse(same_log), Reverse(words));
             (group.is_unnamed(logs), log, rate(group), words, plain)
@@ -117,16 +118,6 @@ fn rate_hz(log: &Log) -> Option<f64> {
     let times = log.columns[log.clock?].times();
     let span = times.last()? - times.first()?;
     (span > 0.0).then(|| (times.len() - 1) as f64 / span)
-}
-
-/// Rates that differ by less than a tenth are of the same class.
-fn rate_class(log: &Log) -> Option<i32> {
-    rate_hz(log).map(|rate| (10.0 * rate.ln()).round() as i32)
-}
-
-fn shared(one: &Group, other: &Group) -> usize {
-    let words = one.family.iter();
-    words.filter(|word| other.family.contains(word)).count()
 }
 
 fn differ(logs: &[Log], one: &Group, other: &Group) -> bool {

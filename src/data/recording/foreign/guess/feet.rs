@@ -1,6 +1,6 @@
 //! Contact from forces at the feet: what a sensor shows in the air, and from where on it bears.
 
-use nalgebra::DMatrix;
+use super::*;
 
 const SHARE: f64 = 0.1; // of the way from no force to the largest at which a foot counts as down; half of it for up
 const DEVIATIONS: f64 = 4.0; // times the deviation of a sensor in the air that a foot on the ground shows at least

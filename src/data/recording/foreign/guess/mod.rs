@@ -11,12 +11,19 @@ mod write;
 
 use std::path::Path;
 
-use super::map::TextFormat;
-use super::mcap::{is_mcap, read_mcap};
-use super::signal::Log;
+use nalgebra::DMatrix;
+
 use super::text::read_text;
+use super::*;
 use crate::recording::error::{Outcome, RecordingError, RecordingFault, text};
-use crate::robot::Robot;
+use crate::recording::{
+    Recording,
+    foreign::{elements::Dimension, map::ColumnMap},
+};
+use crate::robot::{JOINT_DIM, Robot};
+use columns::Group;
+use names::unit;
+use physics::{scale, slopes};
 
 const MOST_SKIPPED: usize = 20; // most lines before the header of a text
 const LEAST_COLUMNS: usize = 3; // fewest columns of a table

@@ -1,6 +1,6 @@
 //! What the name of a column says: leg, joint, axis, quantity, unit. Tables have words of many loggers in lower case.
 
-use super::super::elements::Quantity;
+use super::*;
 
 /// Words for legs, in romc's order.
 const LEGS: [&str; 4] = [

@@ -3,19 +3,11 @@
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
-use nalgebra::DMatrix;
-
-use super::super::assemble::assemble;
-use super::super::elements::{
-    Dimension, Quantity, angle_rates, angles_of_quaternions, in_world, unwrap,
-};
-use super::super::map::{ColumnMap, Frame};
-use super::columns::Group;
+use super::super::elements::{angle_rates, in_world, unwrap};
 use super::feet::force_lines;
-use super::physics::{NamedUnit, Reading, Scale, Torques, View, reach, scale, slopes};
+use super::physics::{NamedUnit, Reading, Scale, Torques, View, reach};
 use super::write::{Lines, Source, unit_line};
-use crate::recording::Recording;
-use crate::robot::{JOINT_DIM, JOINT_NAMES};
+use super::*;
 
 const ANGLE: [(&str, f64); 3] = [
     ("rad", 1.0),

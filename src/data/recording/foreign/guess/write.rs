@@ -1,21 +1,9 @@
 //! The guessed map as text, each line with what it rests on.
 
-use std::collections::BTreeMap;
-use std::path::Path;
-
-use nalgebra::DMatrix;
-
-use super::super::assemble::assemble;
-use super::super::elements::{Dimension, Quantity};
-use super::super::map::{ColumnMap, Frame, Name};
-use super::super::signal::Log;
-use super::Guess;
-use super::columns::{Clock, Group, clock, groups};
-use super::names::unit;
-use super::physics::{scale, slopes};
+use super::super::map::Name;
+use super::columns::{Clock, clock, groups};
 use super::scales::order_line;
-use crate::recording::segment::Rows;
-use crate::robot::Robot;
+use super::*;
 
 pub(super) type Lines = BTreeMap<Quantity, Vec<String>>;
 
