@@ -24,6 +24,7 @@ mod metrics;
 mod options;
 mod progress;
 mod random;
+mod recipe;
 mod refine;
 mod rollout;
 mod seeds;
@@ -48,4 +49,5 @@ pub use options::{
     RegressionOptions, TrainOptions, Transfer,
 };
 pub use progress::{Monitor, Progress};
+pub use recipe::RecipePart;
 pub use task::{Origin, Recordings, SourceFile, sha256};

@@ -9,6 +9,7 @@ use super::growth::Growth;
 use super::judge::Judge;
 use super::knowledge::{Knowledge, brake};
 use super::progress::Monitor;
+use super::recipe::RecipePart;
 use super::rollout::{Change, CoefficientIndex, Xi};
 use super::sparse::active_terms;
 
@@ -48,7 +49,9 @@ impl FreeCoefficients {
         for (phase, (xi, knowledge)) in xi.iter().zip(knowledge).enumerate() {
             let active = (0..xi.len()).filter(|&i| xi[i] != 0.0 && knowledge.free[i]);
             let places = active.map(|i| xi.vector_to_matrix_index(i));
-            let places = places.filter(|(_, column)| knowledge.standing(*column).is_none());
+            let places = places.filter(|(_, column)| {
+                !knowledge.has(RecipePart::UnrefinedLegs) || knowledge.standing(*column).is_none()
+            });
             (free.indices).extend(places.map(|(term, column)| (phase, term, column)));
         }
         free.scales = free.values(xi).abs();

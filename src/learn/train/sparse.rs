@@ -4,6 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::Serialize;
 
 use super::knowledge::Knowledge;
+use super::recipe::RecipePart;
 
 const LEAST_RIDGE: f64 = 1e-10; // on the normalised columns: far above rounding
 const CHANGE_RIDGE: f64 = 1e-2; // of changes from a prior
@@ -70,8 +71,10 @@ impl Regression {
                 .filter(|&i| allowed[i] || self.knowledge.kept[(i, column)])
                 .collect();
             if let Some(standing) = self.knowledge.standing(column) {
+                let share = f64::from(self.knowledge.has(RecipePart::StillFeet));
                 for xi in &mut fits {
-                    let fitted = self.solve_near(column, &informative, &standing.still(xi));
+                    let prior = standing.still(xi) * share;
+                    let fitted = self.solve_near(column, &informative, &prior);
                     self.store(xi, column, &informative, &fitted);
                 }
                 continue;

@@ -18,6 +18,7 @@ use super::latent::{EncodedSet, Latent, input_projection, lift_samples, mean_jac
 use super::metrics::{PLACE, PhaseTerms, SeedReport, SetMetrics, TrainReport, measure};
 use super::options::{EncoderOptions, MirrorImages, TrainOptions};
 use super::progress::Monitor;
+use super::recipe::RecipePart;
 use super::rollout::{Candidate, Xi};
 use super::select::{Choice, select};
 use super::sparse::active_terms;
@@ -82,7 +83,14 @@ impl<'a> Task<'a> {
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
         let (requested, body) = (options.latent_dim, options.body());
         let rows = (options.coordinates(), &body);
-        let frame = Frame::new(&training, &active, requested, rows, robot);
+        let frame = Frame::new(
+            &training,
+            &active,
+            requested,
+            rows,
+            &options.regression,
+            robot,
+        );
         if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested,
@@ -91,9 +99,8 @@ impl<'a> Task<'a> {
         }
         let library = options.library()?;
         let features = Features::new(&library);
-        let equations = options.regression.body_equations;
         Ok(Self {
-            knowledge: Knowledge::of_phases(&training, &features, &frame, equations),
+            knowledge: Knowledge::of_phases(&training, &features, &frame, &options.regression),
             training,
             validation,
             moments,
@@ -334,7 +341,10 @@ impl Task<'_> {
         let (options, features) = (&self.options.regression, &self.features);
         let set = maps.training_set(self);
         check_terms(set, features, &self.library)?;
-        let long = self.frame.judged_over_jumps(set.latent_dim());
+        let long = match options.has(RecipePart::WholeJumps) {
+            true => self.frame.judged_over_jumps(set.latent_dim()),
+            false => set.latent_dim(),
+        };
         let judge = Judge::new(features, maps.judged_set(self), long);
         let mut knowledge = self.knowledge.clone();
         if self.frame.is_spatial() {
