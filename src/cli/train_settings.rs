@@ -77,6 +77,7 @@ impl TrainSettings {
         if let Some(body) = &self.body {
             options.set_body(body.clone());
         }
+        set(&mut options.regression.leave_out, self.leave_out.clone());
         set(&mut options.regression.body_equations, self.body_equations);
         set(&mut options.regression.slack, self.slack);
         set(&mut options.regression.refinements, self.refinements);
@@ -221,10 +222,10 @@ impl TrainSettings {
                 None => format!(" --{name} {}", number.as_f64().unwrap_or(f64::NAN)),
             },
             Value::String(text) => format!(" --{name} {}", quoted_text(&text)),
-            Value::Array(widths) if widths.is_empty() => format!(" --{name} linear"),
-            Value::Array(widths) => {
-                let widths: Vec<String> = widths.iter().map(Value::to_string).collect();
-                format!(" --{name} {}", widths.join(","))
+            Value::Array(values) if values.is_empty() => format!(" --{name} linear"),
+            Value::Array(values) => {
+                let values: Vec<String> = values.iter().map(Value::to_string).collect();
+                format!(" --{name} {}", values.join(",").replace('"', ""))
             }
         };
         self.given().into_iter().map(flag).collect()
@@ -267,7 +268,10 @@ impl TrainSettings {
                 "free, or a training without `--paper`",
             ),
             (
-                given("body body-equations", !is_linear || self.paper || is_free),
+                given(
+                    "body body-equations leave-out",
+                    !is_linear || self.paper || is_free,
+                ),
                 "set with free coordinates",
                 "named coordinates, which have rows of the body",
             ),

@@ -1,7 +1,9 @@
 //! Models whose coordinates are those of the whole body in its plane.
 
+use std::path::Path;
 use std::sync::LazyLock;
 
+use clap::ValueEnum;
 use nalgebra::{DMatrix, DVector};
 use romc::artifact;
 use romc::evaluate::{Assessment, CoordinateSums, Fit, Horizon};
@@ -10,7 +12,7 @@ use romc::model::{LibraryChoice, ReducedModel, StandardLibrary};
 use romc::recording::Recording;
 use romc::robot::{JOINT_DIM, STATE_DIM};
 use romc::sim::{LatentSegment, Restart, rollout};
-use romc::train::TrainOptions;
+use romc::train::{RecipePart, TrainOptions};
 
 use super::{jumps, jumps_of, losses_of_the_simulated_go1, train_with};
 
@@ -209,4 +211,40 @@ fn legs_and_rotation_hold_from_take_off_to_touchdown() {
     let still = WHOLE_BODY.clone().into_builder().phases(phases).build();
     let [_, knee] = at_touchdown(&still.expect("sound"));
     assert!(knee[0] > 0.15, "{knee:?}");
+}
+
+#[test]
+fn parts_that_are_left_out_are_not_in_the_model() {
+    let mut options = TrainOptions::new("without", 7);
+    options.regression.refinements = 0;
+    let (training, validation) = (jumps("train", 4), jumps("validation", 1));
+    let mut zeros = |leave_out: &[RecipePart]| {
+        options.regression.leave_out = leave_out.to_vec();
+        let trained = train_with(&training, &validation, &options).expect("trains");
+        let (of_state, flight) = (weights(&trained.model), &trained.model.phases()[1].xi);
+        let abductions = of_state.column(0).amax();
+        let of_joints = of_state.view((2, 0), (1, JOINT_DIM)).amax();
+        let of_legs = flight.view((1, 3), (2 * 7, 4)).amax(); // on positions and velocities
+        [abductions, of_joints, of_legs].map(|largest| largest == 0.0)
+    };
+    assert_eq!(zeros(&[]), [false, false, true]);
+    let parts = [
+        RecipePart::MomentumWeights,
+        RecipePart::Abductions,
+        RecipePart::FlightLegs,
+    ];
+    assert_eq!(zeros(&parts), [true, true, false]);
+}
+
+#[test]
+fn every_part_has_a_row_in_the_table_of_its_effect() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let files = ["benches/learning/whole_body.py", "docs/learning.md"];
+    let texts = files.map(|file| std::fs::read_to_string(root.join(file)).expect("a text"));
+    for part in RecipePart::value_variants() {
+        let part = part.to_possible_value().expect("none is hidden");
+        let flag = format!("--leave-out {}", part.get_name());
+        let has_row = |text: &String| text.contains(&flag);
+        assert!(texts.iter().all(has_row), "{flag}");
+    }
 }

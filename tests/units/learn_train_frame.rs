@@ -4,6 +4,7 @@ use super::*;
 use crate::recording::PhaseRule;
 use crate::robot::InputRule;
 use crate::train::dataset::{ScaleOptions, Scaling};
+use crate::train::options::TrainOptions;
 use crate::train::random::Random;
 
 const STEP_S: f64 = 0.002;
@@ -118,7 +119,8 @@ fn rows_of_all_of_the_body_leave_room_for_all_joints() {
     let dim = |text: &str| {
         let body: BodyRows = text.parse().expect("known rows");
         let rows = (Coordinates::Named, &body);
-        Frame::new(&training, &active, 6, rows, robot()).dim()
+        let options = TrainOptions::new("m", 6).regression;
+        Frame::new(&training, &active, 6, rows, &options, robot()).dim()
     };
     assert_eq!(dim("x,z,pitch"), 9);
     assert_eq!(dim("all"), 18);

@@ -14,7 +14,9 @@ use crate::recording::preprocess::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
 use crate::robot::{STATE_DIM, WrenchFrame};
 use crate::study::Shard;
-use crate::train::{BodyEquations, BodyRows, Coordinates, Integrator, Method, MirrorImages, Split};
+use crate::train::{
+    BodyEquations, BodyRows, Coordinates, Integrator, Method, MirrorImages, RecipePart, Split,
+};
 
 /// Widths of hidden layers in their order: `32,16`, or `linear` for none; a list of numbers in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -171,7 +173,7 @@ pub(crate) struct TrainSettings {
     /// with --paper)
     #[arg(long, value_name = "RATE", value_parser = finite(&table::GROWTH))]
     pub growth: Option<Finite>,
-    /// Highest degree of the polynomial candidate terms [default: 1; from 7 coordinates on also z2*u1, z2*u2 and z2*u3]
+    /// Highest degree of the polynomial candidate terms [default: 1]
     #[arg(long, value_name = "P", value_parser = |text: &str| table::DEGREE.parse::<u32>(text))]
     pub degree: Option<u32>,
     /// Add sines and cosines of z and dz to the candidate terms
@@ -229,6 +231,15 @@ pub(crate) struct TrainSettings {
     /// or yaw in --body, otherwise none]
     #[arg(long, value_enum)]
     pub mirror_images: Option<MirrorImages>,
+    /// Parts of the recipe for named coordinates to leave out; docs/learning.md has the effect of each
+    #[arg(
+        long,
+        value_enum,
+        value_name = "PART",
+        value_delimiter = ',',
+        hide_short_help = true
+    )]
+    pub leave_out: Option<Vec<RecipePart>>,
     /// Keep the latent basis as trained, without varimax rotation
     #[arg(long)]
     pub no_rotation: bool,

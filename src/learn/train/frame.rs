@@ -1,6 +1,7 @@
 //! Encoder rows known from physics: momentum of the robot, and feet that stand still.
 
 use super::body::PITCH;
+use super::recipe::RecipePart;
 use super::*;
 use crate::model::complement;
 use crate::recording::stretches;
@@ -61,6 +62,7 @@ impl Frame {
         active: &[usize],
         latent_dim: usize,
         (coordinates, body): (Coordinates, &BodyRows),
+        options: &RegressionOptions,
         robot: &Robot,
     ) -> Self {
         if coordinates == Coordinates::Free {
@@ -68,12 +70,15 @@ impl Frame {
         }
         let spatial = body.is_spatial();
         let rows = body.coordinates.clone();
-        let momentum = momentum_rows(training, &rows, robot);
+        let momentum = match options.has(RecipePart::MomentumWeights) {
+            true => momentum_rows(training, &rows, robot),
+            false => DMatrix::identity(STATE_DIM, STATE_DIM).select_columns(&rows),
+        };
         let mut held: Vec<DVector<f64>> =
             momentum.column_iter().map(|row| row.into_owned()).collect();
         let mut legs = Vec::new();
-        if has_leg_rows(body, latent_dim) {
-            for (row, leg) in leg_rows(training, &momentum, robot) {
+        if has_leg_rows(body, latent_dim) && options.has(RecipePart::LegRows) {
+            for (row, leg) in leg_rows(training, &momentum, options, robot) {
                 held.push(row);
                 legs.push(leg);
             }
@@ -358,12 +363,17 @@ fn flight_accelerations(training: &Dataset, jump: &Jump, all: &mut Vec<DVector<f
 fn leg_rows(
     training: &Dataset,
     momentum: &DMatrix<f64>,
+    options: &RegressionOptions,
     robot: &Robot,
 ) -> Vec<(DVector<f64>, LegRow)> {
+    let settling_s = match options.has(RecipePart::Settling) {
+        true => SETTLING_S,
+        false => 0.0,
+    };
     let mut rows = Vec::new();
     for legs in PAIRS {
         let [_, flexion, knee] = std::array::from_fn(|joint| mirrored(legs, joint, robot, 1.0));
-        let stances = stances(training, legs);
+        let stances = stances(training, legs, settling_s);
         if stances.iter().map(|(_, range)| range.len()).sum::<usize>() < LEAST_STANDING {
             return Vec::new();
         }
@@ -383,12 +393,14 @@ fn leg_rows(
             ));
         }
     }
-    add_abductions(training, momentum, &mut rows, robot);
+    if options.has(RecipePart::Abductions) {
+        add_abductions(training, momentum, &mut rows, robot);
+    }
     rows
 }
 
-/// Spans in which both feet of a pair are down, without [`SETTLING_S`] after a touchdown.
-fn stances(training: &Dataset, legs: [Leg; 2]) -> Vec<(usize, Range<usize>)> {
+/// Spans in which both feet of a pair are down, without `settling_s` after a touchdown.
+fn stances(training: &Dataset, legs: [Leg; 2], settling_s: f64) -> Vec<(usize, Range<usize>)> {
     let mut all = Vec::new();
     for (index, jump) in training.jumps.iter().enumerate() {
         let stands = |sample: usize| legs.iter().all(|leg| jump.feet[sample][leg.index()]);
@@ -396,7 +408,7 @@ fn stances(training: &Dataset, legs: [Leg; 2]) -> Vec<(usize, Range<usize>)> {
         for span in spans.filter(|span| stands(span.start)) {
             let settled_s = match span.start {
                 0 => f64::NEG_INFINITY,
-                touchdown => jump.time_s[touchdown] + SETTLING_S,
+                touchdown => jump.time_s[touchdown] + settling_s,
             };
             let settled = (span.clone()).find(|&sample| jump.time_s[sample] >= settled_s);
             all.extend(settled.map(|settled| (index, settled..span.end)));

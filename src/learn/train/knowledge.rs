@@ -1,7 +1,8 @@
 //! What is known of the latent dynamics before a regression, in the coordinates of a [`Frame`].
 
 use super::frame::{LegRow, TURN};
-use super::weak_form::flight_samples;
+use super::recipe::RecipePart::{self, *};
+use super::weak_form::{FLIGHT_WINDOW, flight_samples, windowed_samples};
 use super::*;
 
 const Y: usize = BODY_X + 1;
@@ -21,6 +22,7 @@ pub(super) struct Knowledge {
     shared: Vec<Vec<usize>>,    // terms of each momentum column that is the same in all phases
     standing: Vec<Standing>,    // equations of the legs, if they stand in this phase
     swinging: Range<usize>,     // columns of the legs, if this phase is flight
+    left_out: Vec<RecipePart>,
 }
 
 /// Prior of a leg on the ground. With the row `rho` of the pair and the momentum rows `b` and `t` its feet are at
@@ -82,7 +84,12 @@ impl Knowledge {
             shared: Vec::new(),
             standing: Vec::new(),
             swinging: 0..0,
+            left_out: Vec::new(),
         }
+    }
+
+    pub(super) fn has(&self, part: RecipePart) -> bool {
+        !self.left_out.contains(&part)
     }
 
     /// With the equations of the legs in flight known. They depend on inputs only, so that positions are linear in their
@@ -94,10 +101,13 @@ impl Knowledge {
         phase: usize,
     ) -> Self {
         let mut fitted = self.clone();
-        if self.swinging.is_empty() {
+        if self.swinging.is_empty() || !self.has(FlightFit) {
             return fitted;
         }
-        let (theta, target) = flight_samples(set, features, phase);
+        let (theta, target) = match self.has(WholeFlights) {
+            true => flight_samples(set, features, phase),
+            false => windowed_samples(set, features, phase, FLIGHT_WINDOW),
+        };
         let regression = Regression::new(&theta, &target, self.clone());
         for column in self.swinging.clone() {
             let coefficients = regression.fit_column(column, &self.free, FLIGHT_RIDGE);
@@ -173,7 +183,7 @@ impl Knowledge {
         training: &Dataset,
         features: &Features,
         frame: &Frame,
-        equations: BodyEquations,
+        options: &RegressionOptions,
     ) -> Vec<Self> {
         let (p, d) = (features.library_dim(), features.latent_dim);
         let each = training.phases.patterns.iter();
@@ -182,32 +192,40 @@ impl Knowledge {
         }
         let gravity = -GRAVITY_M_S2 * training.scaling.state[BODY_Z];
         each.map(|phase| {
-            let mut knowledge = Self::nothing(p, d);
+            let mut knowledge = Self {
+                left_out: options.leave_out.clone(),
+                ..Self::nothing(p, d)
+            };
             let place = |v: &usize| frame.body.get(*v).is_some_and(|row| PLACE.contains(row));
-            knowledge.forbid(0..d, features, |variables| variables.iter().any(place));
-            knowledge.forbid(0..2, features, |variables| variables.iter().any(|v| *v < d));
-            let one = features.constant_term();
+            knowledge.forbid(Place, 0..d, features, |variables| {
+                variables.iter().any(place)
+            });
+            knowledge.forbid(Positions, 0..2, features, |variables| {
+                variables.iter().any(|v| *v < d)
+            });
             if phase.feet == FeetRule::None {
                 knowledge.fly(features, frame, gravity);
             } else {
                 let own = [d + 1, 2 * d + 1];
                 let others = |variables: &[usize]| variables.iter().any(|v| !own.contains(v));
-                knowledge.forbid(1..2, features, others);
-                one.into_iter()
-                    .for_each(|one| knowledge.kept[(one, 1)] = true);
+                knowledge.forbid(Height, 1..2, features, others);
+                if let Some(one) = features.constant_term() {
+                    knowledge.kept[(one, 1)] = options.has(KeptConstant);
+                }
                 knowledge.turn(features, frame);
                 knowledge.stand(features, frame);
             }
             knowledge.push_sideways(features, frame);
-            if equations == BodyEquations::AllPhases && phase.feet != FeetRule::None {
+            if options.body_equations == BodyEquations::AllPhases && phase.feet != FeetRule::None {
                 knowledge.share_body(features, frame);
             }
-            let inputs = (0..d).map(|k| (2 * d + k, k));
-            for (variable, k) in inputs.chain((0..2).map(|k| (d + k, k))) {
+            let inputs = (0..d).map(|k| (2 * d + k, k, KeptInputs));
+            for (variable, k, part) in inputs.chain((0..2).map(|k| (d + k, k, KeptVelocities))) {
                 if let Some(term) = features.variable_term(variable) {
                     let free = knowledge.free[(term, k)];
-                    knowledge.kept[(term, k)] = free;
-                    knowledge.braking[(term, k)] = free && variable < 2 * d;
+                    knowledge.kept[(term, k)] |= free && options.has(part);
+                    knowledge.braking[(term, k)] =
+                        free && k + d == variable && options.has(Braking);
                 }
             }
             knowledge
@@ -215,13 +233,18 @@ impl Knowledge {
         .collect()
     }
 
-    /// Terms that depend on certain variables (counted over `z`, `dz`, `u_lat`) are not free in these columns.
+    /// Terms that depend on certain variables (counted over `z`, `dz`, `u_lat`) are not free in these columns, unless this
+    /// part is left out.
     fn forbid(
         &mut self,
+        part: impl Into<Option<RecipePart>>,
         columns: Range<usize>,
         features: &Features,
         depends: impl Fn(&[usize]) -> bool,
     ) {
+        if part.into().is_some_and(|part| !self.has(part)) {
+            return;
+        }
         for (term, variables) in features.variables() {
             if depends(&variables) {
                 let mut row = self.free.row_mut(term);
@@ -242,13 +265,17 @@ impl Knowledge {
         let d = features.latent_dim;
         let loads = 2 * d..2 * d + frame.body.len();
         for k in (TURN..frame.body.len()).filter(|&k| !is_lateral(frame.body[k])) {
-            self.forbid(k..k + 1, features, |variables| {
-                let is_load = |v: &usize| loads.contains(v);
-                let is_known = |v: &usize| *v == HEIGHT || (d..2 * d).contains(v) || is_load(v);
-                let has_arm = !variables.contains(&HEIGHT) || variables.iter().any(is_load);
-                !(variables.iter().all(is_known) && has_arm)
+            self.forbid(RotationPositions, k..k + 1, features, |variables| {
+                let is_arm = variables.iter().any(|v| loads.contains(v));
+                let is_position = |v: &usize| *v < d && !(*v == HEIGHT && is_arm);
+                variables.iter().any(is_position)
             });
-            self.keep(k, features);
+            self.forbid(RotationLegs, k..k + 1, features, |variables| {
+                variables.iter().any(|v| *v >= loads.end)
+            });
+            if self.has(KeptRotation) {
+                self.keep(k, features);
+            }
         }
     }
 
@@ -263,7 +290,7 @@ impl Knowledge {
                 Y => k..k + 1,
                 _ => 0..frame.body.len(),
             };
-            self.forbid(k..k + 1, features, |variables| match *variables {
+            self.forbid(None, k..k + 1, features, |variables| match *variables {
                 [v] => v < inputs || !loads.contains(&(v - inputs)),
                 _ => true,
             });
@@ -291,7 +318,10 @@ impl Knowledge {
     fn stand(&mut self, features: &Features, frame: &Frame) {
         let rows = frame.legs.iter().zip(frame.body.len()..);
         let standing = rows.filter_map(|(&row, k)| Standing::of(row, k, features));
-        self.standing = standing.collect();
+        self.standing = standing.filter(|_| self.has(StancePrior)).collect();
+        if !self.has(Stiffness) {
+            self.standing.iter_mut().for_each(|of| of.ground = None);
+        }
         for k in self.standing.iter().map(|standing| standing.column) {
             for (term, is_affine) in features.affine.iter().enumerate() {
                 self.free[(term, k)] &= is_affine;
@@ -307,19 +337,21 @@ impl Knowledge {
             2 * d..2 * d + momentum,
             momentum..momentum + frame.legs.len(),
         );
-        self.forbid(0..d, features, |variables| {
+        self.forbid(FlightLoads, 0..d, features, |variables| {
             variables.iter().any(|v| loads.contains(v))
         });
-        self.forbid(legs.clone(), features, |variables| {
+        self.forbid(FlightLegs, legs.clone(), features, |variables| {
             variables.iter().any(|v| *v < 2 * d)
         });
-        self.free.column_mut(0).fill(false);
-        if let Some(one) = features.constant_term() {
-            self.known[(one, 1)] = gravity;
-            self.free.column_mut(1).fill(false);
+        if self.has(FreeFall) {
+            self.free.column_mut(0).fill(false);
+            if let Some(one) = features.constant_term() {
+                self.known[(one, 1)] = gravity;
+                self.free.column_mut(1).fill(false);
+            }
         }
-        for k in TURN..momentum {
-            self.free.column_mut(k).fill(false);
+        if self.has(FlightRotation) {
+            (self.free.columns_range_mut(TURN..momentum.max(TURN))).fill(false);
         }
         for k in legs.clone() {
             self.keep(k, features);

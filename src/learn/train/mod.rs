@@ -25,6 +25,7 @@ mod metrics;
 mod options;
 mod progress;
 mod random;
+mod recipe;
 mod refine;
 mod rollout;
 mod seeds;
@@ -49,6 +50,7 @@ pub use options::{
     RegressionOptions, TrainOptions, Transfer,
 };
 pub use progress::{Monitor, Progress};
+pub use recipe::RecipePart;
 pub use task::{Origin, Recordings, SourceFile, sha256};
 
 use std::collections::BTreeMap;

@@ -4,6 +4,7 @@ use clap::ValueEnum;
 
 use super::frame::has_leg_rows;
 use super::joint::{LossWeights, Schedule};
+use super::recipe::RecipePart;
 use super::*;
 use crate::limits::table;
 use crate::model::{Activation, LibraryChoice, MAX_LAYERS, StandardLibrary, check_name};
@@ -140,6 +141,8 @@ pub enum Coordinates {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegressionOptions {
     pub smoothing: usize,
+    /// Parts of the recipe for named coordinates that are left out.
+    pub leave_out: Vec<RecipePart>,
     /// Equations of the momentum rows.
     pub body_equations: BodyEquations,
     /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
@@ -175,6 +178,7 @@ impl TrainOptions {
             },
             regression: RegressionOptions {
                 smoothing: 11,
+                leave_out: Vec::new(),
                 body_equations: BodyEquations::PerPhase,
                 slack: slack(&BodyRows::of_dim(latent_dim), latent_dim),
                 refinements: 10,
@@ -389,6 +393,12 @@ impl MapOptions {
             });
         }
         Ok(())
+    }
+}
+
+impl RegressionOptions {
+    pub(super) fn has(&self, part: RecipePart) -> bool {
+        !self.leave_out.contains(&part)
     }
 }
 

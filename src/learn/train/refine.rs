@@ -4,6 +4,7 @@
 //! Stork, Second order derivatives for network pruning, NIPS 1992).
 
 use super::knowledge::brake;
+use super::recipe::RecipePart;
 use super::rollout::CoefficientIndex;
 use super::*;
 
@@ -43,7 +44,9 @@ impl FreeCoefficients {
         for (phase, (xi, knowledge)) in xi.iter().zip(knowledge).enumerate() {
             let active = (0..xi.len()).filter(|&i| xi[i] != 0.0 && knowledge.free[i]);
             let places = active.map(|i| xi.vector_to_matrix_index(i));
-            let places = places.filter(|(_, column)| knowledge.standing(*column).is_none());
+            let places = places.filter(|(_, column)| {
+                !knowledge.has(RecipePart::UnrefinedLegs) || knowledge.standing(*column).is_none()
+            });
             (free.indices).extend(places.map(|(term, column)| (phase, term, column)));
         }
         free.scales = free.values(xi).abs();

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::recipe::RecipePart;
 use super::refine::{Coefficients, Refiner};
 use super::sparse::Pruning;
 use super::weak_form::windowed_samples;
@@ -73,25 +74,35 @@ pub(super) fn select(
         training: judge,
         judge,
     };
-    let mut tried = refiner.try_all(regressions, monitor);
+    let windows = match options.has(RecipePart::Windows) {
+        true => &regressions[..],
+        false => &regressions[..1],
+    };
+    let mut tried = refiner.try_all(windows, monitor);
     let candidates = tried.len();
     let reference = best_of(&tried)?.now.xi.clone();
-    let training = judge.over(set).relative_to(&reference);
-    let relative = &judge.relative_to(&reference);
+    let (mut training, mut relative) = (judge.over(set), judge.clone());
+    if options.has(RecipePart::RelativeErrors) {
+        for judge in [&mut training, &mut relative] {
+            *judge = judge.relative_to(&reference);
+        }
+    }
     for trial in tried.iter_mut().filter(|trial| trial.is_stable()) {
-        trial.score_by(relative);
+        trial.score_by(&relative);
     }
     let limit = (1.0 + options.slack) * best_of(&tried)?.now.score;
     let refiner = Refiner {
         training: &training,
-        judge: relative,
+        judge: &relative,
         ..refiner
     };
     let mut refined = Vec::new();
     for mut trial in starts(tried, limit) {
         trial.hold(growth);
-        trial.score_by(relative);
-        refiner.sweep(&mut trial, limit, monitor);
+        trial.score_by(&relative);
+        if options.has(RecipePart::Sweep) {
+            refiner.sweep(&mut trial, limit, monitor);
+        }
         trial.now = refiner.refine(trial.now, options.refinements, monitor);
         refined.push(trial);
     }
@@ -117,7 +128,7 @@ fn sparsest<'a>(
     let candidates = refined.len();
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.now.score;
-    if options.refinements > 0 {
+    if options.refinements > 0 && options.has(RecipePart::Thinning) {
         let mut thinned = best.clone();
         thinned.now = refiner.thin(thinned.now, limit, monitor);
         refined.push(thinned);
@@ -172,7 +183,7 @@ impl Trial<'_> {
     }
 }
 
-type Regressions = [Vec<Regression>; WINDOWS.len()]; // of every phase, for each of the windows
+type Regressions = [Vec<Regression>]; // of every phase, for each of the windows
 
 impl Refiner<'_> {
     /// All combinations; where there are terms to choose that are not affine also those without them, and the best of these
@@ -211,6 +222,12 @@ impl Refiner<'_> {
         monitor: &mut Monitor<'_>,
     ) -> Vec<Trial<'r>> {
         let mut tried = Vec::new();
+        let has = |part| self.knowledge.iter().all(|known| known.has(part));
+        let is_tried = |pruning: &Pruning| match pruning {
+            Pruning::Elimination(_) => true,
+            Pruning::Threshold(_) => has(RecipePart::Thresholds),
+        };
+        let prunings: Vec<_> = PRUNINGS.into_iter().filter(is_tried).collect();
         monitor.stage("fitting the dynamics");
         for (window, regressions) in WINDOWS.into_iter().zip(regressions) {
             for ridge in RIDGES {
@@ -218,9 +235,9 @@ impl Refiner<'_> {
                     return tried;
                 }
                 let each = regressions.iter();
-                let fits = each.map(|regression| regression.fit_each(ridge, &PRUNINGS, allowed));
+                let fits = each.map(|regression| regression.fit_each(ridge, &prunings, allowed));
                 let fits: Vec<Vec<Xi>> = fits.collect();
-                for (number, pruning) in PRUNINGS.into_iter().enumerate() {
+                for (number, pruning) in prunings.iter().copied().enumerate() {
                     let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
                     if tried.iter().any(|trial: &Trial<'_>| trial.now.xi == xi) {
                         continue;

@@ -1,5 +1,6 @@
 //! Sparse regression of the latent accelerations.
 
+use super::recipe::RecipePart;
 use super::*;
 
 const LEAST_RIDGE: f64 = 1e-10; // on the normalised columns: far above rounding
@@ -67,8 +68,10 @@ impl Regression {
                 .filter(|&i| allowed[i] || self.knowledge.kept[(i, column)])
                 .collect();
             if let Some(standing) = self.knowledge.standing(column) {
+                let share = f64::from(self.knowledge.has(RecipePart::StillFeet));
                 for xi in &mut fits {
-                    let fitted = self.solve_near(column, &informative, &standing.still(xi));
+                    let prior = standing.still(xi) * share;
+                    let fitted = self.solve_near(column, &informative, &prior);
                     self.store(xi, column, &informative, &fitted);
                 }
                 continue;

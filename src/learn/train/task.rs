@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 use super::frame::{parities, symmetry_classes};
 use super::latent::mean_jacobian;
 use super::metrics::measure;
+use super::recipe::RecipePart;
 use super::select::select;
 use super::subspace::{order_and_sign, varimax};
 use super::weak_form::check_terms;
@@ -66,7 +67,14 @@ impl<'a> Task<'a> {
         let active = moments.active_coordinates(least_std, options.encoder.least_input_share);
         let (requested, body) = (options.latent_dim, options.body());
         let rows = (options.coordinates(), &body);
-        let frame = Frame::new(&training, &active, requested, rows, robot);
+        let frame = Frame::new(
+            &training,
+            &active,
+            requested,
+            rows,
+            &options.regression,
+            robot,
+        );
         if requested == 0 || requested > frame.dim() {
             return Err(TrainError::LatentDim {
                 requested,
@@ -75,9 +83,8 @@ impl<'a> Task<'a> {
         }
         let library = options.library()?;
         let features = Features::new(&library);
-        let equations = options.regression.body_equations;
         Ok(Self {
-            knowledge: Knowledge::of_phases(&training, &features, &frame, equations),
+            knowledge: Knowledge::of_phases(&training, &features, &frame, &options.regression),
             training,
             validation,
             moments,
@@ -318,7 +325,10 @@ impl Task<'_> {
         let (options, features) = (&self.options.regression, &self.features);
         let set = maps.training_set(self);
         check_terms(set, features, &self.library)?;
-        let long = self.frame.judged_over_jumps(set.latent_dim());
+        let long = match options.has(RecipePart::WholeJumps) {
+            true => self.frame.judged_over_jumps(set.latent_dim()),
+            false => set.latent_dim(),
+        };
         let judge = Judge::new(features, maps.judged_set(self), long);
         let mut knowledge = self.knowledge.clone();
         if self.frame.is_spatial() {

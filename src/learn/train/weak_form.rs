@@ -3,7 +3,7 @@
 use super::*;
 
 const STRIDE: usize = 5; // samples between the starts of two windows
-const FLIGHT_WINDOW: usize = 50; // samples
+pub(super) const FLIGHT_WINDOW: usize = 50; // samples
 const WHOLE_FLIGHTS: f64 = 10.0; // weight of the errors of whole flights against those of windows
 const LARGEST: f64 = 1e150; // magnitude of a term: sums of its squares stay finite
 
