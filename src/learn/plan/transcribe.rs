@@ -29,6 +29,8 @@ const FORCE_UNIT_N: f64 = 100.0;
 /// Torques below this share of their limit, joints farther than this from theirs (rad), get no row.
 const FAR_TORQUE: f64 = 0.5;
 const FAR_JOINT_RAD: f64 = 0.3;
+/// Distance of joints from their limits at the nodes: between two of them angles bend beyond both.
+const JOINT_INSET_RAD: f64 = 0.01;
 
 /// Bounds whose violation is a variable of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -294,7 +296,8 @@ impl<'a> Task<'a> {
                 let (least, most) = robot.joint_limit_rad()[j];
                 let far = least + FAR_JOINT_RAD..most - FAR_JOINT_RAD;
                 let angle = self.x(part, node, j);
-                near(builder, &angle, y, ([least, most], far), joint);
+                let inside = [least + JOINT_INSET_RAD, most - JOINT_INSET_RAD];
+                near(builder, &angle, y, (inside, far), joint);
             }
             if of.is_grounded() {
                 self.friction(part, node, friction, builder);
