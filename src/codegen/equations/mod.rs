@@ -18,7 +18,7 @@
 //!     })
 //!     .build()?;
 //! let equations = Equations::of(&model);
-//! let ddz1: Vec<_> = equations.phases()[0]
+//! let ddz1: Vec<_> = equations.phases[0]
 //!     .summands(&equations, 0)
 //!     .map(|(coefficient, term)| (coefficient, term.text.as_str()))
 //!     .collect();
