@@ -30,7 +30,13 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
     let mut out = Vec::new();
     for (part, of) in task.seed.parts.iter().enumerate() {
         let step = of.duration_s / of.intervals() as f64;
+        let next = task.seed.parts.get(part + 1);
+        let lifts = of.is_grounded() && next.is_some_and(|next| !next.is_grounded());
         for node in 0..of.z.len() {
+            let [input, rate] = match lifts && node == of.intervals() {
+                true => settings.at_take_off,
+                false => [1.0; 2],
+            };
             let end = node == 0 || node == of.intervals();
             let time = step / TIME_UNIT_S * if end { 0.5 } else { 1.0 };
             let at = task.node(part, node);
@@ -38,8 +44,8 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
                 if i >= FIRST_OF_POSTURE {
                     out.push(one(at + i, settings.posture * share * time));
                 }
-                out.push(one(at + d + i, settings.rate * share * time));
-                out.push(one(at + 2 * d + i, settings.input * share * time));
+                out.push(one(at + d + i, settings.rate * rate * share * time));
+                out.push(one(at + 2 * d + i, settings.input * input * share * time));
             }
             if node < of.intervals() {
                 let next = task.node(part, node + 1);

@@ -57,6 +57,8 @@ settings! {
     /// Weight of feet that rise otherwise than in the prior, per [`Self::foot_m`], and for how long after take-off, s.
     take_off: f64 = 3.0, ANY;
     take_off_s: f64 = 0.04, 0.1;
+    /// How many times the deviations of the input and of the velocities count at the last node before a take-off.
+    at_take_off: [f64; 2] = [3.0, 100.0], ANY;
     /// Displacement of a foot along and above the floor that counts one, m.
     foot_m: [f64; 2] = [0.005, 0.004], 1.0;
     /// Weight of durations, per 15 % of change: of parts on the ground, and of the flight.
