@@ -165,11 +165,10 @@ fn replay_file(
         );
         let u = (run % 4 != 3).then(|| vary(input.as_slice(), 0.5, &mut random));
         let friction = if run % 3 == 2 { 0.6 } else { 0.0 };
-        let effectiveness = (run % 2 == 1).then(|| Effectiveness {
-            time_constant_s: [0.05, 1.0][run / 2 % 2],
+        let drives = Drives {
             stiffness_nm_rad: [20.0, 0.0, 40.0][run / 2 % 3],
             damping_nm_s_rad: [0.8, 0.0][run / 4 % 2],
-        });
+        };
         let settings = MpcSettings {
             solver: Solver::Riccati,
             missing_input: match knows_inputs {
@@ -181,7 +180,8 @@ fn replay_file(
             foot_friction: [0.6, 0.2][run % 2],
             lift_prior_weight: [1e-3, 1e-2, 1e-4][run % 3],
             linearisation: [Linearisation::Reference, Linearisation::LastPlan][run / 2 % 3 % 2],
-            effectiveness,
+            effectiveness_time_s: (run % 2 == 1).then_some([0.05, 1.0][run / 2 % 2]),
+            drives,
             swing_turn: [1.0, 0.0, 0.5][run / 3 % 3],
             flight_torque: [1.0, 0.3, 0.0][run / 2 % 3],
             torque_rate_nm_s: match rates {
@@ -191,7 +191,7 @@ fn replay_file(
             ..MpcSettings::default()
         };
         let trusting = MpcSettings {
-            effectiveness: None,
+            effectiveness_time_s: None,
             ..settings
         };
         let [mut controller, mut trusting] = [settings, trusting]

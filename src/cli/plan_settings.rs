@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::*;
 use crate::mpc::interface::{SETTINGS, Settings};
-use crate::mpc::{ControlError, Effectiveness, MpcSettings};
-use crate::robot::{Leg, Robot};
+use crate::mpc::{ControlError, Drives, MpcSettings};
+use crate::robot::Robot;
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
 pub(super) fn path_for(plan: &Path) -> PathBuf {
@@ -49,29 +49,18 @@ pub(super) fn read_for(recording: &Path) -> Result<MpcSettings, Error> {
     settings.to_mpc().map_err(refused)
 }
 
-/// Inputs count less than along a recorded jump, which brings the apex nearer. How much of them arrives is estimated, under a
-/// joint PD: on the Go1 20 N m/rad and 0.8 N m s/rad as in the examples, on others in proportion to mass times length of the
-/// legs.
+/// Inputs count less than along a recorded jump, which brings the apex nearer. How much of them arrives is estimated.
 fn of_plans(robot: &Robot) -> MpcSettings {
-    let size = |robot: &Robot| {
-        let legs = robot.geometry(Leg::FrontRight).lengths_m;
-        robot.mass_kg() * (legs[0] + legs[1])
-    };
-    let go1 = crate::robot_file::by_name("go1").expect("a registered robot");
-    let share = size(robot) / size(go1);
-    let gain = |of_go1: f64| (1e3 * of_go1 * share).round() / 1e3;
     MpcSettings {
         input_weight: 8.0,
-        effectiveness: Some(Effectiveness {
-            time_constant_s: 1.0,
-            stiffness_nm_rad: gain(20.0),
-            damping_nm_s_rad: gain(0.8),
-        }),
+        effectiveness_time_s: Some(1.0),
+        drives: Drives::of(robot),
         ..MpcSettings::default()
     }
 }
 
-/// The file for a plan of a robot: the settings that differ from the usual ones, and the torques in flight, which plans need.
+/// The file for a plan of a robot: the settings that differ from the usual ones, the joint PD, and the torques in flight,
+/// which plans need.
 pub(super) fn text(robot: &Robot) -> String {
     let both = [of_plans(robot), MpcSettings::default()];
     let [own, usual] = both.map(|settings| Settings::from(&settings).numbers());
@@ -79,7 +68,7 @@ pub(super) fn text(robot: &Robot) -> String {
                     # read them.\n"
         .to_owned();
     for ((setting, own), usual) in SETTINGS.iter().zip(own).zip(usual) {
-        if own != usual || setting.name == "flight_torque" {
+        if own != usual || setting.name.starts_with("drive_") || setting.name == "flight_torque" {
             text += &format!("{} = {own:?} # {}\n", setting.name, setting.text);
         }
     }

@@ -15,7 +15,7 @@ pub const SOURCES: &[(&str, &str)] = sources! {
     "online":
         command conic control_model controller dense effectiveness error estimate horizon
         interface lift linearise mod plan problem qp reference settings stage step structured
-        trajectory;
+        supervisor trajectory;
     "solver":
         interior links lower mod point problem riccati rows scalar solve;
 };

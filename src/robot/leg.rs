@@ -234,6 +234,23 @@ pub(crate) fn write_force_map(
     true
 }
 
+/// Height of a leg's foot at a state of the robot, m; `q` are the leg's angles.
+pub fn foot_height(leg: &LegShape, hip: &[Real], x: &[Real], q: &[Real]) -> Real {
+    let mut posture: Posture = Posture {
+        frame: [[0.0; 3]; 3],
+        foot: [0.0; 3],
+        by_first: [0.0; 3],
+        limb: [0.0; 2],
+        calf: [0.0; 2],
+    };
+    let mut foot: [Real; 3] = [0.0; 3];
+    posture.bend(leg, q);
+    posture.write_in_body(&posture.foot, &mut foot);
+    let aside = x[15].sin() * (hip[1] + foot[1]);
+    let above = x[15].cos() * (hip[2] + foot[2]);
+    x[14] - x[16].sin() * (hip[0] + foot[0]) + x[16].cos() * (aside + above)
+}
+
 /// Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false
 /// if the torques are not finite or the leg has no force map. The angles must be finite.
 pub(crate) fn add_wrench(

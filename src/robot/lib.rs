@@ -35,7 +35,7 @@ pub use joints::{
     BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
     JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM,
 };
-pub use leg::{LEAST_HEIGHT, LEAST_SPAN, LegShape, Posture};
+pub use leg::{LEAST_HEIGHT, LEAST_SPAN, LegShape, Posture, foot_height};
 pub use links::{LegMoments, MovingLeg, Scalar, TrunkMotion};
 pub use wrench::FeetRule;
 

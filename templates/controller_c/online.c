@@ -1,6 +1,9 @@
 /* @generated from src/control/online and src/robot by `cargo run -p romc-translate`: the controller's own steps.
  * Names that are defined elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
+/* How far a clock may go back, s: measurements may be exchanged. */
+#define ONLINE_CLOCK_JITTER_S 0.005
+
 /* Curvature of the cost as the solvers have it: CURVATURE / 2 ‖v‖². Inputs a few deviations beyond the limits then
  * have multipliers near those at which iterations begin. */
 #define ONLINE_CURVATURE (real)0.01
@@ -11,8 +14,22 @@
 /* Joint speed within which dry friction changes its sign, in rad/s. */
 #define ONLINE_DRY_SPEED_RAD_S (real)0.05
 
+/* Time in the air after which a body has to fall, s, and the least share of gravity. */
+#define ONLINE_FALL_S 0.03
+
+#define ONLINE_FALL_SHARE (real)0.5
+
+/* Height above the floor at which a foot is not on it, m. */
+#define ONLINE_FOOT_UP_M (real)0.06
+
 /* Gap between primal and dual cost, relative to the cost, at which they end as well. */
 #define ONLINE_GAP (real)1e-8
+
+/* Acceleration of free fall, in m/s^2. */
+#define ONLINE_GRAVITY_M_S2 9.81
+
+/* Tilts from half a turn on are none. */
+#define ONLINE_HALF_TURN (real)3.14
 
 /* Half width of the window in which velocities are fitted by a straight line, s. */
 #define ONLINE_HALF_WINDOW_S (0.016 + 1e-9)
@@ -22,10 +39,16 @@
 /* Largest weight of a step, in first steps. */
 #define ONLINE_LARGEST_WEIGHT (real)2.0
 
+/* Share of the distances from the reference that a measurement may be off what the last one predicts. */
+#define ONLINE_LEAP_SHARE (real)0.5
+
 /* Smallest and largest estimate. */
 #define ONLINE_LEAST (real)0.7
 
 #define ONLINE_LIFT_ITERATIONS 60
+
+/* Time over which velocities are compared with positions, s. */
+#define ONLINE_MEMORY_S (real)0.05
 
 /* Error of pitch beyond which legs turn no further, rad. */
 #define ONLINE_MOST_TURN_RAD (real)0.3
@@ -33,12 +56,18 @@
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
 
+/* How long measurements are refused before they are a fault, s. */
+#define ONLINE_PATIENCE_S 0.019
+
 /* Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the stage's end is
  * ahead of the motion and adds to the thrust; that of the middle takes from it. */
 #define ONLINE_POSTURE_SHARE 0.9
 
 /* Weight of the one from before the motion, in first steps. */
 #define ONLINE_PRIOR_WEIGHT (real)10.0
+
+/* How far a reference moves, rad or m, while a measurement that stays the same is not believed. */
+#define ONLINE_REFERENCE_MOVES (real)0.01
 
 /* Smallest |det J|, divided by LegShape::volume, at which torques still give a foot force: a knee about 1e-3 rad
  * from full extension. */
@@ -63,6 +92,27 @@
 
 /* Times closer than this are the same, s. */
 #define ONLINE_TIME_TOLERANCE_S 1e-9
+
+/* Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down. */
+#define ONLINE_UPSIDE_DOWN (real)0.5
+
+/* What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
+ * supervisor says what each is compared with. */
+typedef struct {
+    real tilt_rad;
+    real joint_margin_rad;
+    real joint_velocity;
+    real distance_m;
+    real posture_rad;
+    double clock_gap_s;
+    int frozen_steps;
+    real velocity_mismatch;
+    int contact_mismatch_steps;
+    int poor_steps;
+    double fade_s;
+    real damping_nm_s_rad;
+    real damping_torque_nm;
+} online_bounds;
 
 /* Whether the feet are where the reference has them. */
 typedef enum { ONLINE_AS_SCHEDULED, ONLINE_EARLY, ONLINE_LATE, ONLINE_UNKNOWN } online_contact;
@@ -447,6 +497,19 @@ static inline MAYBE_UNUSED int online_first_undefined(const real *values, int co
     return count;
 }
 
+/* Height of a leg's foot at a state of the robot, m; q are the leg's angles. */
+static inline MAYBE_UNUSED real online_foot_height(const online_leg_shape *leg, const real *hip, const real *x,
+        const real *q)
+{
+    online_posture posture = {.frame = {{0}}, .foot = {0}, .by_first = {0}, .limb = {0}, .calf = {0}};
+    real foot[3] = {0};
+    online_posture_bend(&posture, leg, q);
+    online_posture_write_in_body(&posture, posture.foot, foot);
+    const real aside = SIN(x[15]) * (hip[1] + foot[1]);
+    const real above = COS(x[15]) * (hip[2] + foot[2]);
+    return x[14] - SIN(x[16]) * (hip[0] + foot[0]) + COS(x[16]) * (aside + above);
+}
+
 /* Writes A and y_0; false if a number is not finite. wrench is G; matrices are row-major. */
 static inline MAYBE_UNUSED bool online_free_optimum(const real *projection, const real *wrench, const real *mean,
         const real *deviation, const real *u_lat, real prior_weight, int d, real *restrict scaled_map,
@@ -728,6 +791,15 @@ static inline MAYBE_UNUSED real online_violation(const real *q, const real *lowe
         largest = online_greater(outside / ((real)0.5 * (upper[i] - lower[i])), largest);
     }
     return largest;
+}
+
+/* Writes what is between two states of the robot. */
+static inline MAYBE_UNUSED void online_write_between(const real *earlier, const real *later, real share,
+        real *restrict state)
+{
+    for (int i = 0; i < 18; ++i) {
+        state[i] = earlier[i] + share * (later[i] - earlier[i]);
+    }
 }
 
 /* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that
@@ -1189,6 +1261,284 @@ static inline MAYBE_UNUSED void online_share_update(online_share *restrict self,
         self->weighted = weighted;
         self->estimate = online_greater(ONLINE_LEAST, online_smaller(mean, ONLINE_LARGEST));
     }
+}
+
+/* Writes torques that fade from the last ones into the damping of joint velocities, and a posture that fades into
+ * the measured one; the share that is left of the joint PD. passed_s is the time since the last command. */
+static inline MAYBE_UNUSED real online_supervisor_fade(online_supervisor *restrict self, const online_bounds *bounds,
+        real damping, double passed_s, const real *joints, const real *velocity, const real *limit,
+        const real *lower, const real *upper, const real *last_torque, const real *last_posture,
+        real *restrict torque, real *restrict posture)
+{
+    const real passed = (real)(self->faded_s / bounds->fade_s);
+    const real share = passed < 1 ? 1 - passed : 0.0;
+    self->faded_s += passed_s;
+    for (int i = 0; i < 12; ++i) {
+        const real damped = online_clamped_torque(-damping * velocity[i], bounds->damping_torque_nm);
+        const real faded = share * last_torque[i] + (1 - share) * damped;
+        torque[i] = online_clamped_torque(faded, limit[i]);
+        const real moved = share * last_posture[i] + (1 - share) * joints[i];
+        posture[i] = online_clamped_joint(moved, lower[i], upper[i]);
+    }
+    return share;
+}
+
+/* Forgets measurements, but neither a fault nor the floor. */
+static inline MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self)
+{
+    if (self->fault == ONLINE_NONE) {
+        self->faded_s = 0.0;
+    }
+    self->has_time = false;
+    self->standing = 0;
+    self->frozen = 0;
+    self->has_good = false;
+    self->is_doubted = false;
+    self->is_aloft = false;
+    self->contacts = 0;
+    self->poor = 0;
+    for (int i = 0; i < 3; ++i) {
+        self->unexplained[i] = 0;
+    }
+}
+
+/* Counts steps without a good plan; what is wrong. */
+static inline MAYBE_UNUSED online_fault online_supervisor_judge(online_supervisor *restrict self,
+        const online_bounds *bounds, bool is_poor)
+{
+    self->poor = is_poor ? self->poor + 1 : 0;
+    const bool is_counted = bounds->poor_steps > 0 && self->fault == ONLINE_NONE;
+    if (is_counted && self->poor >= bounds->poor_steps) {
+        self->fault = ONLINE_POOR_STEPS;
+    }
+    return self->fault;
+}
+
+/* Forgets measurements and the fault. */
+static inline MAYBE_UNUSED void online_supervisor_reset(online_supervisor *self)
+{
+    online_supervisor_forget(self);
+    self->fault = ONLINE_NONE;
+    self->faded_s = 0.0;
+}
+
+/* Takes the height of a foot that the reference has on the ground, m. */
+static inline MAYBE_UNUSED void online_supervisor_take_floor(online_supervisor *self, bool is_first, real height)
+{
+    self->floor_m = is_first ? height : online_greater(height, self->floor_m);
+}
+
+/* Whether the clock stands, goes back or leaps. */
+static inline MAYBE_UNUSED online_fault online_supervisor_clock_fault(online_supervisor *restrict self,
+        const online_bounds *bounds, double time_s)
+{
+    const double passed_s = time_s - self->time_s;
+    const bool is_first = !self->has_time;
+    const bool is_later = is_first || passed_s > 0.0;
+    self->standing = is_later ? 0 : self->standing + 1;
+    if (is_later) {
+        self->time_s = time_s;
+    }
+    self->has_time = true;
+    if (is_first || bounds->clock_gap_s > 1e9) {
+        return ONLINE_NONE;
+    }
+    if (passed_s > bounds->clock_gap_s) {
+        return ONLINE_CLOCK_LEAPS;
+    }
+    if (passed_s < -ONLINE_CLOCK_JITTER_S) {
+        return ONLINE_CLOCK_BACK;
+    }
+    const bool is_counted = bounds->frozen_steps > 0;
+    if (is_counted && self->standing >= bounds->frozen_steps) {
+        return ONLINE_CLOCK_STANDS;
+    }
+    return ONLINE_NONE;
+}
+
+/* Whether a measurement was the same too often: one that moves, or while the reference does. */
+static inline MAYBE_UNUSED bool online_supervisor_is_frozen(online_supervisor *restrict self,
+        const online_bounds *bounds, const real *x, const real *dx, const real *nominal)
+{
+    bool is_same = true;
+    bool moves = false;
+    for (int i = 0; i < 18; ++i) {
+        is_same = is_same && x[i] == self->seen_x[i] && dx[i] == self->seen_dx[i];
+        const real moved = solver_magnitude(nominal[i] - self->nominal[i]);
+        moves = (moves || dx[i] != 0) || moved > ONLINE_REFERENCE_MOVES;
+    }
+    for (int i = 0; i < 18; ++i) {
+        self->seen_x[i] = x[i];
+        self->seen_dx[i] = dx[i];
+        if (!is_same) {
+            self->nominal[i] = nominal[i];
+        }
+    }
+    self->frozen = is_same ? self->frozen + 1 : 0;
+    return bounds->frozen_steps > 0 && moves && self->frozen >= bounds->frozen_steps;
+}
+
+/* Cosine of the angle between the verticals of two attitudes, each roll and pitch, rad. */
+static inline MAYBE_UNUSED real online_common_height(const real *attitude, const real *other)
+{
+    const real turned = COS(attitude[1]) * COS(other[1]);
+    const real along = SIN(attitude[1]) * SIN(other[1]);
+    const real aside = turned * (SIN(attitude[0]) * SIN(other[0]));
+    const real above = turned * (COS(attitude[0]) * COS(other[0]));
+    return along + aside + above;
+}
+
+static inline MAYBE_UNUSED real online_distance(const real *place, const real *other)
+{
+    const real x = place[0] - other[0];
+    const real y = place[1] - other[1];
+    const real z = place[2] - other[2];
+    return SQRT(x * x + y * y + z * z);
+}
+
+/* The first bound that a state is beyond. */
+static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_supervisor *self,
+        const online_bounds *bounds, double time_s, const real *x, const real *dx, const real *nominal,
+        const real *lower, const real *upper, const real *speed)
+{
+    if (bounds->tilt_rad < ONLINE_HALF_TURN) {
+        const real off = online_common_height(x + 15, nominal + 15);
+        const real upright = COS(x[16]) * COS(x[15]);
+        if (off < COS(bounds->tilt_rad) || upright < -ONLINE_UPSIDE_DOWN) {
+            return ONLINE_TILT;
+        }
+    }
+    real joints = 0;
+    for (int i = 0; i < 12; ++i) {
+        const real margin = bounds->joint_margin_rad;
+        if (x[i] > upper[i] + margin || x[i] < lower[i] - margin) {
+            return ONLINE_JOINT_RANGE;
+        }
+        if (solver_magnitude(dx[i]) > bounds->joint_velocity * speed[i]) {
+            return ONLINE_JOINT_SPEED;
+        }
+        joints = online_greater(solver_magnitude(x[i] - nominal[i]), joints);
+    }
+    real by_reference[3] = {nominal[12], nominal[13], nominal[14]};
+    if (online_distance(x + 12, by_reference) > bounds->distance_m) {
+        return ONLINE_BODY_FAR;
+    }
+    if (joints > bounds->posture_rad) {
+        return ONLINE_JOINTS_FAR;
+    }
+    const double passed_s = time_s - self->good_s;
+    if (!self->has_good || passed_s > bounds->clock_gap_s) {
+        return ONLINE_NONE;
+    }
+    const real passed = (real)passed_s;
+    real body[3] = {0};
+    for (int i = 0; i < 3; ++i) {
+        body[i] = self->good_x[12 + i] + passed * self->good_dx[12 + i];
+    }
+    if (online_distance(x + 12, body) > ONLINE_LEAP_SHARE * bounds->distance_m) {
+        return ONLINE_BODY_LEAP;
+    }
+    for (int i = 0; i < 12; ++i) {
+        const real predicted = self->good_x[i] + passed * self->good_dx[i];
+        if (solver_magnitude(x[i] - predicted) > ONLINE_LEAP_SHARE * bounds->posture_rad) {
+            return ONLINE_JOINTS_LEAP;
+        }
+    }
+    return ONLINE_NONE;
+}
+
+/* Whether the body's velocity contradicts its positions since the last good measurement. */
+static inline MAYBE_UNUSED bool online_supervisor_is_unexplained(online_supervisor *restrict self,
+        const online_bounds *bounds, double time_s, const real *x, const real *dx)
+{
+    const real passed = (real)(time_s - self->good_s);
+    if (!self->has_good || !(passed > 0)) {
+        return false;
+    }
+    const real share = passed / ONLINE_MEMORY_S;
+    const real kept = share < 1 ? 1 - share : 0.0;
+    real largest = 0;
+    for (int i = 0; i < 3; ++i) {
+        const real moved = x[12 + i] - self->good_x[12 + i];
+        const real by_velocity = (real)0.5 * (dx[12 + i] + self->good_dx[12 + i]) * passed;
+        const real unexplained = kept * self->unexplained[i] + (moved - by_velocity);
+        self->unexplained[i] = unexplained;
+        largest = online_greater(solver_magnitude(unexplained), largest);
+    }
+    return largest / ONLINE_MEMORY_S > bounds->velocity_mismatch;
+}
+
+/* Whether contacts cannot be for too long: a foot on the ground is above the floor, or a body that no foot holds does
+ * not fall. */
+static inline MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor *restrict self,
+        const online_bounds *bounds, double time_s, real rises, const real *heights, bool *is_down)
+{
+    bool is_wrong = false;
+    bool is_aloft = true;
+    for (int foot = 0; foot < 4; ++foot) {
+        const bool is_up = heights[foot] > self->floor_m + ONLINE_FOOT_UP_M;
+        is_wrong = is_wrong || (is_down[foot] && is_up);
+        is_aloft = is_aloft && !is_down[foot];
+    }
+    if (is_aloft && !self->is_aloft) {
+        self->aloft_s = time_s;
+        self->aloft_m_s = rises;
+    }
+    self->is_aloft = is_aloft;
+    const double passed_s = time_s - self->aloft_s;
+    const real least = ONLINE_FALL_SHARE * (real)ONLINE_GRAVITY_M_S2 * (real)passed_s;
+    const bool falls = rises - self->aloft_m_s < -least;
+    if (is_aloft && passed_s > ONLINE_FALL_S && !falls) {
+        is_wrong = true;
+    }
+    self->contacts = is_wrong ? self->contacts + 1 : 0;
+    return bounds->contact_mismatch_steps > 0 && self->contacts >= bounds->contact_mismatch_steps;
+}
+
+/* Takes a finite measurement of state and velocity, 18 each, with the reference's state and the heights of the feet,
+ * m; what is wrong. */
+static inline MAYBE_UNUSED online_fault online_supervisor_watch(online_supervisor *restrict self,
+        const online_bounds *bounds, double time_s, const real *x, const real *dx, const real *nominal,
+        const real *heights, bool *is_down, const real *lower, const real *upper, const real *speed)
+{
+    if (self->fault != ONLINE_NONE) {
+        return self->fault;
+    }
+    const bool is_first = !self->has_time;
+    self->fault = online_supervisor_clock_fault(self, bounds, time_s);
+    if (self->fault == ONLINE_NONE && online_supervisor_is_frozen(self, bounds, x, dx, nominal)) {
+        self->fault = ONLINE_FROZEN;
+    }
+    if (self->fault != ONLINE_NONE) {
+        return self->fault;
+    }
+    online_fault state = online_supervisor_state_fault(self, bounds, time_s, x, dx, nominal, lower, upper, speed);
+    if (state != ONLINE_NONE) {
+        const bool is_far = state == ONLINE_BODY_FAR || state == ONLINE_JOINTS_FAR;
+        if (!self->is_doubted) {
+            self->doubted_s = time_s;
+        }
+        self->is_doubted = true;
+        if (is_first) {
+            self->fault = is_far ? ONLINE_NOT_AT_START : state;
+        } else if (time_s - self->doubted_s >= ONLINE_PATIENCE_S) {
+            self->fault = state;
+        }
+        return self->fault;
+    }
+    self->is_doubted = false;
+    if (online_supervisor_is_unexplained(self, bounds, time_s, x, dx)) {
+        self->fault = ONLINE_VELOCITY_MISMATCH;
+    } else if (online_supervisor_contradicts(self, bounds, time_s, dx[14], heights, is_down)) {
+        self->fault = ONLINE_CONTACT_MISMATCH;
+    }
+    self->has_good = true;
+    self->good_s = time_s;
+    for (int i = 0; i < 18; ++i) {
+        self->good_x[i] = x[i];
+        self->good_dx[i] = dx[i];
+    }
+    return self->fault;
 }
 
 /* Whether a state within STATE_REACH standard deviations of some state of the trajectory reaches row . z =

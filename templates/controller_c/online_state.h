@@ -41,3 +41,43 @@ typedef struct {
     int phase;
 } online_plan_time;
 
+/* What is wrong. Each has a status. */
+typedef enum { ONLINE_NONE, ONLINE_TILT, ONLINE_JOINT_RANGE, ONLINE_JOINT_SPEED, ONLINE_BODY_FAR, ONLINE_JOINTS_FAR, ONLINE_BODY_LEAP, ONLINE_JOINTS_LEAP, ONLINE_NOT_AT_START, ONLINE_CLOCK_STANDS, ONLINE_CLOCK_BACK, ONLINE_CLOCK_LEAPS, ONLINE_FROZEN, ONLINE_VELOCITY_MISMATCH, ONLINE_CONTACT_MISMATCH, ONLINE_POOR_STEPS } online_fault;
+
+/* What the supervisor remembers. */
+typedef struct {
+    /* What is wrong, until a reset. */
+    online_fault fault;
+    /* Time in which torques have faded so far, s. */
+    double faded_s;
+    /* Whether there was a measurement, and the latest time of one, s. */
+    bool has_time;
+    double time_s;
+    /* Calls in a row without a later time. */
+    int standing;
+    /* The last measurement of state and velocity, how often it was the same, and the reference when it first was. */
+    real seen_x[18];
+    real seen_dx[18];
+    int frozen;
+    real nominal[18];
+    /* The last measurement within all bounds, with its time, s. */
+    bool has_good;
+    double good_s;
+    real good_x[18];
+    real good_dx[18];
+    /* Whether the present one is beyond a bound, and since when measurements are, s. */
+    bool is_doubted;
+    double doubted_s;
+    /* Displacement of the body that its velocity does not explain, fading, m. */
+    real unexplained[3];
+    /* Height of the reference's highest foot on the ground, m. */
+    real floor_m;
+    /* Since when no foot is on the ground, s, and the vertical velocity then, m/s. */
+    bool is_aloft;
+    double aloft_s;
+    real aloft_m_s;
+    /* Measurements in a row whose contacts cannot be; steps in a row without a good plan. */
+    int contacts;
+    int poor;
+} online_supervisor;
+

@@ -4,7 +4,7 @@ use nalgebra::{DVector, SVector};
 use romc::lower::CompiledModel;
 use romc::model::ReducedModel;
 use romc::mpc::{
-    Command, ControlError, ControlModel, Controller, Drift, Effectiveness, Linearisation,
+    Command, ControlError, ControlModel, Controller, Drift, Drives, Linearisation,
     Measurement, MissingInput, MpcError, MpcSettings, ReferenceSamples, Source, Status,
 };
 use romc::robot::ContactFlags;
@@ -196,11 +196,11 @@ fn weak_and_strong_motors_are_made_up_for() {
     for stiffness_nm_rad in [0.0, 5.0] {
         let damping_nm_s_rad = 0.04 * stiffness_nm_rad;
         let estimating = MpcSettings {
-            effectiveness: Some(Effectiveness {
-                time_constant_s: 1.0,
+            effectiveness_time_s: Some(1.0),
+            drives: Drives {
                 stiffness_nm_rad,
                 damping_nm_s_rad,
-            }),
+            },
             ..trusting
         };
         let states = |settings, share| -> Vec<[f64; D]> {
@@ -521,11 +521,10 @@ fn settings_out_of_range_are_refused_by_name() {
     );
     assert_eq!(
         refused(MpcSettings {
-            effectiveness: Some(Effectiveness {
-                time_constant_s: 1.0,
+            drives: Drives {
                 stiffness_nm_rad: -1.0,
                 damping_nm_s_rad: 0.0,
-            }),
+            },
             ..MpcSettings::default()
         }),
         "drive_stiffness_nm_rad"

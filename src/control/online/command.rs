@@ -5,7 +5,8 @@
 use super::control_model::{clamped_joint, clamped_torque};
 use super::controller::Controller;
 use super::dense::{Real, first_undefined};
-use super::settings::FallbackSettings;
+use super::settings::{AfterEnd, Drives, FallbackSettings};
+use super::supervisor::Fault;
 use crate::robot::JOINT_DIM;
 
 /// Makes [`Status`] of a table: code, word, and text that begins with the word.
@@ -57,6 +58,27 @@ statuses! {
     MeasurementJump = 14, "measurement_jump",
         "measurement jump: a measurement far from the prediction; fallback";
     LiftFailed = 15, "lift_failed", "lift failed: no torques for the latent input; fallback";
+    Ended = 16, "ended", "ended: the reference is over, as settings say torques fade";
+    Tilt = 20, "tilt", "tilt: roll or pitch far from the reference's, or near upside down; damping until reset";
+    JointRange = 21, "joint_range", "joint range: a joint outside its limits; damping until reset";
+    JointSpeed = 22, "joint_speed", "joint speed: a joint faster than it can be; damping until reset";
+    BodyFar = 23, "body_far", "body far: the body is far from the reference; damping until reset";
+    JointsFar = 24, "joints_far", "joints far: a joint is far from the reference; damping until reset";
+    BodyLeap = 25, "body_leap",
+        "body leap: the body is not where its last measurement leads; damping until reset";
+    JointsLeap = 26, "joints_leap",
+        "joints leap: a joint is not where its last measurement leads; damping until reset";
+    NotAtStart = 27, "not_at_start",
+        "not at start: the first measurement is far from the reference; damping until reset";
+    ClockStands = 28, "clock_stands", "clock stands: times do not increase; damping until reset";
+    ClockBack = 29, "clock_back", "clock back: a time before the last one; damping until reset";
+    ClockLeaps = 30, "clock_leaps", "clock leaps: too long since the last time; damping until reset";
+    Frozen = 31, "frozen", "frozen: the measurement of a moving robot stays the same; damping until reset";
+    VelocityMismatch = 32, "velocity_mismatch",
+        "velocity mismatch: the body's velocity contradicts its positions; damping until reset";
+    ContactMismatch = 33, "contact_mismatch",
+        "contact mismatch: heights of feet or the fall contradict the contacts; damping until reset";
+    PoorSteps = 34, "poor_steps", "poor steps: too many steps without a good plan; damping until reset";
     NotFinite = -1, "not_finite",
         "not finite: a number is infinite or not a number; fallback";
     WrongDimension = -2, "wrong_dimension",
@@ -68,6 +90,17 @@ impl Status {
     /// Whether the command comes from this step's own plan.
     pub fn has_plan(self) -> bool {
         (Self::Solved.code()..Self::Inaccurate.code()).contains(&self.code())
+    }
+
+    /// Whether the step fell short of what the reference allows: nothing was planned, or for unknown contacts.
+    fn is_poor(self) -> bool {
+        !self.has_plan() || self == Self::ContactUnknown
+    }
+
+    /// The status of a fault.
+    fn of(fault: Fault) -> Option<Self> {
+        let code = Self::Tilt.code() - 1 + fault as i32;
+        (Self::ALL.iter().copied()).find(|status| fault != Fault::None && status.code() == code)
     }
 
     /// The status as a number.
@@ -85,6 +118,8 @@ pub enum Source {
     ShiftedPlan,
     /// No plan: posture held, feed-forward torque fading, joints damped.
     Hold,
+    /// The motion was left: torques and joint PD fade into joint damping.
+    Damping,
 }
 
 impl Source {
@@ -94,6 +129,7 @@ impl Source {
             Source::Plan => "plan",
             Source::ShiftedPlan => "shifted_plan",
             Source::Hold => "hold",
+            Source::Damping => "damping",
         }
     }
 }
@@ -110,6 +146,8 @@ pub struct Command {
     pub joint_position_rad: [f64; JOINT_DIM],
     /// Desired joint velocities, rad/s.
     pub joint_velocity_rad_s: [f64; JOINT_DIM],
+    /// Gains of the joint PD on both.
+    pub drives: Drives,
     /// Latent input behind the torques, `latent_dim`.
     pub u_lat: Vec<f64>,
     /// How the step ended.
@@ -142,6 +180,10 @@ impl Command {
             losses_nm: [0.0; JOINT_DIM],
             joint_position_rad: [0.0; JOINT_DIM],
             joint_velocity_rad_s: [0.0; JOINT_DIM],
+            drives: Drives {
+                stiffness_nm_rad: 0.0,
+                damping_nm_s_rad: 0.0,
+            },
             u_lat: vec![0.0; latent_dim],
             status: Status::NoReference,
             source: Source::Hold,
@@ -283,5 +325,55 @@ impl Controller {
         command.joint_velocity_rad_s = [0.0; JOINT_DIM];
         command.u_lat.fill(0.0);
         command.source = Source::Hold;
+    }
+
+    /// Counts poor steps; the status that stays.
+    pub(super) fn judged(&mut self, status: Status) -> Status {
+        let is_poor = self.reference.is_some() && status.is_poor();
+        let fault = self.supervisor.judge(&self.settings.bounds, is_poor);
+        Status::of(fault).unwrap_or(status)
+    }
+
+    /// Leaves the motion: torques and joint PD fade into damping, about the measured joints if there are any.
+    pub(super) fn damp(&mut self, time_s: f64, x: &[f64], command: &mut Command) {
+        let (bounds, stops) = (&self.settings.bounds, self.settings.after_end == AfterEnd::Stop);
+        let is_ended = self.supervisor.fault == Fault::None;
+        let damping = match is_ended && stops {
+            true => 0.0,
+            false => bounds.damping_nm_s_rad,
+        };
+        let [lower, upper] = self.plant.joint_limits();
+        let memory = &mut self.memory;
+        let joints = match x.first_chunk::<JOINT_DIM>() {
+            Some(joints) if first_undefined(joints, JOINT_DIM) == JOINT_DIM => *joints,
+            _ => memory.joint_position,
+        };
+        if !memory.has_position {
+            memory.keep_posture(&joints, &lower, &upper);
+        }
+        if self.supervisor.fault == Fault::Frozen {
+            memory.joint_velocity = [0.0; JOINT_DIM];
+        }
+        let passed_s = memory.since_command(time_s, self.settings.step_s);
+        let share = self.supervisor.fade(
+            bounds,
+            damping,
+            passed_s,
+            &joints,
+            &memory.joint_velocity,
+            self.plant.robot().torque_limit_nm(),
+            &lower,
+            &upper,
+            &memory.feed_forward_nm,
+            &memory.joint_position,
+            &mut command.torque_nm,
+            &mut command.joint_position_rad,
+        );
+        command.drives.stiffness_nm_rad *= share;
+        command.drives.damping_nm_s_rad *= share;
+        command.losses_nm = [0.0; JOINT_DIM];
+        command.joint_velocity_rad_s = [0.0; JOINT_DIM];
+        command.u_lat.fill(0.0);
+        command.source = Source::Damping;
     }
 }

@@ -18,8 +18,9 @@ use super::qp::QpSolver;
 use super::reference::{Reference, ReferenceSamples};
 use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelection};
 use super::stage::{StageShape, write_weights};
+use super::supervisor::{Fault, Supervisor};
 use super::trajectory::Trajectory;
-use crate::robot::{ContactFlags, JOINT_DIM, STATE_DIM};
+use crate::robot::{ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the rows that were
 /// left out may hide.
@@ -53,6 +54,7 @@ pub struct Controller {
     /// What the plan's inputs are lifted for; none without a plan.
     pub(super) stance: Option<StanceState>,
     pub(super) effectiveness: Effectiveness,
+    pub(super) supervisor: Supervisor,
 }
 
 /// One measurement.
@@ -94,6 +96,7 @@ impl Controller {
             last_input: vec![0.0; d],
             stance: None,
             effectiveness: Effectiveness::full(d),
+            supervisor: Supervisor::default(),
             reference: None,
             near_rows: rows.clone(),
             rows,
@@ -170,8 +173,17 @@ impl Controller {
         };
         (self.horizon, self.engine) = program(d, &rows, &state_weights, &self.settings)?;
         self.near_rows = rows;
+        let grounded = reference.robot_states().zip(samples.feet);
+        let mut is_first = true;
+        for (x, feet) in grounded {
+            for leg in Leg::down(*feet) {
+                self.supervisor
+                    .take_floor(is_first, foot_height(self.plant.robot(), leg, x));
+                is_first = false;
+            }
+        }
         self.reference = Some(reference);
-        self.reset();
+        self.forget();
         Ok(())
     }
 
@@ -204,8 +216,14 @@ impl Controller {
         })
     }
 
-    /// Forgets plan and past measurements, but not the reference.
+    /// Forgets plan, past measurements and the supervisor's fault, but not the reference.
     pub fn reset(&mut self) {
+        self.supervisor.reset();
+        self.forget();
+    }
+
+    fn forget(&mut self) {
+        self.supervisor.forget();
         self.plan.time.is_made = false;
         self.horizon.forget();
         self.engine.forget();
@@ -260,18 +278,25 @@ impl Controller {
         command.slack = 0.0;
         command.phase = None;
         command.inconsistency = None;
+        command.drives = self.settings.drives;
         let status = match self.take(&measurement) {
             Ok(()) => self.plan_step(&measurement, command),
             Err(status) => status,
         };
+        let status = self.judged(status);
         command.status = status;
-        if !status.has_plan() {
+        if status == Status::Ended || self.supervisor.fault != Fault::None {
+            self.damp(measurement.time_s, measurement.x, command);
+        } else if !status.has_plan() {
             self.fall_back(measurement.time_s, command);
         }
-        if let Some(settings) = &self.settings.effectiveness {
-            let held = [command.joint_position_rad, command.joint_velocity_rad_s];
+        if self.settings.effectiveness_time_s.is_some() {
+            let (held, drives) = (
+                [command.joint_position_rad, command.joint_velocity_rad_s],
+                &self.settings.drives,
+            );
             match status.has_plan() {
-                true => (self.effectiveness).keep(&self.plant, settings, &measurement, held),
+                true => (self.effectiveness).keep(&self.plant, drives, &measurement, held),
                 false => self.effectiveness.held = None,
             }
         }
@@ -292,6 +317,13 @@ fn program(
     let cost = stage_cost(state_weights, settings);
     let engine = solver.of_horizon(length, shape, &cost, settings.qp)?;
     Ok((Horizon::new(length, &shape), engine))
+}
+
+/// Height of a foot above the origin of the measurements at a state of the robot, m.
+pub(super) fn foot_height(robot: &Robot, leg: Leg, x: &[f64]) -> f64 {
+    let (shape, hip) = (&robot.geometry(leg).shape, robot.hip_position(leg));
+    let q = &x[leg.index() * LEG_JOINT_DIM..][..LEG_JOINT_DIM];
+    crate::robot::foot_height(shape, hip.as_slice(), x, q)
 }
 
 fn mean_state(x: &[f64]) -> [f64; STATE_DIM] {

@@ -18,7 +18,7 @@ use super::controller::Measurement;
 use super::dense::{Real, greater, smaller};
 use super::linearise::StageModel;
 use super::plan::Plan;
-use super::settings::Effectiveness as Settings;
+use super::settings::Drives;
 use crate::robot::{JOINT_DIM, STATE_DIM};
 
 /// Weight of the one from before the motion, in first steps.
@@ -154,12 +154,12 @@ impl Effectiveness {
     pub(super) fn keep(
         &mut self,
         plant: &ControlModel,
-        settings: &Settings,
+        drives: &Drives,
         measurement: &Measurement<'_>,
         held: [[f64; JOINT_DIM]; 2],
     ) {
         self.held = Some(held);
-        match self.take_drives(plant, settings, measurement) {
+        match self.take_drives(plant, drives, measurement) {
             true => self.at_command.copy_from_slice(&self.drives),
             false => self.held = None,
         }
@@ -169,19 +169,19 @@ impl Effectiveness {
     pub(super) fn update(
         &mut self,
         (plant, plan): (&ControlModel, &Plan),
-        settings: &Settings,
+        (time_constant_s, drives): (f64, &Drives),
         measurement: &Measurement<'_>,
         measured: &[f64],
         deviation: &[f64],
     ) {
-        if !self.is_grounded || !self.take_drives(plant, settings, measurement) {
+        if !self.is_grounded || !self.take_drives(plant, drives, measurement) {
             return;
         }
         let (time, d) = (plan.time, self.drives.len());
         self.share.update(
             time.passed(measurement.time_s),
             time.step_s,
-            settings.time_constant_s,
+            time_constant_s,
             &self.by_input,
             plan.input(0),
             &plan.states,
@@ -197,14 +197,14 @@ impl Effectiveness {
     fn take_drives(
         &mut self,
         plant: &ControlModel,
-        settings: &Settings,
+        drives: &Drives,
         measurement: &Measurement<'_>,
     ) -> bool {
         let Some(held) = &self.held else {
             return false;
         };
         let (x, dx, mut torque) = (measurement.x, measurement.dx, [0.0; JOINT_DIM]);
-        let gains = [settings.stiffness_nm_rad, settings.damping_nm_s_rad];
+        let gains = [drives.stiffness_nm_rad, drives.damping_nm_s_rad];
         write_drives(&gains, held.as_flattened(), x, dx, &mut torque);
         let state: [f64; STATE_DIM] = std::array::from_fn(|i| x[i]);
         let rule = plant.input_rule();

@@ -102,6 +102,8 @@ pub struct RawCommand<const D: usize> {
     pub torque: [f64; JOINT_DIM],
     pub joint_position: [f64; JOINT_DIM],
     pub joint_velocity: [f64; JOINT_DIM],
+    pub stiffness: f64,
+    pub damping: f64,
     pub u_lat: [f64; D],
     pub status: i32,
     pub iterations: i32,
@@ -117,6 +119,8 @@ impl<const D: usize> RawCommand<D> {
                 .joint_limit_rad()
                 .map(|(lower, upper)| 0.5 * (lower + upper)),
             joint_velocity: [0.0; JOINT_DIM],
+            stiffness: 0.0,
+            damping: 0.0,
             u_lat: [0.0; D],
             status,
             iterations: 0,
@@ -214,6 +218,8 @@ impl<const D: usize> Handle<D> {
             torque: command.torque_nm,
             joint_position: command.joint_position_rad,
             joint_velocity: command.joint_velocity_rad_s,
+            stiffness: command.drives.stiffness_nm_rad,
+            damping: command.drives.damping_nm_s_rad,
             u_lat: std::array::from_fn(|latent| command.u_lat[latent]),
             status: if has_all {
                 command.status.code()

@@ -35,6 +35,7 @@ mod settings;
 mod stage;
 mod step;
 pub mod structured;
+mod supervisor;
 mod trajectory;
 
 pub use crate::solver::{Outcome, Residuals};
@@ -49,7 +50,7 @@ pub use plan::Plan;
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, sparse};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
-    Drift, Effectiveness, FallbackSettings, Lift, Linearisation, MissingInput, MpcSettings,
+    AfterEnd, Bounds, Drift, Drives, FallbackSettings, Lift, Linearisation, MissingInput, MpcSettings,
     RowSelection, Solver,
 };
 pub use trajectory::NO_PHASE;

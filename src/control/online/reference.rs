@@ -3,7 +3,7 @@
 use super::control_model::ControlModel;
 use super::dense::first_undefined;
 use super::error::ControlError;
-use super::trajectory::{Instant, Trajectory, write_still};
+use super::trajectory::{Instant, Trajectory, write_between, write_still};
 use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
 
 /// A trajectory in SI units as its user has it: samples one after the other.
@@ -91,7 +91,19 @@ impl Reference {
         let Instant { sample, share } = self.locate(time_s);
         let earlier = row(&self.x, sample);
         let later = row(&self.x, (sample + 1).min(self.time_s.len() - 1));
-        std::array::from_fn(|i| earlier[i] + share * (later[i] - earlier[i]))
+        let mut state = [0.0; STATE_DIM];
+        write_between(earlier, later, share, &mut state);
+        state
+    }
+
+    /// Whether a time is after the last sample.
+    pub(super) fn is_over(&self, time_s: f64) -> bool {
+        time_s > self.time_s[self.time_s.len() - 1]
+    }
+
+    /// The robot's state at each sample.
+    pub(super) fn robot_states(&self) -> impl Iterator<Item = &[f64]> {
+        self.x.chunks_exact(STATE_DIM)
     }
 
     /// Roll and pitch, rad, of the last sample at or before the time.

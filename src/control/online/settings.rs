@@ -3,6 +3,7 @@
 
 use super::error::ControlError;
 use super::qp::QpSettings;
+use crate::robot::{Leg, Robot};
 
 /// How a latent input becomes joint torques, each way with its number for interfaces without enumerations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -89,15 +90,96 @@ impl Default for FallbackSettings {
     }
 }
 
-/// How the share of the input that arrives is estimated, and what the motors add to it.
+/// What follows when the time of the reference is over, numbered as [`Lift`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum AfterEnd {
+    /// The last sample is held.
+    Hold = 0,
+    /// Torques fade into joint damping.
+    Damp = 1,
+    /// Torques and gains fade to zero.
+    Stop = 2,
+}
+
+/// Gains of the joint PD that holds the commanded posture, in the motors or in the caller.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Effectiveness {
-    /// Time constant with which what was learned fades, s.
-    pub time_constant_s: f64,
-    /// Stiffness of the joint PD that holds the commanded posture, N m/rad; 0 without one.
+pub struct Drives {
+    /// N m/rad; 0 without one.
     pub stiffness_nm_rad: f64,
-    /// Its damping, N m s/rad.
+    /// N m s/rad.
     pub damping_nm_s_rad: f64,
+}
+
+impl Drives {
+    /// Of the Go1, and its mass times the length of its legs, kg m.
+    const GO1: Self = Self {
+        stiffness_nm_rad: 20.0,
+        damping_nm_s_rad: 0.8,
+    };
+    const GO1_SIZE: f64 = 12.01 * 0.426;
+
+    /// Gains of a robot: those of the Go1 in proportion to mass times length of the legs.
+    pub fn of(robot: &Robot) -> Self {
+        let legs = robot.geometry(Leg::FrontRight).lengths_m;
+        let share = robot.mass_kg() * (legs[0] + legs[1]) / Self::GO1_SIZE;
+        let gain = |of_go1: f64| (1e3 * of_go1 * share).round() / 1e3;
+        Self {
+            stiffness_nm_rad: gain(Self::GO1.stiffness_nm_rad),
+            damping_nm_s_rad: gain(Self::GO1.damping_nm_s_rad),
+        }
+    }
+}
+
+/// What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
+/// `supervisor` says what each is compared with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "the table of settings describes them")]
+pub struct Bounds {
+    pub tilt_rad: Real,
+    pub joint_margin_rad: Real,
+    pub joint_velocity: Real,
+    pub distance_m: Real,
+    pub posture_rad: Real,
+    pub clock_gap_s: f64,
+    pub frozen_steps: usize,
+    pub velocity_mismatch: Real,
+    pub contact_mismatch_steps: usize,
+    pub poor_steps: usize,
+    pub fade_s: f64,
+    pub damping_nm_s_rad: Real,
+    pub damping_torque_nm: Real,
+}
+
+impl Bounds {
+    /// Nothing is watched.
+    pub const OFF: Self = Self {
+        tilt_rad: f64::INFINITY,
+        joint_margin_rad: f64::INFINITY,
+        joint_velocity: f64::INFINITY,
+        distance_m: f64::INFINITY,
+        posture_rad: f64::INFINITY,
+        clock_gap_s: f64::INFINITY,
+        frozen_steps: 0,
+        velocity_mismatch: f64::INFINITY,
+        contact_mismatch_steps: 0,
+        poor_steps: 0,
+        ..Self::USUAL
+    };
+    const USUAL: Self = Self {
+        tilt_rad: 0.5,
+        joint_margin_rad: 0.1,
+        joint_velocity: 1.5,
+        distance_m: 0.3,
+        posture_rad: 1.0,
+        clock_gap_s: 0.1,
+        frozen_steps: 8,
+        velocity_mismatch: 0.5,
+        contact_mismatch_steps: 5,
+        poor_steps: 10,
+        fade_s: 0.1,
+        damping_nm_s_rad: 1.0,
+        damping_torque_nm: 10.0,
+    };
 }
 
 /// Longest horizon that is accepted.
@@ -118,8 +200,10 @@ pub enum Accepts {
     LinkRows(&'static str, &'static str),
     /// A number from 0 to 1.
     Share,
-    /// Zero or a positive number; not looked at where this setting is zero.
-    With(&'static str),
+    /// A positive number, or infinity, which is off.
+    Bound,
+    /// A whole number, or zero, which is off.
+    Count,
 }
 
 impl Accepts {
@@ -133,9 +217,12 @@ impl Accepts {
                 (is_positive, "a positive number")
             }
             Self::Share => ((0.0..=1.0).contains(&found), "a number from 0 to 1"),
-            Self::NotNegative | Self::With(_) => {
-                (is_positive || found == 0.0, "zero or a positive number")
-            }
+            Self::NotNegative => (is_positive || found == 0.0, "zero or a positive number"),
+            Self::Bound => (found > 0.0, "a positive number or infinity"),
+            Self::Count => (
+                (0.0..=f64::from(i32::MAX)).contains(&found),
+                "zero or a positive number",
+            ),
         };
         let refused = ControlError::Setting {
             name,
@@ -151,6 +238,8 @@ impl Accepts {
 pub struct Setting {
     /// Name in C, Python and ROS.
     pub name: &'static str,
+    /// Field of [`MpcSettings`].
+    pub field: &'static str,
     /// `i32`, `f64`, or `Real` for what has the precision of the generated C.
     pub kind: &'static str,
     /// Accepted range.
@@ -201,11 +290,24 @@ in_c! {
         [number] => [Self::Clarabel, Self::Riccati][number as usize];
     QpSettings, 1: (value, _none) [f64::from(value.max_iterations)],
         [number] => Self { max_iterations: number as u32, ..Self::default() };
-    Option<Effectiveness>, 3:
-        (value, none) value.map_or([none; 3], |e| [e.time_constant_s, e.stiffness_nm_rad, e.damping_nm_s_rad]),
-        [time_constant_s, stiffness_nm_rad, damping_nm_s_rad] => {
-            let estimate = Effectiveness { time_constant_s, stiffness_nm_rad, damping_nm_s_rad };
-            (time_constant_s != 0.0).then_some(estimate)
+    AfterEnd, 1: (value, _none) [f64::from(value as u8)],
+        [number] => [Self::Hold, Self::Damp, Self::Stop][number as usize];
+    Drives, 2: (value, _none) [value.stiffness_nm_rad, value.damping_nm_s_rad],
+        [stiffness_nm_rad, damping_nm_s_rad] => Self { stiffness_nm_rad, damping_nm_s_rad };
+    Bounds, 13:
+        (value, _none) [
+            value.tilt_rad, value.joint_margin_rad, value.joint_velocity, value.distance_m, value.posture_rad,
+            value.clock_gap_s, value.frozen_steps as f64, value.velocity_mismatch,
+            value.contact_mismatch_steps as f64, value.poor_steps as f64, value.fade_s, value.damping_nm_s_rad,
+            value.damping_torque_nm,
+        ],
+        [
+            tilt_rad, joint_margin_rad, joint_velocity, distance_m, posture_rad, clock_gap_s, frozen,
+            velocity_mismatch, contacts, poor, fade_s, damping_nm_s_rad, damping_torque_nm,
+        ] => Self {
+            tilt_rad, joint_margin_rad, joint_velocity, distance_m, posture_rad, clock_gap_s,
+            frozen_steps: frozen as usize, velocity_mismatch, contact_mismatch_steps: contacts as usize,
+            poor_steps: poor as usize, fade_s, damping_nm_s_rad, damping_torque_nm,
         };
 }
 
@@ -277,7 +379,7 @@ macro_rules! settings {
             /// The same for the controller.
             pub fn to_mpc(&self) -> Result<MpcSettings, ControlError> {
                 for (setting, found) in SETTINGS.iter().zip(self.numbers()) {
-                    if let Accepts::Whole(..) = setting.accepts {
+                    if let Accepts::Whole(..) | Accepts::Count = setting.accepts {
                         setting.accepts.check(setting.name, found)?;
                     }
                 }
@@ -304,6 +406,7 @@ macro_rules! settings {
         /// The settings that C has, in the order of its structure.
         pub const SETTINGS: &[Setting] = &[$($(Setting {
             name: stringify!($name),
+            field: stringify!($field),
             kind: stringify!($kind),
             accepts: $accepts,
             text: $text,
@@ -362,12 +465,12 @@ settings! {
             in_c "largest change of a torque of LIFT_TRANSPOSE, N m/s; 0 leaves it free, as it must if UPPER_TORQUE_RATES is 0",
             in_ros "largest change of a torque of the plain lift, N m/s, where the controller is compiled with \
                     `UPPER_TORQUE_RATES=1`; 0 leaves it free";
-        effectiveness: Option<Effectiveness> = None => effectiveness_time_s: Real, Accepts::Optional,
+        effectiveness_time_s: Option<f64> = None => effectiveness_time_s: Real, Accepts::Optional,
             "time constant of the estimate of how much of the input arrives, s; 0 for none",
-            in_ros "time constant of the estimate of the share of the input that arrives; 0 for none"
-            | drive_stiffness_nm_rad: Real, Accepts::With("effectiveness_time_s"),
-            "joint PD that holds joint_position, for that estimate"
-            | drive_damping_nm_s_rad: Real, Accepts::With("effectiveness_time_s"), "of joint_velocity";
+            in_ros "time constant of the estimate of the share of the input that arrives; 0 for none";
+        drives: Drives = Drives::GO1 => drive_stiffness_nm_rad: Real, Accepts::NotNegative,
+            "stiffness of the joint PD that holds joint_position, N m/rad"
+            | drive_damping_nm_s_rad: Real, Accepts::NotNegative, "its damping, of joint_velocity, N m s/rad";
         /// Zero leaves them where the reference has them from the body, 1 where it has them from the ground.
         swing_turn: f64 = 1.0 => swing_turn: Real, Accepts::NotNegative,
             "share of the error of pitch that joint_position turns the legs against in flight";
@@ -375,6 +478,37 @@ settings! {
         flight_torque: f64 = 1.0 => flight_torque: Real, Accepts::Share,
             "share of the torques that acts in flight, 0 to 1; 0 leaves the legs to the joint PD",
             in_ros "share of the feed-forward torques that acts in flight, 0 to 1; 0 leaves the legs to the PD";
+        after_end: AfterEnd = AfterEnd::Hold => after_end: i32, Accepts::Whole(0, 2, "0 (hold), 1 (damp) or 2 (stop)"),
+            "after the reference: UPPER_HOLD (default), _DAMP or _STOP", in_c "after the reference: UPPER_HOLD, _DAMP or _STOP";
+        /// Chosen so that no right recording, plan or simulated jump of the repository comes near; see `docs/control.md`.
+        bounds: Bounds = Bounds::USUAL => tilt_rad: Real, Accepts::Bound,
+            "most angle between the verticals of body and reference",
+            in_ros "most angle between the verticals of body and reference, rad; .inf is off"
+            | joint_margin_rad: Real, Accepts::Bound, "how far joints may be outside their limits",
+            in_ros "how far joints may be outside their limits, rad; .inf is off"
+            | joint_velocity: Real, Accepts::Bound, "most joint velocity, in largest speeds of the joint",
+            in_ros "most joint velocity, in largest speeds of the joint; .inf is off"
+            | distance_m: Real, Accepts::Bound,
+            "most distance of the body from the reference, and twice that from where its last measurement leads",
+            in_ros "most distance of the body from the reference, m; .inf is off"
+            | posture_rad: Real, Accepts::Bound,
+            "most distance of a joint from the reference, and twice that from where its last measurement leads",
+            in_ros "most distance of a joint from the reference, rad; .inf is off"
+            | clock_gap_s: f64, Accepts::Bound, "most time between steps, s; infinite: clocks may stand and go back, too",
+            in_ros "most time between steps, s; .inf is off"
+            | frozen_steps: i32, Accepts::Count, "steps in which a clock may stand or a moving measurement stay the same",
+            in_ros "steps in which a measurement may stay the same; 0 is off"
+            | velocity_mismatch: Real, Accepts::Bound, "most velocity of the body that its positions do not show, m/s",
+            in_ros "most velocity of the body that its positions do not show, m/s; .inf is off"
+            | contact_mismatch_steps: i32, Accepts::Count, "steps with contacts that heights of feet or the fall contradict",
+            in_ros "steps with contacts that heights of feet or the fall contradict; 0 is off"
+            | poor_steps: i32, Accepts::Count, "steps in a row without a plan or with unknown contacts",
+            in_ros "steps in a row without a plan or with unknown contacts; 0 is off"
+            | fade_s: f64, Accepts::Positive, "time in which torques fade into damping, s",
+            in_ros "time in which torques fade into damping, s"
+            | damping_nm_s_rad: Real, Accepts::NotNegative, "damping of the joints then",
+            in_ros "damping of the joints then, N m s/rad"
+            | damping_torque_nm: Real, Accepts::Positive, "most torque of it", in_ros "most torque of it, N m";
     }
     rust {
         /// What stands for the reference's own dynamics.

@@ -4,11 +4,13 @@ use nalgebra::SVector;
 
 use super::command::{Command, Source, Status};
 use super::control_model::violation;
-use super::controller::{Controller, Measurement, SOFTENED_FROM};
+use super::controller::{Controller, Measurement, SOFTENED_FROM, foot_height};
 use super::lift::StanceState;
+use super::settings::AfterEnd;
 use super::stage::unscale;
+use super::supervisor::Fault;
 use super::trajectory::NO_PHASE;
-use crate::robot::{JOINT_DIM, STATE_DIM};
+use crate::robot::{JOINT_DIM, Leg, STATE_DIM};
 use crate::solver::Outcome;
 
 /// Lifted force, N, below which its inconsistency means nothing.
@@ -24,6 +26,9 @@ impl Controller {
         if !self.memory.accepts(time_s, x, dx) {
             return Err(Status::NotFinite);
         }
+        if self.supervisor.fault != Fault::None {
+            return Err(Status::NoReference);
+        }
         let Some(reference) = &self.reference else {
             // Nothing to follow yet: the robot stays as it is.
             if !self.memory.has_position {
@@ -32,6 +37,31 @@ impl Controller {
             }
             return Err(Status::NoReference);
         };
+        if self.settings.after_end != AfterEnd::Hold && reference.is_over(time_s) {
+            return Err(Status::Ended);
+        }
+        let nominal = reference.robot_state_at(time_s);
+        let robot = self.plant.robot();
+        let heights = Leg::ALL.map(|leg| foot_height(robot, leg, x));
+        let [lower, upper] = self.plant.joint_limits();
+        let (bounds, feet) = (&self.settings.bounds, &measurement.feet);
+        let fault = self.supervisor.watch(
+            bounds,
+            time_s,
+            x,
+            dx,
+            &nominal,
+            &heights,
+            feet,
+            &lower,
+            &upper,
+            &robot.joint_speed_limit_rad_s,
+        );
+        if fault != Fault::None || self.supervisor.is_doubted {
+            // The measured velocities must not become torques.
+            self.memory.joint_velocity = [0.0; JOINT_DIM];
+            return Err(Status::MeasurementJump);
+        }
         let (d, horizon) = (self.plant.latent_dim(), self.settings.horizon);
         let (z, dz) = self.measured.split_at_mut(d);
         self.plant.encode(x, z);
@@ -43,8 +73,9 @@ impl Controller {
         if self.memory.refuses(is_jump, fallback.jump_patience) {
             return Err(Status::MeasurementJump);
         }
-        if let Some(settings) = &self.settings.effectiveness {
+        if let Some(time_constant_s) = self.settings.effectiveness_time_s {
             let parts = (&self.plant, plan);
+            let settings = (time_constant_s, &self.settings.drives);
             (self.effectiveness).update(parts, settings, measurement, measured, deviation);
         }
         self.stand_at(measurement.x);

@@ -309,6 +309,13 @@ pub(super) trait Trajectory {
     }
 }
 
+/// Writes what is between two states of the robot.
+pub(super) fn write_between(earlier: &[Real], later: &[Real], share: Real, state: &mut [Real]) {
+    for i in 0..18 {
+        state[i] = earlier[i] + share * (later[i] - earlier[i]);
+    }
+}
+
 /// Whether times are the same but for rounding.
 pub(super) fn is_same_time(time_s: f64, other_s: f64) -> bool {
     let off_s = time_s - other_s;

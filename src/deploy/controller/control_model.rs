@@ -146,6 +146,23 @@ impl SettingText {
         format!("{kind} {name}; /**< {text}{default} */")
     }
 
+    /// Its default in the generated C.
+    pub(in crate::deploy) fn default_in_c(&self) -> String {
+        let number = match self.default.is_finite() {
+            true => self.default.to_string(),
+            false => "INFINITY".to_owned(),
+        };
+        match self.setting.kind {
+            "Real" => format!("(real){number}"),
+            _ => number,
+        }
+    }
+
+    /// Whether the generated C checks it by [`Self::refused`]; other choices it checks by hand.
+    pub(in crate::deploy) fn is_checked_by_table(&self) -> bool {
+        !matches!(self.setting.accepts, Accepts::Whole(..))
+    }
+
     /// The condition under which the generated C refuses a value, and the accepted range in words.
     pub(in crate::deploy) fn refused(&self) -> (String, &'static str) {
         let number = format!("settings->{}", self.setting.name);
@@ -160,10 +177,8 @@ impl SettingText {
                 let condition = format!("!is_not_negative({number}) || {number} > 1");
                 (condition, "a number from 0 to 1")
             }
-            Accepts::With(first) => {
-                let condition = format!("settings->{first} > 0 && !is_not_negative({number})");
-                (condition, other)
-            }
+            Accepts::Bound => (format!("!({number} > 0)"), "a positive number or infinity"),
+            Accepts::Count => (format!("{number} < 0"), other),
             _ => (format!("!is_not_negative({number})"), other),
         }
     }

@@ -247,6 +247,12 @@ fn is_state(word: &str) -> bool {
     word.starts_with("online_") && STATE.contains(&format!("}} {word};"))
 }
 
+/// Whether a word is a value of such a type.
+fn is_value(word: &str) -> bool {
+    let separated = |end: &str| STATE.contains(&format!(" {word}{end}"));
+    word.starts_with("ONLINE_") && (separated(",") || separated(" }"))
+}
+
 /// A stage of the horizon's solver and the controller's own state, for the header of a controller.
 pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
     let rename = |word: &str| match word {
@@ -255,6 +261,7 @@ pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
         "NU" => Some(format!("{upper}_LATENT_DIM")),
         "bool" => Some("int32_t".to_owned()),
         _ if is_state(word) || word.starts_with("solver_") => Some(format!("{name}_{word}")),
+        _ if is_value(word) => Some(format!("{upper}_{word}")),
         _ => None,
     };
     renamed(STAGE, rename) + &renamed(STATE, rename)
@@ -265,6 +272,7 @@ fn for_controller(text: &str, name: &str) -> String {
     renamed(text, |word| match word {
         "online_settings" => Some(format!("{name}_controller_settings")),
         _ if is_state(word) || word == "solver_stage" => Some(format!("{name}_{word}")),
+        _ if is_value(word) => Some(format!("{}_{word}", name.to_ascii_uppercase())),
         _ => None,
     })
 }

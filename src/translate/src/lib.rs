@@ -204,8 +204,8 @@ pub fn controller(root: &Path) -> Result<[(&'static str, String); 4], Fault> {
     let online = Unit {
         prefix: "online",
         users: &users,
-        fixed: &["LegShape", "FallbackSettings", "Settings"],
-        header: &["Share", "Memory", "PlanTime"],
+        fixed: &["LegShape", "FallbackSettings", "Settings", "Bounds"],
+        header: &["Share", "Memory", "PlanTime", "Supervisor"],
         elsewhere: &[
             ("MOST_LATENT", "D"),
             ("MOST_STATE", "X"),

@@ -1,0 +1,394 @@
+//! What a robot that is under control does not measure, and the command that follows when it does. C is made of this
+//! file.
+//!
+//! In: every measurement with the reference's state at its time. Out: a [`Fault`], which stays until a reset, and torques
+//! that fade into joint damping. A measurement beyond a bound is refused, as a glitch may be; beyond it for
+//! [`PATIENCE_S`], or in the first measurement, it is a fault. Clocks, frozen measurements, contacts and steps without a
+//! good plan are counted. Read [`Supervisor::watch`] first.
+
+use super::control_model::{clamped_joint, clamped_torque};
+use super::dense::{Real, greater};
+use super::settings::Bounds;
+use crate::robot::GRAVITY_M_S2;
+
+/// How long measurements are refused before they are a fault, s.
+const PATIENCE_S: f64 = 0.019;
+/// Tilts from half a turn on are none.
+const HALF_TURN: Real = 3.14;
+/// Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down.
+const UPSIDE_DOWN: Real = 0.5;
+/// Share of the distances from the reference that a measurement may be off what the last one predicts.
+const LEAP_SHARE: Real = 0.5;
+/// How far a clock may go back, s: measurements may be exchanged.
+const CLOCK_JITTER_S: f64 = 0.005;
+/// Time over which velocities are compared with positions, s.
+const MEMORY_S: Real = 0.05;
+/// Height above the floor at which a foot is not on it, m.
+const FOOT_UP_M: Real = 0.06;
+/// Time in the air after which a body has to fall, s, and the least share of gravity.
+const FALL_S: f64 = 0.03;
+const FALL_SHARE: Real = 0.5;
+/// How far a reference moves, rad or m, while a measurement that stays the same is not believed.
+const REFERENCE_MOVES: Real = 0.01;
+
+/// What is wrong. Each has a status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Fault {
+    #[default]
+    None,
+    Tilt,
+    JointRange,
+    JointSpeed,
+    BodyFar,
+    JointsFar,
+    BodyLeap,
+    JointsLeap,
+    NotAtStart,
+    ClockStands,
+    ClockBack,
+    ClockLeaps,
+    Frozen,
+    VelocityMismatch,
+    ContactMismatch,
+    PoorSteps,
+}
+
+/// What the supervisor remembers.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Supervisor {
+    /// What is wrong, until a reset.
+    pub fault: Fault,
+    /// Time in which torques have faded so far, s.
+    faded_s: f64,
+    /// Whether there was a measurement, and the latest time of one, s.
+    has_time: bool,
+    time_s: f64,
+    /// Calls in a row without a later time.
+    standing: usize,
+    /// The last measurement of state and velocity, how often it was the same, and the reference when it first was.
+    seen_x: [Real; 18],
+    seen_dx: [Real; 18],
+    frozen: usize,
+    nominal: [Real; 18],
+    /// The last measurement within all bounds, with its time, s.
+    has_good: bool,
+    good_s: f64,
+    good_x: [Real; 18],
+    good_dx: [Real; 18],
+    /// Whether the present one is beyond a bound, and since when measurements are, s.
+    pub is_doubted: bool,
+    doubted_s: f64,
+    /// Displacement of the body that its velocity does not explain, fading, m.
+    unexplained: [Real; 3],
+    /// Height of the reference's highest foot on the ground, m.
+    floor_m: Real,
+    /// Since when no foot is on the ground, s, and the vertical velocity then, m/s.
+    is_aloft: bool,
+    aloft_s: f64,
+    aloft_m_s: Real,
+    /// Measurements in a row whose contacts cannot be; steps in a row without a good plan.
+    contacts: usize,
+    poor: usize,
+}
+
+impl Supervisor {
+    /// Forgets measurements, but neither a fault nor the floor.
+    pub(super) fn forget(&mut self) {
+        if self.fault == Fault::None {
+            self.faded_s = 0.0;
+        }
+        self.has_time = false;
+        self.standing = 0;
+        self.frozen = 0;
+        self.has_good = false;
+        self.is_doubted = false;
+        self.is_aloft = false;
+        self.contacts = 0;
+        self.poor = 0;
+        for i in 0..3 {
+            self.unexplained[i] = 0.0;
+        }
+    }
+
+    /// Forgets measurements and the fault.
+    pub(super) fn reset(&mut self) {
+        self.forget();
+        self.fault = Fault::None;
+        self.faded_s = 0.0;
+    }
+
+    /// Takes the height of a foot that the reference has on the ground, m.
+    pub(super) fn take_floor(&mut self, is_first: bool, height: Real) {
+        self.floor_m = if is_first {
+            height
+        } else {
+            greater(height, self.floor_m)
+        };
+    }
+
+    /// Takes a finite measurement of state and velocity, 18 each, with the reference's state and the heights of the feet,
+    /// m; what is wrong.
+    pub(super) fn watch(
+        &mut self,
+        bounds: &Bounds,
+        time_s: f64,
+        x: &[Real],
+        dx: &[Real],
+        nominal: &[Real],
+        heights: &[Real],
+        is_down: &[bool],
+        lower: &[Real],
+        upper: &[Real],
+        speed: &[Real],
+    ) -> Fault {
+        if self.fault != Fault::None {
+            return self.fault;
+        }
+        let is_first = !self.has_time;
+        self.fault = self.clock_fault(bounds, time_s);
+        if self.fault == Fault::None && self.is_frozen(bounds, x, dx, nominal) {
+            self.fault = Fault::Frozen;
+        }
+        if self.fault != Fault::None {
+            return self.fault;
+        }
+        let state = self.state_fault(bounds, time_s, x, dx, nominal, lower, upper, speed);
+        if state != Fault::None {
+            let is_far = state == Fault::BodyFar || state == Fault::JointsFar;
+            if !self.is_doubted {
+                self.doubted_s = time_s;
+            }
+            self.is_doubted = true;
+            if is_first {
+                self.fault = if is_far { Fault::NotAtStart } else { state };
+            } else if time_s - self.doubted_s >= PATIENCE_S {
+                self.fault = state;
+            }
+            return self.fault;
+        }
+        self.is_doubted = false;
+        if self.is_unexplained(bounds, time_s, x, dx) {
+            self.fault = Fault::VelocityMismatch;
+        } else if self.contradicts(bounds, time_s, dx[14], heights, is_down) {
+            self.fault = Fault::ContactMismatch;
+        }
+        self.has_good = true;
+        self.good_s = time_s;
+        for i in 0..18 {
+            self.good_x[i] = x[i];
+            self.good_dx[i] = dx[i];
+        }
+        self.fault
+    }
+
+    /// Whether the clock stands, goes back or leaps.
+    fn clock_fault(&mut self, bounds: &Bounds, time_s: f64) -> Fault {
+        let passed_s = time_s - self.time_s;
+        let is_first = !self.has_time;
+        let is_later = is_first || passed_s > 0.0;
+        self.standing = if is_later { 0 } else { self.standing + 1 };
+        if is_later {
+            self.time_s = time_s;
+        }
+        self.has_time = true;
+        if is_first || bounds.clock_gap_s > 1e9 {
+            return Fault::None;
+        }
+        if passed_s > bounds.clock_gap_s {
+            return Fault::ClockLeaps;
+        }
+        if passed_s < -CLOCK_JITTER_S {
+            return Fault::ClockBack;
+        }
+        let is_counted = bounds.frozen_steps > 0;
+        if is_counted && self.standing >= bounds.frozen_steps {
+            return Fault::ClockStands;
+        }
+        Fault::None
+    }
+
+    /// Whether a measurement was the same too often: one that moves, or while the reference does.
+    fn is_frozen(&mut self, bounds: &Bounds, x: &[Real], dx: &[Real], nominal: &[Real]) -> bool {
+        let mut is_same = true;
+        let mut moves = false;
+        for i in 0..18 {
+            is_same = is_same && x[i] == self.seen_x[i] && dx[i] == self.seen_dx[i];
+            let moved = (nominal[i] - self.nominal[i]).abs();
+            moves = moves || dx[i] != 0.0 || moved > REFERENCE_MOVES;
+        }
+        for i in 0..18 {
+            self.seen_x[i] = x[i];
+            self.seen_dx[i] = dx[i];
+            if !is_same {
+                self.nominal[i] = nominal[i];
+            }
+        }
+        self.frozen = if is_same { self.frozen + 1 } else { 0 };
+        bounds.frozen_steps > 0 && moves && self.frozen >= bounds.frozen_steps
+    }
+
+    /// The first bound that a state is beyond.
+    fn state_fault(
+        &self,
+        bounds: &Bounds,
+        time_s: f64,
+        x: &[Real],
+        dx: &[Real],
+        nominal: &[Real],
+        lower: &[Real],
+        upper: &[Real],
+        speed: &[Real],
+    ) -> Fault {
+        if bounds.tilt_rad < HALF_TURN {
+            let off = common_height(&x[15..], &nominal[15..]);
+            let upright = x[16].cos() * x[15].cos();
+            if off < bounds.tilt_rad.cos() || upright < -UPSIDE_DOWN {
+                return Fault::Tilt;
+            }
+        }
+        let mut joints: Real = 0.0;
+        for i in 0..12 {
+            let margin = bounds.joint_margin_rad;
+            if x[i] > upper[i] + margin || x[i] < lower[i] - margin {
+                return Fault::JointRange;
+            }
+            if dx[i].abs() > bounds.joint_velocity * speed[i] {
+                return Fault::JointSpeed;
+            }
+            joints = greater((x[i] - nominal[i]).abs(), joints);
+        }
+        let by_reference: [Real; 3] = [nominal[12], nominal[13], nominal[14]];
+        if distance(&x[12..], &by_reference) > bounds.distance_m {
+            return Fault::BodyFar;
+        }
+        if joints > bounds.posture_rad {
+            return Fault::JointsFar;
+        }
+        let passed_s = time_s - self.good_s;
+        if !self.has_good || passed_s > bounds.clock_gap_s {
+            return Fault::None;
+        }
+        let passed = passed_s as Real;
+        let mut body: [Real; 3] = [0.0; 3];
+        for i in 0..3 {
+            body[i] = self.good_x[12 + i] + passed * self.good_dx[12 + i];
+        }
+        if distance(&x[12..], &body) > LEAP_SHARE * bounds.distance_m {
+            return Fault::BodyLeap;
+        }
+        for i in 0..12 {
+            let predicted = self.good_x[i] + passed * self.good_dx[i];
+            if (x[i] - predicted).abs() > LEAP_SHARE * bounds.posture_rad {
+                return Fault::JointsLeap;
+            }
+        }
+        Fault::None
+    }
+
+    /// Whether the body's velocity contradicts its positions since the last good measurement.
+    fn is_unexplained(&mut self, bounds: &Bounds, time_s: f64, x: &[Real], dx: &[Real]) -> bool {
+        let passed = (time_s - self.good_s) as Real;
+        if !self.has_good || !(passed > 0.0) {
+            return false;
+        }
+        let share = passed / MEMORY_S;
+        let kept = if share < 1.0 { 1.0 - share } else { 0.0 };
+        let mut largest: Real = 0.0;
+        for i in 0..3 {
+            let moved = x[12 + i] - self.good_x[12 + i];
+            let by_velocity = 0.5 * (dx[12 + i] + self.good_dx[12 + i]) * passed;
+            let unexplained = kept * self.unexplained[i] + (moved - by_velocity);
+            self.unexplained[i] = unexplained;
+            largest = greater(unexplained.abs(), largest);
+        }
+        largest / MEMORY_S > bounds.velocity_mismatch
+    }
+
+    /// Whether contacts cannot be for too long: a foot on the ground is above the floor, or a body that no foot holds does
+    /// not fall.
+    fn contradicts(
+        &mut self,
+        bounds: &Bounds,
+        time_s: f64,
+        rises: Real,
+        heights: &[Real],
+        is_down: &[bool],
+    ) -> bool {
+        let mut is_wrong = false;
+        let mut is_aloft = true;
+        for foot in 0..4 {
+            let is_up = heights[foot] > self.floor_m + FOOT_UP_M;
+            is_wrong = is_wrong || (is_down[foot] && is_up);
+            is_aloft = is_aloft && !is_down[foot];
+        }
+        if is_aloft && !self.is_aloft {
+            self.aloft_s = time_s;
+            self.aloft_m_s = rises;
+        }
+        self.is_aloft = is_aloft;
+        let passed_s = time_s - self.aloft_s;
+        let least = FALL_SHARE * (GRAVITY_M_S2 as Real) * (passed_s as Real);
+        let falls = rises - self.aloft_m_s < -least;
+        if is_aloft && passed_s > FALL_S && !falls {
+            is_wrong = true;
+        }
+        self.contacts = if is_wrong { self.contacts + 1 } else { 0 };
+        bounds.contact_mismatch_steps > 0 && self.contacts >= bounds.contact_mismatch_steps
+    }
+
+    /// Counts steps without a good plan; what is wrong.
+    pub(super) fn judge(&mut self, bounds: &Bounds, is_poor: bool) -> Fault {
+        self.poor = if is_poor { self.poor + 1 } else { 0 };
+        let is_counted = bounds.poor_steps > 0 && self.fault == Fault::None;
+        if is_counted && self.poor >= bounds.poor_steps {
+            self.fault = Fault::PoorSteps;
+        }
+        self.fault
+    }
+
+    /// Writes torques that fade from the last ones into the damping of joint velocities, and a posture that fades into
+    /// the measured one; the share that is left of the joint PD. `passed_s` is the time since the last command.
+    pub(super) fn fade(
+        &mut self,
+        bounds: &Bounds,
+        damping: Real,
+        passed_s: f64,
+        joints: &[Real],
+        velocity: &[Real],
+        limit: &[Real],
+        lower: &[Real],
+        upper: &[Real],
+        last_torque: &[Real],
+        last_posture: &[Real],
+        torque: &mut [Real],
+        posture: &mut [Real],
+    ) -> Real {
+        let passed = (self.faded_s / bounds.fade_s) as Real;
+        let share = if passed < 1.0 { 1.0 - passed } else { 0.0 };
+        self.faded_s += passed_s;
+        for i in 0..12 {
+            let damped = clamped_torque(-damping * velocity[i], bounds.damping_torque_nm);
+            let faded = share * last_torque[i] + (1.0 - share) * damped;
+            torque[i] = clamped_torque(faded, limit[i]);
+            let moved = share * last_posture[i] + (1.0 - share) * joints[i];
+            posture[i] = clamped_joint(moved, lower[i], upper[i]);
+        }
+        share
+    }
+}
+
+/// Cosine of the angle between the verticals of two attitudes, each roll and pitch, rad.
+fn common_height(attitude: &[Real], other: &[Real]) -> Real {
+    let turned = attitude[1].cos() * other[1].cos();
+    let along = attitude[1].sin() * other[1].sin();
+    let aside = turned * (attitude[0].sin() * other[0].sin());
+    let above = turned * (attitude[0].cos() * other[0].cos());
+    along + aside + above
+}
+
+fn distance(place: &[Real], other: &[Real; 3]) -> Real {
+    let x = place[0] - other[0];
+    let y = place[1] - other[1];
+    let z = place[2] - other[2];
+    (x * x + y * y + z * z).sqrt()
+}
