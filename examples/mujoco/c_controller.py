@@ -3,6 +3,7 @@ the crate's Python binding."""
 
 import ctypes
 import json
+import re
 import subprocess
 import types
 
@@ -17,9 +18,16 @@ def build(model, folder, romc):
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC"]
     subprocess.run(["cc", *flags, *sources, "-lm", "-o", "libcontroller.so"], check=True, cwd=crate)
     with open(model, encoding="utf-8") as file:
-        dimension = json.load(file)["latent_dim"]
-    (crate / "binding.json").write_text(json.dumps({"name": name, "latent_dim": dimension}))
+        sizes = {f"{name.upper()}_LATENT_DIM": json.load(file)["latent_dim"]}
+    structs = {of: _fields(header.read_text(), f"{name}_{of}") for of in ("controller_settings", "command")}
+    (crate / "binding.json").write_text(json.dumps({"name": name, "sizes": sizes, **structs}))
     return crate
+
+
+def _fields(header, struct):
+    """Type, name and length, None or a number or its name, of each field of a struct in the header."""
+    (body,) = re.findall(r"typedef struct \{([^}]*)\} " + struct + ";", header)
+    return re.findall(r"^ *(double|int32_t) (\w+)(?:\[(\w+)\])?;", body, re.MULTILINE)
 
 
 def load(crate):
@@ -28,27 +36,16 @@ def load(crate):
     library = ctypes.CDLL(str(crate / "libcontroller.so"))
     prefix, number = facts["name"] + "_controller_", ctypes.c_double
 
+    def fields(struct):
+        for kind, name, length in facts[struct]:
+            of = {"double": number, "int32_t": ctypes.c_int32}[kind]
+            yield name, of * (facts["sizes"].get(length) or int(length)) if length else of
+
     class Settings(ctypes.Structure):
-        _fields_ = [
-            (name, ctypes.c_int32)
-            for name in ("horizon", "max_iterations", "lift", "linearisation")
-        ] + [
-            (name, number)
-            for name in (
-                "step_s", "input_weight", "velocity_weight", "terminal_weight", "joint_penalty",
-                "body_friction", "effectiveness_time_s", "drive_stiffness_nm_rad", "drive_damping_nm_s_rad",
-            )
-        ]  # fmt: skip
+        _fields_ = list(fields("controller_settings"))
 
     class Command(ctypes.Structure):
-        _fields_ = [
-            ("torque", number * 12),
-            ("joint_position", number * 12),
-            ("joint_velocity", number * 12),
-            ("u_lat", number * facts["latent_dim"]),
-            ("status", ctypes.c_int32),
-            ("iterations", ctypes.c_int32),
-        ]
+        _fields_ = list(fields("command"))
         solve_us = 0.0
 
     def function(name, result, *arguments):

@@ -353,7 +353,7 @@ static inline MAYBE_UNUSED bool online_minus_inverse_transpose(real j[3][3], rea
     const real minor_1 = j[0][1] * j[2][2] - j[0][2] * j[2][1];
     const real minor_2 = j[0][1] * j[1][2] - j[0][2] * j[1][1];
     const real det = j[0][0] * minor_0 - j[1][0] * minor_1 + j[2][0] * minor_2;
-    if (det == 0 || !solver_is_finite_number(det)) {
+    if ((det <= 0 && det >= 0) || !solver_is_finite_number(det)) {
         return false;
     }
     out[0][0] = -(minor_0 / det);
@@ -904,7 +904,7 @@ static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const re
         bool is_free = true;
         for (int j = 0; j < d; ++j) {
             row[j] = sign * force[axis + j] - SQRT_HALF * force[j];
-            is_free = is_free && row[j] == 0;
+            is_free = is_free && (row[j] <= 0 && row[j] >= 0);
         }
         const real at_reference = online_scale_row(row, root, input, d, rows + side * d);
         bounds[side] = is_free ? 1 : -at_reference;
@@ -1248,7 +1248,7 @@ static inline MAYBE_UNUSED void online_share_update(online_share *restrict self,
     if (!(size > 0 && solver_is_finite_number(size) && solver_is_finite_number(agreement))) {
         return;
     }
-    const real unit = self->unit == 0 ? size : self->unit;
+    const real unit = (self->unit <= 0 && self->unit >= 0) ? size : self->unit;
     const real own = online_smaller(size / unit, ONLINE_LARGEST_WEIGHT);
     const real kept = EXP(-part * step_s / time_constant_s);
     const real weight = kept * self->weight + own;
@@ -1363,9 +1363,10 @@ static inline MAYBE_UNUSED bool online_supervisor_is_frozen(online_supervisor *r
     bool is_same = true;
     bool moves = false;
     for (int i = 0; i < 18; ++i) {
-        is_same = is_same && x[i] == self->seen_x[i] && dx[i] == self->seen_dx[i];
+        is_same = is_same && (x[i] <= self->seen_x[i] && x[i] >= self->seen_x[i]) && (dx[i] <= self->seen_dx[i]
+                && dx[i] >= self->seen_dx[i]);
         const real moved = solver_magnitude(nominal[i] - self->nominal[i]);
-        moves = (moves || dx[i] != 0) || moved > ONLINE_REFERENCE_MOVES;
+        moves = (moves || !(dx[i] <= 0 && dx[i] >= 0)) || moved > ONLINE_REFERENCE_MOVES;
     }
     for (int i = 0; i < 18; ++i) {
         self->seen_x[i] = x[i];

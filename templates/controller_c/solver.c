@@ -378,7 +378,7 @@ static inline bool solver_is_finite_number(real self)
 {
     /* Infinity less itself is not a number, and no such number equals itself. */
     const real difference = self - self;
-    return difference == 0;
+    return (difference <= 0 && difference >= 0);
 }
 
 /* L D L^T of a symmetric matrix, of which the lower triangle is read; false if it is not positive definite. */

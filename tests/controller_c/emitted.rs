@@ -12,7 +12,7 @@ use romc::model::ReducedModel;
 use crate::programs::{root, succeed};
 
 /// Warnings that the sources must not raise.
-pub const STRICT: [&str; 9] = [
+pub const STRICT: [&str; 10] = [
     "-std=c99",
     "-Wall",
     "-Wextra",
@@ -20,6 +20,7 @@ pub const STRICT: [&str; 9] = [
     "-Wshadow",
     "-pedantic",
     "-Wdouble-promotion",
+    "-Wfloat-equal",
     "-Wvla",
     "-Werror",
 ];

@@ -4,8 +4,8 @@ use nalgebra::{DVector, SVector};
 use romc::lower::CompiledModel;
 use romc::model::ReducedModel;
 use romc::mpc::{
-    Command, ControlError, ControlModel, Controller, Drift, Drives, Linearisation,
-    Measurement, MissingInput, MpcError, MpcSettings, ReferenceSamples, Source, Status,
+    Command, ControlError, ControlModel, Controller, Drift, Drives, Linearisation, Measurement,
+    MissingInput, MpcError, MpcSettings, ReferenceSamples, Source, Status,
 };
 use romc::robot::ContactFlags;
 

@@ -336,7 +336,10 @@ impl Controller {
 
     /// Leaves the motion: torques and joint PD fade into damping, about the measured joints if there are any.
     pub(super) fn damp(&mut self, time_s: f64, x: &[f64], command: &mut Command) {
-        let (bounds, stops) = (&self.settings.bounds, self.settings.after_end == AfterEnd::Stop);
+        let (bounds, stops) = (
+            &self.settings.bounds,
+            self.settings.after_end == AfterEnd::Stop,
+        );
         let is_ended = self.supervisor.fault == Fault::None;
         let damping = match is_ended && stops {
             true => 0.0,

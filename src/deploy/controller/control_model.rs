@@ -5,7 +5,6 @@ use nalgebra::storage::RawStorage;
 use nalgebra::{DMatrix, DVector, Dim};
 
 use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::codegen::wrapped;
 use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings};
 use crate::mpc::{ControlModel, ControlPhase};
 use crate::robot::{Leg, Robot, WrenchFrame};
@@ -182,13 +181,4 @@ impl SettingText {
             _ => (format!("!is_not_negative({number})"), other),
         }
     }
-}
-
-/// The names of the whole numbers or of the others, as a tuple in Python has them.
-pub(super) fn quoted_names(is_whole: bool) -> String {
-    let of_kind = (SETTINGS.iter()).filter(|setting| (setting.kind == "i32") == is_whole);
-    let names: Vec<String> = of_kind
-        .map(|setting| format!("{:?}", setting.name))
-        .collect();
-    wrapped(&names.join(", "), 88, "           ").join("\n")
 }

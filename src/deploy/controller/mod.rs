@@ -18,7 +18,7 @@ use crate::model::ReducedModel;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{SETTINGS, Settings, all_codes};
 use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
-use control_model::{ControlModelText, SettingText, quoted_names};
+use control_model::{ControlModelText, SettingText};
 
 /// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
 pub(super) struct Facts<'a> {

@@ -290,6 +290,20 @@ impl Writer<'_> {
             (false, Type::Int | Type::Double) if right.ty == Type::Real => Type::Real,
             (false, ty) => ty.clone(),
         };
+        if let "==" | "!=" = sign
+            && [&left.ty, &right.ty]
+                .map(Type::referent)
+                .iter()
+                .any(|ty| matches!(ty, Type::Real | Type::Double))
+        {
+            // Compilers warn of equal reals; undefined numbers equal none.
+            let (left, right) = (left.at_least(11), right.at_least(11));
+            let equal = format!("({left} <= {right} && {left} >= {right})");
+            return Ok(match sign {
+                "==" => Value::new(equal, ty, 16),
+                _ => Value::new(format!("!{equal}"), ty, 15),
+            });
+        }
         // Numbers of Rust's reals are integers in C.
         let is_integer = left.is_literal() && right.is_literal() && ty == Type::Real;
         let cast = if is_integer { "(real)" } else { "" };
