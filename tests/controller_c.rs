@@ -10,8 +10,8 @@ use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::model::ReducedModel;
 use romc::mpc::{
-    ConsistentLift, Controller, Effectiveness, Lift, Linearisation, Measurement, MissingInput,
-    MpcSettings, ReferenceSamples, Solver, StanceState, Status,
+    AfterEnd, Bounds, ConsistentLift, Controller, Drives, Lift, Linearisation, Measurement,
+    MissingInput, MpcSettings, ReferenceSamples, Solver, StanceState, Status,
 };
 
 #[path = "controller_c/analysers.rs"]
@@ -118,12 +118,16 @@ fn push_counts(bytes: &mut Vec<u8>, values: &[i64]) {
     bytes.extend(values.iter().flat_map(|value| value.to_ne_bytes()));
 }
 
-/// Whether most of the runs have limits on torque rates.
+/// Whether most of the runs have limits on torque rates, and whether a supervisor watches them, each with another fault.
 #[derive(Clone, Copy, PartialEq)]
 enum Rates {
     Free,
     Limited,
+    FreeAndWatched,
 }
+
+/// Kinds of faults that measurements of a supervised run have from some time on, the last of them none.
+const FAULTS: usize = 13;
 
 /// Steps of random measurements along random variations of recorded jumps, with what the library
 /// commands, as `replay.c` reads them; how many latent inputs the estimate of the share that
@@ -169,6 +173,7 @@ fn replay_file(
             stiffness_nm_rad: [20.0, 0.0, 40.0][run / 2 % 3],
             damping_nm_s_rad: [0.8, 0.0][run / 4 % 2],
         };
+        let is_watched = rates == Rates::FreeAndWatched;
         let settings = MpcSettings {
             solver: Solver::Riccati,
             missing_input: match knows_inputs {
@@ -184,8 +189,10 @@ fn replay_file(
             drives,
             swing_turn: [1.0, 0.0, 0.5][run / 3 % 3],
             flight_torque: [1.0, 0.3, 0.0][run / 2 % 3],
+            after_end: [AfterEnd::Hold, AfterEnd::Damp, AfterEnd::Stop][run % 3],
+            bounds: [Bounds::OFF, MpcSettings::default().bounds][usize::from(is_watched)],
             torque_rate_nm_s: match rates {
-                Rates::Free => None,
+                Rates::Free | Rates::FreeAndWatched => None,
                 Rates::Limited => [Some(300.0), Some(100.0), None, Some(1000.0)][run % 4],
             },
             ..MpcSettings::default()
@@ -220,23 +227,25 @@ fn replay_file(
             let is_about_plan = settings.linearisation == Linearisation::LastPlan;
             push_counts(
                 &mut bytes,
-                &[i64::from(is_consistent), i64::from(is_about_plan)],
+                &[
+                    i64::from(is_consistent),
+                    i64::from(is_about_plan),
+                    settings.after_end as i64,
+                ],
             );
             push(&mut bytes, &[friction]);
             push(
                 &mut bytes,
-                &effectiveness.map_or([0.0; 3], |e| {
-                    [e.time_constant_s, e.stiffness_nm_rad, e.damping_nm_s_rad]
-                }),
-            );
-            push(
-                &mut bytes,
                 &[
+                    settings.effectiveness_time_s.unwrap_or(0.0),
+                    drives.stiffness_nm_rad,
+                    drives.damping_nm_s_rad,
                     settings.foot_friction,
                     settings.lift_prior_weight,
                     settings.torque_rate_nm_s.unwrap_or(0.0),
                     settings.swing_turn,
                     settings.flight_torque,
+                    f64::from(u8::from(is_watched)),
                 ],
             );
             push(&mut bytes, reference.time_s);
@@ -245,11 +254,13 @@ fn replay_file(
             push(&mut bytes, reference.u.unwrap_or_default());
             let feet = reference.feet.iter().flatten();
             bytes.extend(feet.map(|down| u8::from(*down)));
+            let (fault, from) = (run % FAULTS, first + (20 * run + 40) % 200);
             for &sample in &samples {
+                let fault = (is_watched && sample >= from).then_some(fault);
                 changed += usize::from(one_step(
                     [&mut controller, &mut trusting],
                     segment,
-                    sample,
+                    (sample, fault),
                     roughness,
                     &mut random,
                     (&mut bytes, &mut lifts),
@@ -265,7 +276,7 @@ fn replay_file(
 fn one_step(
     [controller, trusting]: [&mut Controller; 2],
     segment: &romc::recording::Segment,
-    sample: usize,
+    (sample, fault): (usize, Option<usize>),
     roughness: f64,
     random: &mut Random,
     (bytes, lifts): (&mut Vec<u8>, &mut [usize; 2]),
@@ -286,7 +297,22 @@ fn one_step(
         dx[sample % 18] = f64::NAN;
     }
     let jitter = if random.signed() > 0.9 { 0.003 } else { 0.0 };
-    let time_s = segment.time_s[sample] + jitter;
+    let mut time_s = segment.time_s[sample] + jitter;
+    match fault {
+        Some(0) => x[15] += 3.0,
+        Some(1) => x[13] += 5.0,
+        Some(2) => x.swap(1, 2),
+        Some(3) => dx[7] += 60.0,
+        Some(4) => time_s = 0.3,
+        Some(5) => time_s -= 0.001 * (sample % 300) as f64,
+        Some(6) => time_s += 0.5,
+        Some(7) => (x, dx) = ([0.01; 18], [0.1; 18]),
+        Some(8) => dx[12..15].fill(0.0),
+        Some(9) => feet = feet.map(|down| !down),
+        Some(10) => x[4] += 0.7,
+        Some(11) => feet = [true, false, false, false],
+        _ => {}
+    }
     let resets = random.signed() > 0.97;
     if resets {
         controller.reset();
@@ -318,6 +344,8 @@ fn one_step(
     push(bytes, &command.torque_nm);
     push(bytes, &command.joint_position_rad);
     push(bytes, &command.joint_velocity_rad_s);
+    let drives = &command.drives;
+    push(bytes, &[drives.stiffness_nm_rad, drives.damping_nm_s_rad]);
     push(bytes, &command.u_lat);
     push_counts(
         bytes,
@@ -404,6 +432,28 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
         );
     }
     assert!(unlifted > 3, "lifts hardly fail: {unlifted}");
+}
+
+#[test]
+fn supervisor_in_c_repeats_the_library_bit_for_bit_under_faults() {
+    let model = shipped("go1-d4");
+    let emitted = Emitted::with_library_sines(&model);
+    let replay = root().join("tests/controller_c/replay.c");
+    let program = emitted.program("cc", &[], replay.to_str().expect("UTF-8"));
+    let file = emitted.scratch.path().join("steps");
+    let (steps, ..) = replay_file(&model, step_count(), 5, Rates::FreeAndWatched);
+    fs::write(&file, steps).expect("written");
+    let output = succeed(Command::new(program).arg(&file));
+    let text = String::from_utf8_lossy(&output.stdout);
+    println!("{text}");
+    let kinds = text.trim().rsplit(", ").next().expect("a count");
+    let kinds: usize = kinds
+        .split(' ')
+        .next()
+        .expect("a number")
+        .parse()
+        .expect("a count");
+    assert!(kinds >= 10, "few kinds of faults: {text}");
 }
 
 #[test]

@@ -29,7 +29,7 @@
 #define ONLINE_GRAVITY_M_S2 9.81
 
 /* Tilts from half a turn on are none. */
-#define ONLINE_HALF_TURN (real)3.14
+#define ONLINE_HALF_TURN (real)3.1
 
 /* Half width of the window in which velocities are fitted by a straight line, s. */
 #define ONLINE_HALF_WINDOW_S (0.016 + 1e-9)
@@ -1271,7 +1271,7 @@ static inline MAYBE_UNUSED real online_supervisor_fade(online_supervisor *restri
         real *restrict torque, real *restrict posture)
 {
     const real passed = (real)(self->faded_s / bounds->fade_s);
-    const real share = passed < 1 ? 1 - passed : 0.0;
+    const real share = passed < 1 ? 1 - passed : 0;
     self->faded_s += passed_s;
     for (int i = 0; i < 12; ++i) {
         const real damped = online_clamped_torque(-damping * velocity[i], bounds->damping_torque_nm);
@@ -1453,11 +1453,11 @@ static inline MAYBE_UNUSED bool online_supervisor_is_unexplained(online_supervis
         const online_bounds *bounds, double time_s, const real *x, const real *dx)
 {
     const real passed = (real)(time_s - self->good_s);
-    if (!self->has_good || !(passed > 0)) {
+    if (!self->has_good || passed <= 0) {
         return false;
     }
     const real share = passed / ONLINE_MEMORY_S;
-    const real kept = share < 1 ? 1 - share : 0.0;
+    const real kept = share < 1 ? 1 - share : 0;
     real largest = 0;
     for (int i = 0; i < 3; ++i) {
         const real moved = x[12 + i] - self->good_x[12 + i];

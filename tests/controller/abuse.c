@@ -131,7 +131,7 @@ int main(void)
     dx[3] = 0.0;
     step(controller, "sound again", 0.0, x, dx, feet, 0);
     step(controller, "the same time", 0.0, x, dx, feet, 0);
-    step(controller, "earlier", -0.01, x, dx, feet, 0);
+    step(controller, "a little earlier", -0.004, x, dx, feet, 0);
     CALL(reset)(controller);
     step(controller, "after a reset", 0.02, x, dx, feet, 0);
     if (strcmp(CALL(status_text)(1234), "unknown status") != 0)

@@ -1,13 +1,14 @@
 /* Replays steps from a file through a generated controller and compares every command with the file's, bit for bit.
  * usage: replay FILE; prints steps, differing ones, the most iterations and torques beyond their limits. Native byte order:
  * runs until the end of the file, each of
- *   int64 samples, steps, has_u, is_next, lift, linearisation; double body_friction, effectiveness_time_s, stiffness and
- *   damping of the drives, foot_friction, lift_prior_weight, torque_rate_nm_s, swing_turn, flight_torque;
+ *   int64 samples, steps, has_u, is_next, lift, linearisation, after_end; double body_friction, effectiveness_time_s, stiffness and
+ *   damping of the drives, foot_friction, lift_prior_weight, torque_rate_nm_s, swing_turn, flight_torque, is_watched;
  *   double time_s[samples], x[18 samples], dx[18 samples], u[18 samples] if has_u; uint8 feet[4 samples]
  *   and for each step double time_s, x[18], dx[18]; uint8 feet[4], flags (1 prepare, 2 reset); double torque[12],
- *   joint_position[12], joint_velocity[12], u_lat[D]; int64 status, iterations. */
+ *   joint_position[12], joint_velocity[12], stiffness, damping, u_lat[D]; int64 status, iterations. */
 #include HEADER
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,16 +47,17 @@ int main(int argc, char **argv)
 {
     static const double LIMITS[3] = {23.7, 23.7, 35.55};
     static FN(_controller) controller;
-    long steps = 0, different = 0, iterations = 0, beyond = 0, active = 0, fallbacks = 0;
-    int64_t head[6];
+    long steps = 0, different = 0, iterations = 0, beyond = 0, active = 0, fallbacks = 0, kinds = 0;
+    unsigned long seen = 0;
+    int64_t head[7];
     input = argc > 1 ? fopen(argv[1], "rb") : NULL;
     if (input == NULL) {
         return 2;
     }
-    while (get(head, sizeof head[0], 6)) {
+    while (get(head, sizeof head[0], 7)) {
         const size_t count = (size_t)head[0];
-        double chosen[9];
-        need(chosen, sizeof chosen[0], 9);
+        double chosen[10];
+        need(chosen, sizeof chosen[0], 10);
         double *time_s = array(sizeof(double), count), *x = array(sizeof(double), 18 * count);
         double *dx = array(sizeof(double), 18 * count), *u = NULL;
         if (head[2]) {
@@ -74,6 +76,12 @@ int main(int argc, char **argv)
         settings.flight_torque = chosen[8];
         settings.lift = (int32_t)head[4];
         settings.linearisation = (int32_t)head[5];
+        settings.after_end = (int32_t)head[6];
+        if (!(chosen[9] > 0)) {
+            settings.tilt_rad = settings.joint_margin_rad = settings.joint_velocity = settings.distance_m = INFINITY;
+            settings.posture_rad = settings.clock_gap_s = settings.velocity_mismatch = INFINITY;
+            settings.frozen_steps = settings.contact_mismatch_steps = settings.poor_steps = 0;
+        }
         const int is_next = head[3] != 0;
         if ((!is_next && FN(_controller_init)(&controller, &settings) != 0)
             || FN(_controller_set_reference)(&controller, count, time_s, x, dx, u, feet) != 0) {
@@ -81,13 +89,13 @@ int main(int argc, char **argv)
             return 2;
         }
         for (int64_t k = 0; k < head[1]; ++k) {
-            double measured[37], wanted[36 + D];
+            double measured[37], wanted[38 + D];
             uint8_t flags[5];
             int64_t codes[2];
             FN(_command) command;
             need(measured, sizeof measured[0], 37);
             need(flags, 1, 5);
-            need(wanted, sizeof wanted[0], 36 + D);
+            need(wanted, sizeof wanted[0], 38 + D);
             need(codes, sizeof codes[0], 2);
             if (flags[4] & 2) {
                 FN(_controller_reset)(&controller);
@@ -99,7 +107,9 @@ int main(int argc, char **argv)
             const int same = memcmp(command.torque, wanted, sizeof command.torque) == 0
                 && memcmp(command.joint_position, wanted + 12, sizeof command.joint_position) == 0
                 && memcmp(command.joint_velocity, wanted + 24, sizeof command.joint_velocity) == 0
-                && memcmp(command.u_lat, wanted + 36, sizeof command.u_lat) == 0
+                && memcmp(&command.stiffness, wanted + 36, sizeof wanted[0]) == 0
+                && memcmp(&command.damping, wanted + 37, sizeof wanted[0]) == 0
+                && memcmp(command.u_lat, wanted + 38, sizeof command.u_lat) == 0
                 && command.status == codes[0] && command.iterations == codes[1];
             if (!same && different < 3) {
                 printf("step %ld: status %d not %d, iterations %d not %d, torque %.17g not %.17g\n", steps, command.status,
@@ -108,6 +118,9 @@ int main(int argc, char **argv)
             different += !same;
             ++steps;
             active += command.iterations > 0;
+            if (command.status >= 20) {
+                seen |= 1ul << (command.status - 20);
+            }
             fallbacks += command.status < 0 || command.status >= 10;
             iterations = command.iterations > iterations ? command.iterations : iterations;
             for (int i = 0; i < 12; ++i) {
@@ -121,8 +134,11 @@ int main(int argc, char **argv)
         free(u);
         free(feet);
     }
-    printf("%ld steps, %ld different, %ld with iterations, at most %ld, %ld fallbacks, %ld torques beyond their limit\n", steps,
-           different, active, iterations, fallbacks, beyond);
+    for (; seen > 0; seen &= seen - 1) {
+        ++kinds;
+    }
+    printf("%ld steps, %ld different, %ld with iterations, at most %ld, %ld fallbacks, %ld torques beyond their limit, "
+           "%ld kinds of faults\n", steps, different, active, iterations, fallbacks, beyond, kinds);
     fclose(input);
     return different > 0 || beyond > 0 || steps == 0;
 }

@@ -68,7 +68,15 @@ int main(void)
     settings.drive_stiffness_nm_rad = 20;
     settings.drive_damping_nm_s_rad = (double)NAN;
     expect(settings, "drive_damping_nm_s_rad");
-    settings.effectiveness_time_s = 0;
+    TRY(tilt_rad, 0);
+    TRY(tilt_rad, (double)NAN);
+    TRY(clock_gap_s, -1);
+    TRY(frozen_steps, -1);
+    TRY(fade_s, 0);
+    TRY(after_end, 3);
+    settings = FN(_controller_settings_default)();
+    settings.tilt_rad = settings.clock_gap_s = (double)INFINITY;
+    settings.poor_steps = 0;
     expect(settings, NULL);
     return faults > 0;
 }

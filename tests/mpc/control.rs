@@ -9,7 +9,7 @@ use romc::mpc::{
 };
 use romc::robot::ContactFlags;
 
-use crate::synthetic::{D, Equations, STAND, Trajectory, decoded, model, trajectory};
+use crate::synthetic::{D, Equations, STAND, Trajectory, decoded, model, trajectory, unwatched};
 
 fn controller(
     model: &ReducedModel,
@@ -56,7 +56,7 @@ fn on_a_reference_that_the_model_follows_the_reference_input_is_commanded() {
     for drift in [Drift::Reference, Drift::Model] {
         let settings = MpcSettings {
             drift,
-            ..MpcSettings::default()
+            ..unwatched()
         };
         let mut controller = controller(&model, settings, reference.samples());
         for sample in (0..300).step_by(5) {
@@ -191,7 +191,7 @@ fn weak_and_strong_motors_are_made_up_for() {
     let model = model(Equations::Nonlinear);
     let trusting = MpcSettings {
         velocity_weight: STIFF,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     for stiffness_nm_rad in [0.0, 5.0] {
         let damping_nm_s_rad = 0.04 * stiffness_nm_rad;
@@ -232,12 +232,12 @@ fn feedback_brings_the_model_back_to_the_reference_faster_than_its_own_damping()
     let strong = MpcSettings {
         input_weight: 1e-3,
         velocity_weight: STIFF,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let weak = MpcSettings {
         input_weight: 1e6,
         velocity_weight: STIFF,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let sum = |settings| {
         closed_loop(&model, settings, true)[5..30]
@@ -261,7 +261,7 @@ fn without_a_recorded_input_the_reference_is_still_tracked() {
                 velocity_weight: STIFF,
                 linearisation,
                 missing_input,
-                ..MpcSettings::default()
+                ..unwatched()
             };
             let distances = closed_loop(&model, settings, false);
             let late = distances[40..].iter().copied().fold(0.0, f64::max);
@@ -275,7 +275,7 @@ fn without_a_recorded_input_the_reference_is_still_tracked() {
 fn input_of_a_reference_without_one_is_found_behind_its_accelerations() {
     let model = model(Equations::Nonlinear);
     let reference = trajectory(&model);
-    let mut controller = controller(&model, MpcSettings::default(), reference.without_input());
+    let mut controller = controller(&model, unwatched(), reference.without_input());
     let (mut error, mut size) = (0.0, 0.0);
     for sample in (0..350).step_by(5) {
         let command = measure(&reference, sample, &mut controller);
@@ -298,7 +298,7 @@ fn plan_of_a_linear_model_is_a_trajectory_of_its_runge_kutta_steps() {
     let reference = trajectory(&model);
     let settings = MpcSettings {
         input_weight: 1e-2,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let mut dynamics = CompiledModel::new(&model).expect("lowers");
     for linearisation in [Linearisation::Reference, Linearisation::LastPlan] {
@@ -345,7 +345,7 @@ fn torque_rate_is_kept_between_commands() {
     let settings = MpcSettings {
         torque_rate_nm_s: Some(rate),
         input_weight: 1e-4,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let free = MpcSettings {
         torque_rate_nm_s: None,
@@ -385,7 +385,7 @@ fn lifted_body_force_stays_in_its_friction_cone() {
     let violations = |body_friction| {
         let settings = MpcSettings {
             body_friction,
-            ..MpcSettings::default()
+            ..unwatched()
         };
         let mut controller = controller(&model, settings, reference.samples());
         let mut count = 0;
@@ -414,7 +414,7 @@ fn saturated_torques_reach_their_limit_and_never_pass_it() {
     let settings = MpcSettings {
         input_weight: 1e-9,
         velocity_weight: STIFF,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let mut controller = controller(&model, settings, reference.samples());
     let mut saturated = 0;
@@ -447,7 +447,7 @@ fn same_measurements_give_the_same_bits() {
     let model = model(Equations::Nonlinear);
     let reference = trajectory(&model);
     let run = || {
-        let mut controller = controller(&model, MpcSettings::default(), reference.samples());
+        let mut controller = controller(&model, unwatched(), reference.samples());
         let bits = |command: Command| command.torque_nm.map(f64::to_bits);
         (0..300)
             .step_by(5)
@@ -460,8 +460,8 @@ fn same_measurements_give_the_same_bits() {
 #[test]
 fn stage_rows_keep_only_what_can_be_active() {
     let controller =
-        romc::mpc::controller(&model(Equations::Linear), MpcSettings::default()).expect("complete");
-    let rows = romc::mpc::problem::StageRows::new(controller.plant(), &MpcSettings::default());
+        romc::mpc::controller(&model(Equations::Linear), unwatched()).expect("complete");
+    let rows = romc::mpc::problem::StageRows::new(controller.plant(), &unwatched());
     assert!(
         !rows.input.is_empty() && rows.input.len() < 16,
         "{} of 16 torque rows",
@@ -487,35 +487,35 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(
         refused(MpcSettings {
             horizon: 0,
-            ..MpcSettings::default()
+            ..unwatched()
         }),
         "horizon"
     );
     let most = romc::limits::table::HORIZON.most as usize;
     let with = |horizon| MpcSettings {
         horizon,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     assert_eq!(refused(with(most + 1)), "horizon");
     assert!(romc::mpc::controller(&model, with(most)).is_ok());
     assert_eq!(
         refused(MpcSettings {
             step_s: f64::NAN,
-            ..MpcSettings::default()
+            ..unwatched()
         }),
         "step_s"
     );
     assert_eq!(
         refused(MpcSettings {
             input_weight: -1.0,
-            ..MpcSettings::default()
+            ..unwatched()
         }),
         "input_weight"
     );
     assert_eq!(
         refused(MpcSettings {
             body_friction: Some(0.0),
-            ..MpcSettings::default()
+            ..unwatched()
         }),
         "body_friction"
     );
@@ -525,7 +525,7 @@ fn settings_out_of_range_are_refused_by_name() {
                 stiffness_nm_rad: -1.0,
                 damping_nm_s_rad: 0.0,
             },
-            ..MpcSettings::default()
+            ..unwatched()
         }),
         "drive_stiffness_nm_rad"
     );
@@ -535,7 +535,7 @@ fn settings_out_of_range_are_refused_by_name() {
 fn references_that_do_not_fit_are_refused_and_the_old_one_stays() {
     let model = model(Equations::Linear);
     let good = trajectory(&model);
-    let mut controller = controller(&model, MpcSettings::default(), good.samples());
+    let mut controller = controller(&model, unwatched(), good.samples());
     let mut bad_value = trajectory(&model);
     bad_value.dx[18 * 7 + 4] = f64::INFINITY;
     let error = controller

@@ -1,5 +1,6 @@
 //! The input of a reference that comes without one.
 
+use crate::synthetic::unwatched;
 use nalgebra::{DMatrix, DVector};
 use romc::mpc::{
     ControlModel, ControlPhase, Controller, InputGivenState, LatentDynamics, Measurement,
@@ -71,7 +72,7 @@ fn estimated(
         step_s,
         horizon: 2,
         solver: Solver::Riccati,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let plant = plant.checked().expect("a sound model");
     let mut controller =

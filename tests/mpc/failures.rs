@@ -8,7 +8,7 @@ use romc::robot::ContactFlags;
 
 use crate::control::{assert_within_limits, measure};
 use crate::random::Random;
-use crate::synthetic::{Equations, Trajectory, model, trajectory};
+use crate::synthetic::{Equations, Trajectory, model, trajectory, unwatched};
 
 struct Bench {
     reference: Trajectory,
@@ -71,7 +71,7 @@ impl Bench {
 
 #[test]
 fn measurement_that_is_not_a_number_uses_the_plan_then_holds_then_recovers() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     let good = bench.nominal(100);
     let planned: Vec<f64> = bench.controller.plan().input(1).to_vec();
     for step in 1..12 {
@@ -97,7 +97,7 @@ fn measurement_that_is_not_a_number_uses_the_plan_then_holds_then_recovers() {
 
 #[test]
 fn hold_fades_its_torque_and_keeps_its_posture() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     bench.nominal(100);
     let mut before: Option<Command> = None;
     for step in 5..60 {
@@ -130,7 +130,7 @@ fn hold_damps_measured_joint_velocities_without_piling_up() {
             damping_nm_s: 2.0,
             ..FallbackSettings::default()
         },
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let mut bench = Bench::new(settings);
     for step in 0..30 {
@@ -150,7 +150,7 @@ fn hold_damps_measured_joint_velocities_without_piling_up() {
 
 #[test]
 fn time_that_is_not_a_number_is_refused_and_the_next_step_is_solved() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     bench.nominal(100);
     let (x, dx) = bench.reference.state(105);
     let command = bench.controller.step(Measurement {
@@ -168,7 +168,7 @@ fn time_that_is_not_a_number_is_refused_and_the_next_step_is_solved() {
 
 #[test]
 fn wrong_dimension_is_refused_and_the_next_step_is_solved() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     bench.nominal(100);
     let (x, dx) = bench.reference.state(105);
     for (x, dx) in [(&x[..17], &dx[..]), (&x[..], &dx[..0])] {
@@ -190,7 +190,7 @@ fn wrong_dimension_is_refused_and_the_next_step_is_solved() {
 #[test]
 fn without_a_reference_the_joints_are_damped_and_nothing_else() {
     let mut controller =
-        romc::mpc::controller(&model(Equations::Linear), MpcSettings::default()).expect("complete");
+        romc::mpc::controller(&model(Equations::Linear), unwatched()).expect("complete");
     let mut dx = [0.0; 18];
     dx[4] = 3.0;
     let command = controller.step(Measurement {
@@ -210,7 +210,7 @@ fn without_a_reference_the_joints_are_damped_and_nothing_else() {
 #[test]
 fn without_a_reference_the_posture_measured_first_is_held() {
     let mut controller =
-        romc::mpc::controller(&model(Equations::Linear), MpcSettings::default()).expect("complete");
+        romc::mpc::controller(&model(Equations::Linear), unwatched()).expect("complete");
     let standing: [f64; 18] = std::array::from_fn(|i| match i {
         0..12 => [0.1, 0.92, -1.75][i % 3],
         _ => 0.0,
@@ -231,7 +231,7 @@ fn without_a_reference_the_posture_measured_first_is_held() {
 
 /// The largest torque after each of `times_s`, held after a plan whose stages have run out.
 fn held_torques(times_s: impl IntoIterator<Item = f64>) -> Vec<f64> {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     bench.nominal(100);
     let start_s = bench.reference.time_s[100];
     let mut torques = Vec::new();
@@ -280,7 +280,7 @@ fn hold_fades_by_time_and_by_calls_where_the_clock_says_nothing() {
 
 #[test]
 fn jump_of_the_measurement_is_disbelieved_for_a_while_and_then_believed() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     bench.nominal(100);
     for step in 1..=3 {
         let command = bench.changed(100 + 5 * step, |x, _| x[12] += 5.0);
@@ -305,7 +305,7 @@ fn jump_of_the_measurement_is_disbelieved_for_a_while_and_then_believed() {
 
 #[test]
 fn single_outlier_costs_one_step() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     bench.nominal(100);
     assert_eq!(
         bench.changed(105, |x, _| x[14] -= 3.0).status,
@@ -321,7 +321,7 @@ fn plan_that_fails_the_optimality_conditions_is_inaccurate_and_not_used() {
             accepted_residual: 1e-30,
             ..QpSettings::default()
         },
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let refused = Bench::new(settings).nominal(0);
     assert_eq!(
@@ -332,7 +332,7 @@ fn plan_that_fails_the_optimality_conditions_is_inaccurate_and_not_used() {
 
 #[test]
 fn reference_whose_deviations_overflow_is_a_numerical_failure_until_a_sane_one_comes() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     let mut huge = trajectory(&model(Equations::Nonlinear));
     huge.x.iter_mut().for_each(|value| *value *= 1e200);
     let set = bench.controller.set_reference(huge.samples());
@@ -361,7 +361,7 @@ fn contradicting_constraints_are_infeasible_and_solved_again_when_they_agree() {
             torque_rate_nm_s: Some(5.0),
             body_friction: Some(0.3),
             horizon: 5,
-            ..MpcSettings::default()
+            ..unwatched()
         };
         let mut bench = Bench::new(settings);
         for sample in (205..235).step_by(5) {
@@ -378,7 +378,7 @@ fn contradicting_constraints_are_infeasible_and_solved_again_when_they_agree() {
 
 #[test]
 fn touchdown_before_schedule_is_planned_in_contact_at_once() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     bench.nominal(230);
     let early = bench.with_feet(235, [true; 4]);
     assert_eq!((early.status, early.phase), (Status::ContactEarly, Some(0)));
@@ -388,7 +388,7 @@ fn touchdown_before_schedule_is_planned_in_contact_at_once() {
 
 #[test]
 fn takeoff_after_schedule_is_planned_in_contact_for_one_more_stage() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     bench.nominal(195);
     let late = bench.with_feet(205, [true, true, false, false]);
     assert_eq!((late.status, late.phase), (Status::ContactLate, Some(0)));
@@ -398,7 +398,7 @@ fn takeoff_after_schedule_is_planned_in_contact_for_one_more_stage() {
 
 #[test]
 fn flight_that_the_reference_is_not_near_is_told() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     let unknown = bench.with_feet(0, [false; 4]);
     assert_eq!(
         (unknown.status, unknown.phase),
@@ -409,7 +409,7 @@ fn flight_that_the_reference_is_not_near_is_told() {
 
 #[test]
 fn posture_outside_the_joint_limits_softens_the_plan() {
-    let mut bench = Bench::new(MpcSettings::default());
+    let mut bench = Bench::new(unwatched());
     let pseudo_knee = |x: &mut [f64; 18]| (0..4).for_each(|leg| x[3 * leg + 2] += 6.0);
     let command = bench.changed(100, |x, _| pseudo_knee(x));
     assert_eq!(command.status, Status::Softened);
@@ -422,7 +422,7 @@ fn posture_outside_the_joint_limits_softens_the_plan() {
 #[test]
 fn huge_reference_never_leaves_the_limits_and_a_sane_one_is_followed_again() {
     for size in [1e3, 1e9, 1e30, 1e160] {
-        let mut bench = Bench::new(MpcSettings::default());
+        let mut bench = Bench::new(unwatched());
         let mut huge = trajectory(&model(Equations::Nonlinear));
         huge.x.iter_mut().for_each(|value| *value *= size);
         huge.dx.iter_mut().for_each(|value| *value *= size);
@@ -456,7 +456,7 @@ fn stretched_leg_in_contact_fails_the_consistent_lift_only_as_long_as_it_is_stre
     let mut bench = Bench::new(MpcSettings {
         lift: Lift::Consistent,
         fallback: believing,
-        ..MpcSettings::default()
+        ..unwatched()
     });
     assert_eq!(bench.nominal(100).status, Status::Solved);
     let stretched = bench.changed(105, |x, _| x[5] = 0.0);
@@ -473,7 +473,7 @@ fn torques_stay_within_limits_under_any_measurement() {
     for lift in [Lift::Transpose, Lift::Consistent] {
         let mut bench = Bench::new(MpcSettings {
             lift,
-            ..MpcSettings::default()
+            ..unwatched()
         });
         let mut plans = 0;
         for step in 0..400 {

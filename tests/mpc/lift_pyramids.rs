@@ -1,5 +1,6 @@
 //! The consistent lift with the structured solver against the one with clarabel.
 
+use crate::synthetic::unwatched;
 use romc::mpc::{
     Cone, ConeProgram, ConsistentLift, ControlModel, MpcSettings, Outcome, QpSettings, QpSolver,
     Solver, SolverProfile, StanceState, foot_forces, sparse,
@@ -22,7 +23,7 @@ fn lift_by(plant: &ControlModel, solver: Solver) -> ConsistentLift {
         solver,
         foot_friction: FRICTION,
         lift_prior_weight: PRIOR_WEIGHT,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     ConsistentLift::new(plant, &settings).expect("a sound program")
 }

@@ -6,7 +6,7 @@ use romc::mpc::{ConsistentLift, ControlModel, LiftFailure, MpcSettings, StanceSt
 use romc::robot::{Actuators, InputRule, Leg, Robot, WrenchFrame};
 
 use crate::random::Random;
-use crate::synthetic::{D, Equations, STAND, model, model_with};
+use crate::synthetic::{D, Equations, STAND, model, model_with, unwatched};
 
 const FOOTING: StanceState = StanceState {
     joints_rad: [
@@ -107,7 +107,7 @@ fn consistent_lift_recovers_torques_that_obey_the_ground() {
     let plant = romc::mpc::control_model(&informed_model()).expect("complete");
     let settings = MpcSettings {
         lift_prior_weight: 1e-6,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let mut lift = ConsistentLift::new(&plant, &settings).expect("a sound program");
     let mut random = Random::new(31);
@@ -158,7 +158,7 @@ fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_bet
     let plant = romc::mpc::control_model(&informed_model()).expect("complete");
     let settings = MpcSettings {
         foot_friction: 0.5,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let mut lift = ConsistentLift::new(&plant, &settings).expect("a sound program");
     let mut random = Random::new(14);
@@ -196,7 +196,7 @@ fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_bet
 #[test]
 fn consistent_lift_of_a_giant_input_stays_within_the_torque_limits() {
     let plant = romc::mpc::control_model(&informed_model()).expect("complete");
-    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let mut lift = ConsistentLift::new(&plant, &unwatched()).expect("a sound program");
     let wanted = projected(&plant, &torque_for([Vector3::new(0.0, 0.0, 900.0); 4]));
     let found = lift.lift(&plant, &wanted, &FOOTING).expect("bent legs");
     let shares = found
@@ -214,7 +214,7 @@ fn consistent_lift_of_a_giant_input_stays_within_the_torque_limits() {
 #[test]
 fn feet_in_the_air_have_no_cone() {
     let plant = romc::mpc::control_model(&informed_model()).expect("complete");
-    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let mut lift = ConsistentLift::new(&plant, &unwatched()).expect("a sound program");
     let wanted = projected(&plant, &torque_for([Vector3::new(8.0, 0.0, -6.0); 4]));
     let flying = StanceState {
         feet: [false; 4],
@@ -231,7 +231,7 @@ fn feet_in_the_air_have_no_cone() {
 #[test]
 fn stretched_leg_is_a_failure_in_contact_only() {
     let plant = romc::mpc::control_model(&informed_model()).expect("complete");
-    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let mut lift = ConsistentLift::new(&plant, &unwatched()).expect("a sound program");
     let mut stretched = FOOTING;
     stretched.joints_rad[5] = 0.0;
     assert_eq!(
@@ -255,7 +255,7 @@ fn losses() -> Actuators {
 fn consistent_lift_keeps_the_command_with_its_losses_within_the_limits() {
     let model = informed_model().into_builder().actuators(Some(losses()));
     let plant = romc::mpc::control_model(&model.build().expect("sound")).expect("complete");
-    let mut lift = ConsistentLift::new(&plant, &MpcSettings::default()).expect("a sound program");
+    let mut lift = ConsistentLift::new(&plant, &unwatched()).expect("a sound program");
     let wanted = projected(&plant, &torque_for([Vector3::new(0.0, 0.0, 900.0); 4]));
     let limits = go1().torque_limit_nm();
     let at_rest = lift.lift(&plant, &wanted, &FOOTING).expect("bent legs");
@@ -304,7 +304,7 @@ fn consistent_lift_in_world_axes_recovers_the_torques_of_a_pitched_robot() {
     let plant = romc::mpc::control_model(&model.build().expect("sound")).expect("complete");
     let settings = MpcSettings {
         lift_prior_weight: 1e-6,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let mut lift = ConsistentLift::new(&plant, &settings).expect("a sound program");
     let (mut error, mut size) = (0.0, 0.0);

@@ -5,7 +5,7 @@ use romc::model::{Activation, AffineMap, Layer, ReducedModel, StateMap};
 use romc::mpc::{Lift, Measurement, MpcSettings, RowSelection};
 
 use crate::random::Random;
-use crate::synthetic::{D, Equations, STAND, Trajectory, model, trajectory};
+use crate::synthetic::{D, Equations, STAND, Trajectory, model, trajectory, unwatched};
 
 fn layer(weights: DMatrix<f64>, bias: DVector<f64>, activation: Activation) -> Layer {
     let map = AffineMap::new("layer", weights, bias).expect("shapes fit");
@@ -95,7 +95,7 @@ fn maps_that_are_linear_in_disguise_give_the_commands_of_the_linear_model() {
             body_friction: Some(0.7),
             torque_rate_nm_s: Some(400.0),
             lift,
-            ..MpcSettings::default()
+            ..unwatched()
         };
         let mut controllers = [&linear, &hidden].map(|model| {
             let mut controller = romc::mpc::controller(model, settings).expect("complete");
@@ -140,7 +140,7 @@ fn torques_are_lifted_at_the_measured_state_and_limited_at_the_reference_of_each
     let mut trajectory = trajectory(&crate::synthetic::model(Equations::Nonlinear));
     // Inputs that no motor gives: the limits have something to do.
     trajectory.u.iter_mut().for_each(|u| *u *= 40.0);
-    let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
+    let mut controller = romc::mpc::controller(&model, unwatched()).expect("complete");
     controller
         .set_reference(trajectory.samples())
         .expect("a sound reference");

@@ -8,7 +8,7 @@ use romc::mpc::{Lift, MpcSettings, Source};
 use romc::recording::{Recording, Segment};
 
 use crate::outside;
-use crate::synthetic::{Equations, Trajectory, model, trajectory};
+use crate::synthetic::{Equations, Trajectory, model, trajectory, unwatched};
 use crate::tools::thorough_or;
 
 fn recording(trajectory: &Trajectory) -> Recording {
@@ -37,7 +37,7 @@ fn recording(trajectory: &Trajectory) -> Recording {
 fn run_along_a_recording_that_the_model_follows_finds_its_torques() {
     let model = model(Equations::Nonlinear);
     let recording = recording(&trajectory(&model));
-    let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
+    let mut controller = romc::mpc::controller(&model, unwatched()).expect("complete");
     let mut told = Vec::new();
     let run = along_recording(
         &mut controller,
@@ -96,7 +96,7 @@ fn torques_of_no_robot_are_left_out_and_counted() {
     let model = model(Equations::Nonlinear);
     let mut recording = recording(&trajectory(&model));
     recording.segments.remove(0);
-    let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
+    let mut controller = romc::mpc::controller(&model, unwatched()).expect("complete");
     recording.segments[0].torque_nm[(2, 203)] = -2.7e5;
     let run = along_recording(
         &mut controller,
@@ -120,7 +120,7 @@ fn torques_of_no_robot_are_left_out_and_counted() {
 fn lift_comparison_of_inputs_in_the_encoders_range_is_exact() {
     let model = model(Equations::Nonlinear);
     let recording = recording(&trajectory(&model));
-    let mut controller = romc::mpc::controller(&model, MpcSettings::default()).expect("complete");
+    let mut controller = romc::mpc::controller(&model, unwatched()).expect("complete");
     let run = along_recording(
         &mut controller,
         &recording,
@@ -141,7 +141,7 @@ fn hardware_jump_gets_torques_within_the_limits_with_either_lift() {
     for lift in [Lift::Transpose, Lift::Consistent] {
         let settings = MpcSettings {
             lift,
-            ..MpcSettings::default()
+            ..unwatched()
         };
         let mut controller =
             romc::mpc::controller(&model(Equations::Nonlinear), settings).expect("complete");
@@ -190,7 +190,7 @@ fn shipped_models_stay_within_limits_and_friction_at_every_step_of_every_recordi
         for lift in [Lift::Transpose, Lift::Consistent] {
             let settings = MpcSettings {
                 lift,
-                ..MpcSettings::default()
+                ..unwatched()
             };
             let mut controller = romc::mpc::controller(&model, settings).expect("complete");
             let mut steps = 0;
@@ -232,7 +232,7 @@ fn metrics_along(jump: &str, step_s: f64) -> (ControlMetrics, Option<f64>) {
     let jump = romc::recording::read(&path).expect("a sound jump");
     let settings = MpcSettings {
         step_s,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let mut controller = romc::mpc::controller(&model, settings).expect("complete");
     let input = ReferenceInput::Recorded;

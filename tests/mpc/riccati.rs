@@ -1,5 +1,6 @@
 //! The structured solver against clarabel.
 
+use crate::synthetic::unwatched;
 use romc::evaluate::{ReferenceInput, along_recording};
 use romc::mpc::{
     Cone, ConeProgram, Lift, MpcSettings, Outcome, QpSettings, QpSolver, Solver, sparse,
@@ -359,7 +360,7 @@ fn riccati_commands_clarabels_torques_along_recordings_and_prepares_ahead() {
             let mut settings = MpcSettings {
                 solver,
                 lift,
-                ..MpcSettings::default()
+                ..unwatched()
             };
             settings.qp.tolerance = 1e-9;
             let mut controller = romc::mpc::controller(&model, settings).expect("complete");
@@ -405,7 +406,7 @@ fn riccati_commands_clarabels_torques_under_limits_on_their_rates() {
                 let mut settings = MpcSettings {
                     solver,
                     torque_rate_nm_s: Some(rate),
-                    ..MpcSettings::default()
+                    ..unwatched()
                 };
                 settings.qp.tolerance = 1e-12;
                 let mut controller = romc::mpc::controller(&model, settings).expect("complete");

@@ -3,7 +3,7 @@
 use romc::mpc::problem::{Row, RowKind, has_links_or_cones, needed_rows};
 use romc::mpc::{Lift, MpcSettings, RowSelection};
 
-use crate::synthetic::{Equations, model};
+use crate::synthetic::{Equations, model, unwatched};
 
 fn row(joint: usize, row: &[f64], bound: f64) -> Row {
     Row {
@@ -85,7 +85,7 @@ fn with_all_kinds() -> MpcSettings {
         rows: RowSelection::All,
         torque_rate_nm_s: Some(100.0),
         body_friction: Some(0.5),
-        ..MpcSettings::default()
+        ..unwatched()
     }
 }
 
@@ -102,7 +102,7 @@ fn every_kind_has_rows_if_the_settings_ask_for_all() {
 fn kinds_that_the_settings_do_not_ask_for_have_no_rows() {
     let settings = MpcSettings {
         lift: Lift::Consistent,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     let rows = rows_of_stage(settings);
     assert!(rows.iter().all(|row| row.kind == RowKind::JointLimit));

@@ -1,5 +1,6 @@
 //! Legs in flight: turned against an error of pitch, under a share of the torques.
 
+use crate::synthetic::unwatched;
 use std::path::PathBuf;
 
 use nalgebra::{Rotation3, Vector3};
@@ -27,7 +28,7 @@ fn jump() -> Segment {
 fn command(swing_turn: f64, sample: usize, error_rad: f64) -> Command {
     let settings = MpcSettings {
         swing_turn,
-        ..MpcSettings::default()
+        ..unwatched()
     };
     command_with(settings, sample, error_rad)
 }
@@ -118,7 +119,7 @@ fn share_of_torques_acts_in_flight_alone() {
         let [whole, part] = [1.0, 0.3].map(|flight_torque| {
             let settings = MpcSettings {
                 flight_torque,
-                ..MpcSettings::default()
+                ..unwatched()
             };
             command_with(settings, sample, 0.0)
         });
@@ -135,7 +136,7 @@ fn share_of_torques_beyond_one_is_refused() {
     for flight_torque in [-0.1, 1.1, f64::NAN] {
         let settings = MpcSettings {
             flight_torque,
-            ..MpcSettings::default()
+            ..unwatched()
         };
         let refused = romc::mpc::controller(&shipped(), settings).map(drop);
         let error = refused.expect_err("outside 0 to 1").to_string();

@@ -189,3 +189,11 @@ pub fn trajectory(model: &ReducedModel) -> Trajectory {
     }
     out
 }
+
+/// The usual settings without a supervisor: a synthetic model is no robot that falls and stands.
+pub fn unwatched() -> romc::mpc::MpcSettings {
+    romc::mpc::MpcSettings {
+        bounds: romc::mpc::Bounds::OFF,
+        ..Default::default()
+    }
+}

@@ -170,7 +170,7 @@ impl Bounds {
         joint_margin_rad: 0.1,
         joint_velocity: 1.5,
         distance_m: 0.3,
-        posture_rad: 1.0,
+        posture_rad: 0.8,
         clock_gap_s: 0.1,
         frozen_steps: 8,
         velocity_mismatch: 0.5,

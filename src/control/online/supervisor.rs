@@ -14,7 +14,7 @@ use crate::robot::GRAVITY_M_S2;
 /// How long measurements are refused before they are a fault, s.
 const PATIENCE_S: f64 = 0.019;
 /// Tilts from half a turn on are none.
-const HALF_TURN: Real = 3.14;
+const HALF_TURN: Real = 3.1;
 /// Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down.
 const UPSIDE_DOWN: Real = 0.5;
 /// Share of the distances from the reference that a measurement may be off what the last one predicts.
@@ -288,11 +288,11 @@ impl Supervisor {
     /// Whether the body's velocity contradicts its positions since the last good measurement.
     fn is_unexplained(&mut self, bounds: &Bounds, time_s: f64, x: &[Real], dx: &[Real]) -> bool {
         let passed = (time_s - self.good_s) as Real;
-        if !self.has_good || !(passed > 0.0) {
+        if !self.has_good || passed <= 0.0 {
             return false;
         }
         let share = passed / MEMORY_S;
-        let kept = if share < 1.0 { 1.0 - share } else { 0.0 };
+        let kept: Real = if share < 1.0 { 1.0 - share } else { 0.0 };
         let mut largest: Real = 0.0;
         for i in 0..3 {
             let moved = x[12 + i] - self.good_x[12 + i];
@@ -364,7 +364,7 @@ impl Supervisor {
         posture: &mut [Real],
     ) -> Real {
         let passed = (self.faded_s / bounds.fade_s) as Real;
-        let share = if passed < 1.0 { 1.0 - passed } else { 0.0 };
+        let share: Real = if passed < 1.0 { 1.0 - passed } else { 0.0 };
         self.faded_s += passed_s;
         for i in 0..12 {
             let damped = clamped_torque(-damping * velocity[i], bounds.damping_torque_nm);

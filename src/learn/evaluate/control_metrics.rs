@@ -5,7 +5,7 @@ use super::prediction::{prediction_error, recorded_stages, uninformed};
 use super::verdict::failure;
 use super::*;
 use crate::mpc::problem::has_links_or_cones;
-use crate::mpc::{MpcSettings, Solver, Status, structured::MAX_STRUCTURED_DIM};
+use crate::mpc::{Bounds, MpcSettings, Solver, Status, structured::MAX_STRUCTURED_DIM};
 use crate::robot::{InputRule, rotation};
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -146,6 +146,8 @@ pub fn control_metrics(
     if model.latent_dim() <= MAX_STRUCTURED_DIM && !has_links_or_cones(&settings) {
         settings.solver = Solver::Riccati;
     }
+    // The plant is the model: nothing stands or falls.
+    settings.bounds = Bounds::OFF;
     let stages = recorded_stages(model, recording, settings.step_s)?;
     let predicted = |dynamics: Option<&ReducedModel>| prediction_error(model, dynamics, &stages);
     let blind = uninformed(model, &stages)?;
