@@ -38,9 +38,11 @@ impl LogColumn {
     pub fn all(latent_dim: usize) -> Vec<Self> {
         let samples = Column::all(false, false).into_iter().map(Self::Sample);
         let inputs = (0..latent_dim).map(Self::LatentInput);
-        (samples.chain([Self::Status, Self::Iterations]).chain(inputs))
-            .chain((0..JOINT_DIM).map(Self::Desired))
-            .collect()
+        (samples
+            .chain([Self::Status, Self::Iterations])
+            .chain(inputs))
+        .chain((0..JOINT_DIM).map(Self::Desired))
+        .collect()
     }
 
     fn checked(self, cell: &str, value: Option<f64>) -> Checked<f64> {
