@@ -191,6 +191,7 @@ struct Drawn<'a> {
     log: &'a ControllerLog,
     /// Times of the steps; where one is not finite, the one before.
     time_s: Vec<f64>,
+    over: (f64, f64),
     /// From the first fault on.
     shaded: Vec<(f64, f64)>,
 }
@@ -214,15 +215,16 @@ impl<'a> Drawn<'a> {
                 last_s
             })
             .collect();
-        let end_s = range(time_s.iter().copied()).1;
+        let over = range(time_s.iter().copied());
         let from = facts
             .fault
             .iter()
             .map(|of| time_s[of.first_row - FIRST_ROW]);
         Self {
-            shaded: from.map(|from_s| (from_s, end_s)).collect(),
+            shaded: from.map(|from_s| (from_s, over.1)).collect(),
             log,
             time_s,
+            over,
         }
     }
 
@@ -245,9 +247,10 @@ impl<'a> Drawn<'a> {
         (all.iter().filter(|of| is_so(of.start)).map(times)).collect()
     }
 
-    fn strip(id: &str, caption: &str, rows: Vec<(String, Vec<(f64, f64)>)>) -> Figure {
+    fn strip(&self, id: &str, caption: &str, rows: Vec<(String, Vec<(f64, f64)>)>) -> Figure {
         let size = (WIDE.0, AROUND + WIDE.1 * rows.len() as f64);
-        let (title, drawing) = (String::new(), Drawing::Spans(rows));
+        let over = self.over;
+        let (title, drawing) = (String::new(), Drawing::Spans { rows, over });
         let figure = Figure::over_time(id, caption, vec![Panel { title, drawing }], &[]);
         figure.in_columns(1, size)
     }
@@ -259,7 +262,7 @@ impl<'a> Drawn<'a> {
             (of.status.to_owned(), spans)
         };
         let rows = facts.statuses.iter().map(row).collect();
-        Self::strip("statuses", "How the steps ended.", rows)
+        self.strip("statuses", "How the steps ended.", rows)
     }
 
     fn contacts(&self) -> Figure {
@@ -269,7 +272,7 @@ impl<'a> Drawn<'a> {
             (Leg::ALL[foot].to_string(), spans)
         };
         let rows = (0..FOOT_DIM).map(row).collect();
-        Self::strip("contacts", "Feet on the ground, as measured.", rows)
+        self.strip("contacts", "Feet on the ground, as measured.", rows)
     }
 
     fn body(&self) -> Figure {

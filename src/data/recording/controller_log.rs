@@ -135,15 +135,14 @@ fn arranged(path: &Path, header: &str) -> Outcome<Vec<LogColumn>> {
     let names: Vec<&str> = cells(header, ',').collect();
     let is_input = |name: &&&str| name.starts_with(LATENT_INPUT);
     let columns = LogColumn::all(names.iter().filter(is_input).count());
-    let of_log = |name: &str| {
-        format!("`{name}`, as in logs that `NAME_log_write` of a generated controller writes")
-    };
     for (place, column) in columns.iter().enumerate() {
         let (found, name) = (names.get(place), column.name());
         if found.is_none_or(|found| *found != name) {
             let found = found.map_or("the end".to_owned(), |name| listed(&[(*name).into()], 1));
-            let fault = unexpected(found, of_log(&name));
-            return Err(fault.in_cell(path, 1, &format!("{}", place + 1)));
+            let place = place + 1;
+            let of_log =
+                format!("`{name}` in column {place} of a log that `NAME_log_write` writes");
+            return Err(unexpected(found, of_log).at(path, 1));
         }
     }
     match names.get(columns.len()) {

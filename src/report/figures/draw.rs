@@ -97,7 +97,7 @@ pub(crate) fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<
     let title = panel.title.as_str();
     match &panel.drawing {
         Drawing::Lines { series, shaded } => draw_lines(title, (series, shaded), size, x_label),
-        Drawing::Spans(rows) => draw_spans(title, rows, size, x_label),
+        Drawing::Spans { rows, over } => draw_spans(title, (rows, *over), size, x_label),
         Drawing::Heat(map) => draw_heat(title, map, size, x_label),
         Drawing::Sticks(plot) => draw_sticks(title, plot, size),
     }
@@ -214,19 +214,16 @@ fn draw_x_axis(axes: &Axes, x_label: &str, marks: &mut Vec<Mark>) {
 
 fn draw_spans(
     title: &str,
-    rows: &[(String, Vec<(f64, f64)>)],
+    (rows, over): (&[(String, Vec<(f64, f64)>)], (f64, f64)),
     size: (f64, f64),
     x_label: &str,
 ) -> Vec<Mark> {
     const NAMES: f64 = 104.0; // names of statuses, and the same for all figures of a page
     const THINNEST: f64 = 1.0;
-    let spans = rows.iter().flat_map(|(_, spans)| spans);
-    let (first, last) = range(spans.flat_map(|&(from, to)| [from, to]));
     let axes = Axes {
-        x: if last > first {
-            (first, last)
-        } else {
-            padded([first].into_iter())
+        x: match over.1 > over.0 {
+            true => over,
+            false => padded([over.0].into_iter()),
         },
         y: (rows.len() as f64, 0.0),
         left: NAMES,

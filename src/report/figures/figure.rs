@@ -63,7 +63,10 @@ pub(crate) enum Drawing {
         shaded: Vec<(f64, f64)>,
     },
     /// Ranges of x in named rows, such as the times at which a foot is down.
-    Spans(Vec<(String, Vec<(f64, f64)>)>),
+    Spans {
+        rows: Vec<(String, Vec<(f64, f64)>)>,
+        over: (f64, f64),
+    },
     Heat(HeatMap),
     Sticks(StickPlot),
 }

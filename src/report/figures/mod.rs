@@ -64,7 +64,7 @@ fn csv(figure: &Figure) -> String {
                     }
                 }
             }
-            Drawing::Spans(rows) => {
+            Drawing::Spans { rows, .. } => {
                 for (name, spans) in rows {
                     for (from, to) in spans {
                         row([title, name, &from.to_string(), "1"]);
