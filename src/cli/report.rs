@@ -31,18 +31,15 @@ fn of_log(arguments: &ReportArguments, path: &Path) -> Result<Answer, Error> {
     let log = ControllerLog::read(path)?;
     let facts = LogFacts::of(&log);
     let figures = log_figures(&log, &facts);
-    let words = [path, output].map(quoted);
-    let command = format!("romc report --log {} --output {}", words[0], words[1]);
-    let page = log_page(path, &facts, &figures, &command)?;
+    let page = log_page(path, &facts, &figures)?;
     let (shown, bytes) = (output.display().to_string(), page.len());
     let mut text = format!("{}\n{}", facts.headline, lines("", &facts.sentences));
     text += &format!("{shown}: {} kB, {} figures\n", bytes / 1000, figures.len());
     let json = json!({ "log": path.display().to_string(), "output": shown, "bytes": bytes });
     let mut answer = Answer::new(text, json);
     extend(&mut answer.json, json!(facts));
-    let figures = || Ok(figures.into_iter().map(|(_, figure)| figure).collect());
     let folder = arguments.figures.as_deref();
-    inputs.write_figures(folder, figures, arguments.force, &mut answer)?;
+    inputs.write_figures(folder, || Ok(figures), arguments.force, &mut answer)?;
     write_file(output, page.as_bytes(), arguments.force)?;
     Ok(answer)
 }

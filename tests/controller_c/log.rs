@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use romc::codegen::Precision;
-use romc::recording::{Column, ControllerLog, LogColumn};
+use romc::recording::{Column, ControllerLog};
 
 use crate::emitted::Emitted;
 use crate::programs::{root, shipped, succeed};
@@ -39,9 +39,9 @@ fn log_in_c_keeps_the_last_steps_and_the_report_names_their_statuses() {
     let path = folder.path().join("fall.csv");
     fs::write(&path, &text).expect("written");
     let log = ControllerLog::read(&path).expect("a log");
-    let values = |column| log.values(LogColumn::Sample(column));
+    let values = |column: Column| log.values(&column.name());
     // Steps 41 to 89 of 10 ms, and one without a measurement.
-    assert_eq!(log.len(), 50);
+    assert_eq!(values(Column::Time).len(), 50);
     let times = values(Column::Time);
     let is_step = |(step, time): (usize, &f64)| (time - 0.01 * (step + 41) as f64).abs() < 1e-9;
     assert!(times.iter().enumerate().all(is_step), "{times:?}");
@@ -53,7 +53,7 @@ fn log_in_c_keeps_the_last_steps_and_the_report_names_their_statuses() {
     let output = report(&path, &["--json"]);
     assert!(output.status.success(), "{output:?}");
     let facts: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let codes = log.values(LogColumn::Status);
+    let codes = log.values("status");
     let first = codes
         .iter()
         .position(|code| *code >= 20.0)
@@ -89,10 +89,10 @@ fn log_of_the_example_is_a_recording_in_both_precisions() {
         let [segment] = &recording.segments[..] else {
             panic!("{} segments", recording.segments.len());
         };
-        let heights = log.values(LogColumn::Sample(Column::Position(14)));
+        let heights = log.values(&Column::Position(14).name());
         assert!(segment.x.row(14).iter().eq(heights), "other heights");
         assert_eq!(recording.ignored_columns.len(), 2 + 2 + 12);
-        let desired = log.values(LogColumn::Desired(0));
+        let desired = log.values("fr.hx.desired");
         assert!(desired.iter().all(|angle| angle.abs() < 1.0), "{desired:?}");
     }
 }
@@ -104,8 +104,11 @@ fn report_on_what_is_no_log_names_file_line_found_and_expected() {
     let line = |number: usize| text.lines().nth(number - 1).expect("a line");
     let cut = line(3).rsplit_once(',').expect("cells").0;
     let cases = [
-        (String::new(), "found an empty file, expected the header"),
-        (format!("{}\n", line(1)), "row 1: found a header alone"),
+        (String::new(), "found ``, expected `Time`"),
+        (
+            format!("{}\n", line(1)),
+            "header of 69 columns but no sample",
+        ),
         (
             text.replacen("status", "state", 1),
             "found `state`, expected `status`",

@@ -2,151 +2,79 @@
 //! accelerations, then those of the command. Numbers may be infinite or undefined, and times may stand still or go
 //! back, as in the measurements that a controller refuses.
 
-use super::error::Checked;
-use super::lines::{Lines, MAX_ROWS, NumberReader, cells};
+use super::foreign::{TextFormat, read_lines};
+use super::lines::{Lines, cells};
 use super::*;
 use crate::robot::JOINT_NAMES;
-
-/// The quantity in a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LogColumn {
-    /// Of the measurement, or a torque of the command.
-    Sample(Column),
-    /// Code of the step's status.
-    Status,
-    /// Interior-point iterations.
-    Iterations,
-    /// Latent input, scaled.
-    LatentInput(usize),
-    /// Desired position of a joint, rad.
-    Desired(usize),
-}
-
-impl LogColumn {
-    /// Name in the header.
-    pub fn name(self) -> String {
-        match self {
-            Self::Sample(column) => column.name(),
-            Self::Status => "status".to_owned(),
-            Self::Iterations => "iterations".to_owned(),
-            Self::LatentInput(i) => format!("{LATENT_INPUT}{}", i + 1),
-            Self::Desired(joint) => format!("{}.desired", JOINT_NAMES[joint]),
-        }
-    }
-
-    /// The columns of a log, in the order of writing.
-    pub fn all(latent_dim: usize) -> Vec<Self> {
-        let samples = Column::all(false, false).into_iter().map(Self::Sample);
-        let inputs = (0..latent_dim).map(Self::LatentInput);
-        (samples
-            .chain([Self::Status, Self::Iterations])
-            .chain(inputs))
-        .chain((0..JOINT_DIM).map(Self::Desired))
-        .collect()
-    }
-
-    fn checked(self, cell: &str, value: Option<f64>) -> Checked<f64> {
-        let (is_sound, expected): (fn(f64) -> bool, _) = match self {
-            Self::Status | Self::Iterations => (|value| value.fract() == 0.0, "a whole number"),
-            Self::Sample(Column::Foot(_)) => (|value| [0.0, 1.0].contains(&value), "0 or 1"),
-            _ => (|_| true, "a number with a decimal point"),
-        };
-        let value = value.filter(|value| is_sound(*value));
-        value.ok_or_else(|| RecordingFault::number(cell, expected))
-    }
-}
 
 const LATENT_INPUT: &str = "u_lat_";
 
 /// The last steps of a controller, oldest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ControllerLog {
-    columns: Vec<(LogColumn, Vec<f64>)>,
+    columns: Vec<(String, Vec<f64>)>,
 }
 
 impl ControllerLog {
+    /// Names of the columns, in the order of writing.
+    pub fn column_names(latent_dim: usize) -> Vec<String> {
+        let samples = Column::all(false, false).into_iter().map(Column::name);
+        let inputs = (1..=latent_dim).map(|input| format!("{LATENT_INPUT}{input}"));
+        let desired = JOINT_NAMES.map(|joint| format!("{joint}.desired"));
+        let of_step = ["status", "iterations"].map(str::to_owned);
+        (samples.chain(of_step).chain(inputs).chain(desired)).collect()
+    }
+
     /// Reads a log, plain or gzip; errors name row and column.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
-        let mut lines = Lines::open(path)?;
-        let Some((_, header)) = lines.next_row()? else {
-            let expected = "the header of a log";
-            return Err(unexpected("an empty file", expected).of(path));
-        };
-        let columns = arranged(path, header)?;
-        let mut log = Self {
-            columns: columns.into_iter().map(|c| (c, Vec::new())).collect(),
-        };
-        let mut numbers = NumberReader::new(',');
-        while let Some((row, line)) = lines.next_row()? {
-            if log.columns[0].1.len() == MAX_ROWS {
-                let found = format!("more than {MAX_ROWS} steps");
-                return Err(unexpected(found, "a shorter log").at(path, row));
+        let mut first = Lines::open(path)?;
+        let header = first.next_row()?.map_or("", |(_, line)| line);
+        check_header(path, &cells(header, ',').collect::<Vec<_>>())?;
+        let header = Some(true);
+        let other = TextFormat::default();
+        let log = read_lines(path, Lines::open(path)?, &TextFormat { header, ..other })?;
+        for column in &log.columns {
+            let (is_sound, expected): (fn(&f64) -> bool, _) = match &*column.name {
+                "status" | "iterations" => (|value| value.fract() == 0.0, "a whole number"),
+                name if name.ends_with(" Foot") => (|value| [0.0, 1.0].contains(value), "0 or 1"),
+                _ => (|_| true, "a number"),
+            };
+            let refused = (column.refused.clone()).or_else(|| {
+                let sample = column.values.iter().position(|value| !is_sound(value))?;
+                Some((sample, column.values[sample].to_string()))
+            });
+            if let Some((sample, found)) = refused {
+                let fault = RecordingFault::number(&found, expected);
+                return Err(fault.in_cell(path, log.first_row + sample, &column.name));
             }
-            log.push(line, &mut numbers)
-                .map_err(|(column, fault)| fault.in_cell(path, row, &column.name()))?;
         }
-        match log.is_empty() {
-            true => Err(unexpected("a header alone", "at least one step").at(path, 1)),
-            false => Ok(log),
-        }
-    }
-
-    fn push(
-        &mut self,
-        line: &str,
-        numbers: &mut NumberReader,
-    ) -> Result<(), (LogColumn, RecordingFault)> {
-        let (found, expected) = (cells(line, ',').count(), self.columns.len());
-        if found != expected {
-            let column = self.columns[found.min(expected - 1)].0;
-            let (found, expected) = (format!("{found} cells"), expected.to_string());
-            return Err((column, unexpected(found, expected)));
-        }
-        for ((column, values), cell) in self.columns.iter_mut().zip(cells(line, ',')) {
-            let value = column.checked(cell, numbers.parse(cell));
-            values.push(value.map_err(|fault| (*column, fault))?);
-        }
-        Ok(())
-    }
-
-    /// Number of steps.
-    pub fn len(&self) -> usize {
-        self.columns[0].1.len()
-    }
-
-    /// Whether there is no step.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The columns with their values.
-    pub fn columns(&self) -> &[(LogColumn, Vec<f64>)] {
-        &self.columns
+        let columns = log.columns.into_iter();
+        let columns = columns.map(|column| (column.name, column.values));
+        Ok(Self {
+            columns: columns.collect(),
+        })
     }
 
     /// Values of a column, one per step; none if the log does not have it.
-    pub fn values(&self, column: LogColumn) -> &[f64] {
-        let found = self.columns.iter().find(|(known, _)| *known == column);
+    pub fn values(&self, name: &str) -> &[f64] {
+        let found = self.columns.iter().find(|(known, _)| known == name);
         found.map_or(&[], |(_, values)| values)
     }
 }
 
-fn arranged(path: &Path, header: &str) -> Outcome<Vec<LogColumn>> {
-    let names: Vec<&str> = cells(header, ',').collect();
-    let is_input = |name: &&&str| name.starts_with(LATENT_INPUT);
-    let columns = LogColumn::all(names.iter().filter(is_input).count());
-    for (place, column) in columns.iter().enumerate() {
-        let (found, name) = (names.get(place), column.name());
-        if found.is_none_or(|found| *found != name) {
-            let found = found.map_or("the end".to_owned(), |name| listed(&[(*name).into()], 1));
+fn check_header(path: &Path, names: &[&str]) -> Outcome<()> {
+    let inputs = names.iter().filter(|name| name.starts_with(LATENT_INPUT));
+    let expected = ControllerLog::column_names(inputs.count());
+    for place in 0..expected.len().max(names.len()) {
+        let (found, expected) = (names.get(place), expected.get(place));
+        if found.copied() != expected.map(String::as_str) {
+            let quoted = |name: Option<&str>| name.map_or("the end".into(), |n| format!("`{n}`"));
+            let found = quoted(found.map(|name| error::shortened(name)).as_deref());
+            let expected = quoted(expected.map(String::as_str));
             let place = place + 1;
-            let of_log =
-                format!("`{name}` in column {place} of a log that `NAME_log_write` writes");
+            let of_log = format!("{expected} as column {place} of a log of `NAME_log_write`");
             return Err(unexpected(found, of_log).at(path, 1));
         }
     }
-    match names.get(columns.len()) {
-        None => Ok(columns),
-        Some(name) => Err(RecordingFault::number(name, "the end of the header").at(path, 1)),
-    }
+    Ok(())
 }

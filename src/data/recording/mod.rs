@@ -49,7 +49,7 @@ mod write;
 
 pub use self::write::{Notation, WriteOptions, write, write_as, write_mcap, write_to};
 pub use clock::Mended;
-pub use controller_log::{ControllerLog, LogColumn};
+pub use controller_log::ControllerLog;
 pub use error::{RecordingError, RecordingFault};
 pub use files::{
     Accelerations, ConditionOptions, ImplausibleSamples, RecordingFile, RecordingSet, SmoothedRows,

@@ -20,7 +20,7 @@ use crate::files::EmittedFile;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Accepts, SETTINGS, Setting};
 use crate::mpc::problem::StageRows;
-use crate::recording::LogColumn;
+use crate::recording::ControllerLog;
 use crate::solver::ROW_NUMBERS;
 use source::{Numbers, Source};
 
@@ -143,9 +143,7 @@ impl<'a> Facts<'a> {
             n_phases: plant.phases().len(),
             has_given_state: (plant.phases().iter()).all(|phase| phase.given_state.is_some()),
             rows,
-            log_columns: (LogColumn::all(entries.latent_dim).into_iter())
-                .map(LogColumn::name)
-                .collect(),
+            log_columns: ControllerLog::column_names(entries.latent_dim),
         }
     }
 }
