@@ -1295,20 +1295,21 @@ static inline MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self
     self->has_good = false;
     self->is_doubted = false;
     self->is_aloft = false;
-    self->contacts = 0;
-    self->poor = 0;
+    self->is_contradicted = false;
+    self->poor_s = 0.0;
     for (int i = 0; i < 3; ++i) {
         self->unexplained[i] = 0;
     }
 }
 
-/* Counts steps without a good plan; what is wrong. */
+/* Adds up steps without a good plan, passed_s after the last one; what is wrong. */
 static inline MAYBE_UNUSED online_fault online_supervisor_judge(online_supervisor *restrict self,
-        const online_bounds *bounds, bool is_poor)
+        const online_bounds *bounds, bool is_poor, double passed_s)
 {
-    self->poor = is_poor ? self->poor + 1 : 0;
-    const bool is_counted = bounds->poor_steps > 0 && self->fault == ONLINE_NONE;
-    if (is_counted && self->poor >= bounds->poor_steps) {
+    self->poor_s = is_poor ? self->poor_s + passed_s : 0.0;
+    const double most = (double)bounds->poor_steps;
+    const bool is_counted = most > 0.0 && self->fault == ONLINE_NONE;
+    if (is_counted && self->poor_s / self->step_s > most - 0.5) {
         self->fault = ONLINE_POOR_STEPS;
     }
     return self->fault;
@@ -1492,8 +1493,13 @@ static inline MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor 
     if (is_aloft && passed_s > ONLINE_FALL_S && !falls) {
         is_wrong = true;
     }
-    self->contacts = is_wrong ? self->contacts + 1 : 0;
-    return bounds->contact_mismatch_steps > 0 && self->contacts >= bounds->contact_mismatch_steps;
+    if (is_wrong && !self->is_contradicted) {
+        self->contradicted_s = time_s;
+    }
+    self->is_contradicted = is_wrong;
+    const double steps = 1.0 + (time_s - self->contradicted_s) / self->step_s;
+    const double most = (double)bounds->contact_mismatch_steps;
+    return is_wrong && most > 0.0 && steps > most - 0.5;
 }
 
 /* Takes a finite measurement of state and velocity, 18 each, with the reference's state and the heights of the feet,

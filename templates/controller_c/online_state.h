@@ -76,8 +76,11 @@ typedef struct {
     bool is_aloft;
     double aloft_s;
     real aloft_m_s;
-    /* Measurements in a row whose contacts cannot be; steps in a row without a good plan. */
-    int contacts;
-    int poor;
+    /* Since when contacts cannot be, s. */
+    bool is_contradicted;
+    double contradicted_s;
+    /* Time without a good plan, s, and that of a step. */
+    double poor_s;
+    double step_s;
 } online_supervisor;
 

@@ -92,9 +92,10 @@ impl Status {
         (Self::Solved.code()..Self::Inaccurate.code()).contains(&self.code())
     }
 
-    /// Whether the step fell short of what the reference allows: nothing was planned, or for unknown contacts.
+    /// Whether nothing was planned, or for unknown contacts. Jumps of measurements have a patience of their own.
     fn is_poor(self) -> bool {
-        !self.has_plan() || self == Self::ContactUnknown
+        let is_poor = !self.has_plan() || self == Self::ContactUnknown;
+        is_poor && self != Self::MeasurementJump && self != Self::Ended
     }
 
     /// The status of a fault.
@@ -328,9 +329,10 @@ impl Controller {
     }
 
     /// Counts poor steps; the status that stays.
-    pub(super) fn judged(&mut self, status: Status) -> Status {
-        let is_poor = self.reference.is_some() && status.is_poor();
-        let fault = self.supervisor.judge(&self.settings.bounds, is_poor);
+    pub(super) fn judged(&mut self, status: Status, time_s: f64) -> Status {
+        let (settings, is_poor) = (&self.settings, self.reference.is_some() && status.is_poor());
+        let passed_s = self.memory.since_command(time_s, settings.step_s);
+        let fault = self.supervisor.judge(&settings.bounds, is_poor, passed_s);
         Status::of(fault).unwrap_or(status)
     }
 

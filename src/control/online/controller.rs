@@ -96,7 +96,7 @@ impl Controller {
             last_input: vec![0.0; d],
             stance: None,
             effectiveness: Effectiveness::full(d),
-            supervisor: Supervisor::default(),
+            supervisor: Supervisor::of_step(settings.step_s),
             reference: None,
             near_rows: rows.clone(),
             rows,
@@ -283,7 +283,7 @@ impl Controller {
             Ok(()) => self.plan_step(&measurement, command),
             Err(status) => status,
         };
-        let status = self.judged(status);
+        let status = self.judged(status, measurement.time_s);
         command.status = status;
         if status == Status::Ended || self.supervisor.fault != Fault::None {
             self.damp(measurement.time_s, measurement.x, command);

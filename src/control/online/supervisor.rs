@@ -86,12 +86,23 @@ pub(super) struct Supervisor {
     is_aloft: bool,
     aloft_s: f64,
     aloft_m_s: Real,
-    /// Measurements in a row whose contacts cannot be; steps in a row without a good plan.
-    contacts: usize,
-    poor: usize,
+    /// Since when contacts cannot be, s.
+    is_contradicted: bool,
+    contradicted_s: f64,
+    /// Time without a good plan, s, and that of a step.
+    poor_s: f64,
+    pub step_s: f64,
 }
 
 impl Supervisor {
+    /// One without memories.
+    pub(super) fn of_step(step_s: f64) -> Self {
+        Self {
+            step_s,
+            ..Self::default()
+        }
+    }
+
     /// Forgets measurements, but neither a fault nor the floor.
     pub(super) fn forget(&mut self) {
         if self.fault == Fault::None {
@@ -103,8 +114,8 @@ impl Supervisor {
         self.has_good = false;
         self.is_doubted = false;
         self.is_aloft = false;
-        self.contacts = 0;
-        self.poor = 0;
+        self.is_contradicted = false;
+        self.poor_s = 0.0;
         for i in 0..3 {
             self.unexplained[i] = 0.0;
         }
@@ -332,15 +343,21 @@ impl Supervisor {
         if is_aloft && passed_s > FALL_S && !falls {
             is_wrong = true;
         }
-        self.contacts = if is_wrong { self.contacts + 1 } else { 0 };
-        bounds.contact_mismatch_steps > 0 && self.contacts >= bounds.contact_mismatch_steps
+        if is_wrong && !self.is_contradicted {
+            self.contradicted_s = time_s;
+        }
+        self.is_contradicted = is_wrong;
+        let steps = 1.0 + (time_s - self.contradicted_s) / self.step_s;
+        let most = bounds.contact_mismatch_steps as f64;
+        is_wrong && most > 0.0 && steps > most - 0.5
     }
 
-    /// Counts steps without a good plan; what is wrong.
-    pub(super) fn judge(&mut self, bounds: &Bounds, is_poor: bool) -> Fault {
-        self.poor = if is_poor { self.poor + 1 } else { 0 };
-        let is_counted = bounds.poor_steps > 0 && self.fault == Fault::None;
-        if is_counted && self.poor >= bounds.poor_steps {
+    /// Adds up steps without a good plan, `passed_s` after the last one; what is wrong.
+    pub(super) fn judge(&mut self, bounds: &Bounds, is_poor: bool, passed_s: f64) -> Fault {
+        self.poor_s = if is_poor { self.poor_s + passed_s } else { 0.0 };
+        let most = bounds.poor_steps as f64;
+        let is_counted = most > 0.0 && self.fault == Fault::None;
+        if is_counted && self.poor_s / self.step_s > most - 0.5 {
             self.fault = Fault::PoorSteps;
         }
         self.fault
