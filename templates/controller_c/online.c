@@ -39,9 +39,6 @@
 /* Largest weight of a step, in first steps. */
 #define ONLINE_LARGEST_WEIGHT (real)2.0
 
-/* Share of the distances from the reference that a measurement may be off what the last one predicts. */
-#define ONLINE_LEAP_SHARE (real)0.5
-
 /* Smallest and largest estimate. */
 #define ONLINE_LEAST (real)0.7
 
@@ -52,6 +49,9 @@
 
 /* Error of pitch beyond which legs turn no further, rad. */
 #define ONLINE_MOST_TURN_RAD (real)0.3
+
+/* Share of the distances from the reference that the first measurement may be off, and others off what the last predicts. */
+#define ONLINE_NEAR (real)0.5
 
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
@@ -1404,9 +1404,9 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
         const real *lower, const real *upper, const real *speed)
 {
     if (bounds->tilt_rad < ONLINE_HALF_TURN) {
-        const real off = online_common_height(x + 15, nominal + 15);
+        const real along = online_common_height(x + 15, nominal + 15);
         const real upright = COS(x[16]) * COS(x[15]);
-        if (off < COS(bounds->tilt_rad) || upright < -ONLINE_UPSIDE_DOWN) {
+        if (along < COS(bounds->tilt_rad) || upright < -ONLINE_UPSIDE_DOWN) {
             return ONLINE_TILT;
         }
     }
@@ -1422,11 +1422,16 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
         joints = online_greater(solver_magnitude(x[i] - nominal[i]), joints);
     }
     real by_reference[3] = {nominal[12], nominal[13], nominal[14]};
-    if (online_distance(x + 12, by_reference) > bounds->distance_m) {
+    const real off = online_distance(x + 12, by_reference);
+    if (off > bounds->distance_m) {
         return ONLINE_BODY_FAR;
     }
     if (joints > bounds->posture_rad) {
         return ONLINE_JOINTS_FAR;
+    }
+    const bool is_near = off <= ONLINE_NEAR * bounds->distance_m && joints <= ONLINE_NEAR * bounds->posture_rad;
+    if (!self->has_good && !is_near) {
+        return ONLINE_NOT_AT_START;
     }
     const double passed_s = time_s - self->good_s;
     if (!self->has_good || passed_s > bounds->clock_gap_s) {
@@ -1437,12 +1442,12 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
     for (int i = 0; i < 3; ++i) {
         body[i] = self->good_x[12 + i] + passed * self->good_dx[12 + i];
     }
-    if (online_distance(x + 12, body) > ONLINE_LEAP_SHARE * bounds->distance_m) {
+    if (online_distance(x + 12, body) > ONLINE_NEAR * bounds->distance_m) {
         return ONLINE_BODY_LEAP;
     }
     for (int i = 0; i < 12; ++i) {
         const real predicted = self->good_x[i] + passed * self->good_dx[i];
-        if (solver_magnitude(x[i] - predicted) > ONLINE_LEAP_SHARE * bounds->posture_rad) {
+        if (solver_magnitude(x[i] - predicted) > ONLINE_NEAR * bounds->posture_rad) {
             return ONLINE_JOINTS_LEAP;
         }
     }

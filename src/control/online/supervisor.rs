@@ -17,8 +17,8 @@ const PATIENCE_S: f64 = 0.019;
 const HALF_TURN: Real = 3.1;
 /// Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down.
 const UPSIDE_DOWN: Real = 0.5;
-/// Share of the distances from the reference that a measurement may be off what the last one predicts.
-const LEAP_SHARE: Real = 0.5;
+/// Share of the distances from the reference that the first measurement may be off, and others off what the last predicts.
+const NEAR: Real = 0.5;
 /// How far a clock may go back, s: measurements may be exchanged.
 const CLOCK_JITTER_S: f64 = 0.005;
 /// Time over which velocities are compared with positions, s.
@@ -251,9 +251,9 @@ impl Supervisor {
         speed: &[Real],
     ) -> Fault {
         if bounds.tilt_rad < HALF_TURN {
-            let off = common_height(&x[15..], &nominal[15..]);
+            let along = common_height(&x[15..], &nominal[15..]);
             let upright = x[16].cos() * x[15].cos();
-            if off < bounds.tilt_rad.cos() || upright < -UPSIDE_DOWN {
+            if along < bounds.tilt_rad.cos() || upright < -UPSIDE_DOWN {
                 return Fault::Tilt;
             }
         }
@@ -269,11 +269,16 @@ impl Supervisor {
             joints = greater((x[i] - nominal[i]).abs(), joints);
         }
         let by_reference: [Real; 3] = [nominal[12], nominal[13], nominal[14]];
-        if distance(&x[12..], &by_reference) > bounds.distance_m {
+        let off = distance(&x[12..], &by_reference);
+        if off > bounds.distance_m {
             return Fault::BodyFar;
         }
         if joints > bounds.posture_rad {
             return Fault::JointsFar;
+        }
+        let is_near = off <= NEAR * bounds.distance_m && joints <= NEAR * bounds.posture_rad;
+        if !self.has_good && !is_near {
+            return Fault::NotAtStart;
         }
         let passed_s = time_s - self.good_s;
         if !self.has_good || passed_s > bounds.clock_gap_s {
@@ -284,12 +289,12 @@ impl Supervisor {
         for i in 0..3 {
             body[i] = self.good_x[12 + i] + passed * self.good_dx[12 + i];
         }
-        if distance(&x[12..], &body) > LEAP_SHARE * bounds.distance_m {
+        if distance(&x[12..], &body) > NEAR * bounds.distance_m {
             return Fault::BodyLeap;
         }
         for i in 0..12 {
             let predicted = self.good_x[i] + passed * self.good_dx[i];
-            if (x[i] - predicted).abs() > LEAP_SHARE * bounds.posture_rad {
+            if (x[i] - predicted).abs() > NEAR * bounds.posture_rad {
                 return Fault::JointsLeap;
             }
         }
