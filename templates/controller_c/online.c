@@ -59,9 +59,9 @@
 /* How long measurements are refused before they are a fault, s. */
 #define ONLINE_PATIENCE_S 0.019
 
-/* Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the stage's end is
- * ahead of the motion and adds to the thrust; that of the middle takes from it. */
-#define ONLINE_POSTURE_SHARE 0.9
+/* How far ahead of the middle of the time that it is held for a posture is commanded, in stages. A joint PD that holds the
+ * posture of the end of a stage is ahead of the motion and adds to the thrust; that of the middle takes from it. */
+#define ONLINE_POSTURE_LEAD 0.4
 
 /* Weight of the one from before the motion, in first steps. */
 #define ONLINE_PRIOR_WEIGHT (real)10.0
@@ -95,6 +95,9 @@
 
 /* Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down. */
 #define ONLINE_UPSIDE_DOWN (real)0.5
+
+/* Share of a stage from which on a command counts as held for all of it. */
+#define ONLINE_WHOLE_STAGE 0.75
 
 /* What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
  * supervisor says what each is compared with. */
@@ -1189,10 +1192,10 @@ static inline MAYBE_UNUSED bool online_plan_time_is_jump(online_plan_time *self,
     return largest > most;
 }
 
-/* The instant whose posture is commanded for a stage, s. */
-static inline MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, int stage)
+/* The instant whose posture is commanded at a time for held_s, s. */
+static inline MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, double now_s, double held_s)
 {
-    return self->start_s + ((double)stage + ONLINE_POSTURE_SHARE) * self->step_s;
+    return now_s + (ONLINE_POSTURE_LEAD * self->step_s + 0.5 * held_s);
 }
 
 /* Whether a time is in a stage or beyond the last. Up to half a stage before the first, as where a clock jitters, it
@@ -1210,6 +1213,12 @@ static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self,
     const double passed = online_plan_time_passed(self, time_s) + 1e-6;
     return !online_plan_time_reaches(self, time_s)
             || passed >= (double)otherwise ? otherwise : passed > 0.0 ? (int)passed : 0;
+}
+
+/* Beginning of a stage, s. */
+static inline MAYBE_UNUSED double online_plan_time_stage_s(online_plan_time *self, int stage)
+{
+    return self->start_s + (double)stage * self->step_s;
 }
 
 static inline MAYBE_UNUSED online_share online_share_unknown(void)
@@ -1652,6 +1661,23 @@ static inline MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *
     }
     for (int i = 0; i < d; ++i) {
         mean[i] /= (real)duration_s;
+    }
+}
+
+/* Moves an input of the stage from a time on to the part of it for which a command is held, as the trajectory's own
+ * input moves. Does nothing for commands that are held for whole stages. */
+static inline MAYBE_UNUSED void online_trajectory_move_input(online_trajectory *self, double stage_s, double step_s,
+        double now_s, double held_s, real *restrict input)
+{
+    if (held_s > ONLINE_WHOLE_STAGE * step_s) {
+        return;
+    }
+    real held[D] = {0};
+    real whole[D] = {0};
+    online_trajectory_mean_input(self, now_s, held_s, held);
+    online_trajectory_mean_input(self, stage_s, step_s, whole);
+    for (int i = 0; i < online_trajectory_latent_dim(self); ++i) {
+        input[i] += held[i] - whole[i];
     }
 }
 

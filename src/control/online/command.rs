@@ -266,7 +266,7 @@ impl Memory {
     }
 
     /// Time since the last command, at most one stage, and one stage where it is not known or the clock stands still.
-    fn since_command(&self, time_s: f64, step_s: f64) -> f64 {
+    pub(super) fn since_command(&self, time_s: f64, step_s: f64) -> f64 {
         let passed_s = time_s - self.command_s;
         let is_known = self.has_command && passed_s > 0.0 && passed_s <= step_s;
         if is_known { passed_s } else { step_s }
@@ -302,7 +302,7 @@ impl Controller {
         let now_s = self.memory.now_s(time_s, step_s);
         let stages = (self.settings.fallback.plan_stages).min(self.settings.horizon);
         let stage = self.plan.time.stage_at(now_s, stages);
-        if stage < stages && self.write_plan(stage, command) {
+        if stage < stages && self.write_plan(stage, now_s, command) {
             command.source = Source::ShiftedPlan;
             return;
         }
