@@ -53,7 +53,7 @@ pub(super) fn read_for(recording: &Path) -> Result<MpcSettings, Error> {
 fn of_plans(robot: &Robot) -> MpcSettings {
     MpcSettings {
         input_weight: 8.0,
-        effectiveness_time_s: Some(1.0),
+        effectiveness: Some(1.0),
         drives: Drives::of(robot),
         ..MpcSettings::default()
     }

@@ -1423,7 +1423,7 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
     for (int i = 0; i < 12; ++i) {
         const real margin = bounds->joint_margin_rad;
         if (x[i] > upper[i] + margin || x[i] < lower[i] - margin) {
-            return ONLINE_JOINT_RANGE;
+            return ONLINE_JOINT_BEYOND;
         }
         if (solver_magnitude(dx[i]) > bounds->joint_velocity * speed[i]) {
             return ONLINE_JOINT_SPEED;

@@ -96,12 +96,12 @@ const FAULTS: &[(&str, Change, &[Status])] = &[
     (
         "thigh and calf exchanged",
         |seen, _, _| seen.x.swap(1, 2),
-        &[Status::JointRange],
+        &[Status::JointBeyond],
     ),
     (
         "signs of joints",
         |seen, _, _| (0..12).for_each(|joint| seen.x[joint] *= -1.0),
-        &[Status::JointRange],
+        &[Status::JointBeyond],
     ),
     (
         "encoder slips",
@@ -145,7 +145,7 @@ const FAULTS: &[(&str, Change, &[Status])] = &[
     (
         "all zero",
         |seen, _, _| (seen.x, seen.dx) = ([0.0; 18], [0.0; 18]),
-        &[Status::JointRange, Status::Frozen],
+        &[Status::JointBeyond, Status::Frozen],
     ),
     (
         "not a number",

@@ -60,7 +60,7 @@ statuses! {
     LiftFailed = 15, "lift_failed", "lift failed: no torques for the latent input; fallback";
     Ended = 16, "ended", "ended: the reference is over, as settings say torques fade";
     Tilt = 20, "tilt", "tilt: roll or pitch far from the reference's, or near upside down; damping until reset";
-    JointRange = 21, "joint_range", "joint range: a joint outside its limits; damping until reset";
+    JointBeyond = 21, "joint_beyond", "joint beyond: a joint beyond its limits; damping until reset";
     JointSpeed = 22, "joint_speed", "joint speed: a joint faster than it can be; damping until reset";
     BodyFar = 23, "body_far", "body far: the body is far from the reference; damping until reset";
     JointsFar = 24, "joints_far", "joints far: a joint is far from the reference; damping until reset";

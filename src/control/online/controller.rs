@@ -290,7 +290,7 @@ impl Controller {
         } else if !status.has_plan() {
             self.fall_back(measurement.time_s, command);
         }
-        if self.settings.effectiveness_time_s.is_some() {
+        if self.settings.effectiveness.is_some() {
             let (held, drives) = (
                 [command.joint_position_rad, command.joint_velocity_rad_s],
                 &self.settings.drives,

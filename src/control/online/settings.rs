@@ -465,7 +465,7 @@ settings! {
             in_c "largest change of a torque of LIFT_TRANSPOSE, N m/s; 0 leaves it free, as it must if UPPER_TORQUE_RATES is 0",
             in_ros "largest change of a torque of the plain lift, N m/s, where the controller is compiled with \
                     `UPPER_TORQUE_RATES=1`; 0 leaves it free";
-        effectiveness_time_s: Option<f64> = None => effectiveness_time_s: Real, Accepts::Optional,
+        effectiveness: Option<f64> = None => effectiveness_time_s: Real, Accepts::Optional,
             "time constant of the estimate of how much of the input arrives, s; 0 for none",
             in_ros "time constant of the estimate of the share of the input that arrives; 0 for none";
         drives: Drives = Drives::GO1 => drive_stiffness_nm_rad: Real, Accepts::NotNegative,

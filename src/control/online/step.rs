@@ -73,7 +73,7 @@ impl Controller {
         if self.memory.refuses(is_jump, fallback.jump_patience) {
             return Err(Status::MeasurementJump);
         }
-        if let Some(time_constant_s) = self.settings.effectiveness_time_s {
+        if let Some(time_constant_s) = self.settings.effectiveness {
             let parts = (&self.plant, plan);
             let settings = (time_constant_s, &self.settings.drives);
             (self.effectiveness).update(parts, settings, measurement, measured, deviation);
@@ -146,7 +146,7 @@ impl Controller {
         reference.state_at(time_s, &mut self.posture);
         let (z, dz) = self.posture.split_at(self.plant.latent_dim());
         command.u_lat.copy_from_slice(plan.input(stage));
-        if reference.input.is_some() && self.settings.torque_rate_nm_s.is_none() {
+        if reference.input.is_some() && self.near_rows.link.is_empty() {
             let stage_s = plan.time.stage_s(stage);
             reference.move_input(stage_s, step_s, now_s, held_s, &mut command.u_lat);
         }

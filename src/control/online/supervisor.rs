@@ -37,7 +37,7 @@ pub(super) enum Fault {
     #[default]
     None,
     Tilt,
-    JointRange,
+    JointBeyond,
     JointSpeed,
     BodyFar,
     JointsFar,
@@ -261,7 +261,7 @@ impl Supervisor {
         for i in 0..12 {
             let margin = bounds.joint_margin_rad;
             if x[i] > upper[i] + margin || x[i] < lower[i] - margin {
-                return Fault::JointRange;
+                return Fault::JointBeyond;
             }
             if dx[i].abs() > bounds.joint_velocity * speed[i] {
                 return Fault::JointSpeed;
