@@ -31,6 +31,7 @@ mod train_settings;
 
 pub use args::compile::UnitsChoice;
 pub use import::{Compared, import_compared};
+pub use mpc::JudgedRuns;
 
 use std::borrow::Cow;
 use std::ffi::OsString;

@@ -203,6 +203,17 @@ pub const SOLVERS: [(&str, &str, Solver); 2] = [
     ),
 ];
 
+/// Words of a setting of the controller, in the order of their numbers; none for a setting that is a number.
+pub fn words_of_setting(name: &str) -> Vec<&'static str> {
+    match name {
+        "lift" => LIFTS.map(|(word, ..)| word).to_vec(),
+        "solver" => SOLVERS.map(|(word, ..)| word).to_vec(),
+        "linearisation" => vec!["reference", "last_plan"],
+        "after_end" => vec!["hold", "damp", "stop"],
+        _ => Vec::new(),
+    }
+}
+
 /// Why a controller could not be built or given a reference; commands carry a [`Status`](super::Status).
 #[derive(Debug, Error)]
 #[non_exhaustive]
