@@ -2,7 +2,7 @@
 
 use super::number::exact_sum;
 use super::power::half_integer;
-use crate::{Exponent, ExprId, ExprPool, Node, Number};
+use super::*;
 
 /// Bound on passes over operands that become flat only after collecting: each removes a level, two or three suffice.
 const MAX_PASSES: usize = 64;

@@ -1,8 +1,6 @@
 //! The elementary functions, each a row of a table.
 
-use std::fmt;
-
-use crate::{ExprId, ExprPool, Interval, Number};
+use super::*;
 
 /// The elementary functions. Arguments are real, in radians where they are angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -2,10 +2,8 @@
 //! Sums, products, quotients and square roots err outward by a unit in the last place at most; elementary functions by
 //! a few, more than the error of any current mathematical library.
 
-use std::fmt;
-
 use super::number::power;
-use crate::Function;
+use super::*;
 
 /// Arguments beyond this are not reduced: sines of them are only known to lie in `[-1, 1]`.
 const LARGEST_ANGLE: f64 = 1e9;

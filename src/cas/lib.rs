@@ -78,6 +78,14 @@ pub use shorten::search::{Shortened, Shortener};
 pub use values::integer_power;
 
 // Names that most files use.
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::fmt;
+use std::sync::Arc;
+
+use defined::Guards;
+use germ::{Germs, LAST_ORDER, Stop};
 use node::{IdMap, IdSet};
+use num_integer::{Integer, Roots};
 use order::Exponent;
 use pool::Sign;

@@ -1,9 +1,6 @@
 //! What an expression is made of, and maps of expressions.
 
-use std::collections::{HashMap, HashSet};
-use std::sync::Arc;
-
-use crate::{Function, Number};
+use super::*;
 
 /// A canonical expression of one [`ExprPool`](super::ExprPool): structurally equal exactly if the ids are equal.
 /// Children have smaller ids than parents; sort by [`ExprPool::compare`](super::ExprPool::compare), not by ids.

@@ -5,10 +5,7 @@
 //! integer powers as multiplication chains), so that results are the same on every machine. An operation whose result
 //! would be infinite, undefined or denormal is refused ([`None`]) and stays symbolic.
 
-use std::cmp::Ordering;
-use std::fmt;
-
-use num_integer::{Integer, Roots};
+use super::*;
 
 /// Largest magnitude below which every integer is a float: `2^53`.
 const EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;

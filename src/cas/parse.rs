@@ -11,8 +11,7 @@
 //! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. Each rule is a function; nesting is limited.
 //! Chains of sums and products are handed over whole, so time is near linear in the length of the text.
 
-use super::defined::{Guards, Reading};
-use crate::{Exponent, ExprId, ExprPool, Function, Number};
+use super::*;
 
 /// Longest text, in bytes.
 const MAX_LENGTH: usize = 65_536;

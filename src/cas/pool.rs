@@ -1,13 +1,10 @@
 //! The pool that owns all expressions: storage, symbols and traversal.
 
-use std::collections::{BTreeSet, HashMap};
-use std::sync::Arc;
-
 use super::factors::Identity;
 use super::node::BuildIdHasher;
 use super::order::SymbolKey;
 use super::slope::Slope;
-use crate::{Coefficient, ExprId, Function, IdSet, Node, Number, SymbolId};
+use super::*;
 
 /// Owner of hash-consed, canonical expressions, made only by constructors ([`sum`](ExprPool::sum),
 /// [`product`](ExprPool::product), [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and what is built on them) with

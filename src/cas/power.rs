@@ -1,9 +1,7 @@
 //! Canonical constructors of powers and functions.
 
-use num_integer::Integer;
-
 use super::function::Parity;
-use crate::{Exponent, ExprId, ExprPool, Function, Node, Number, Sign};
+use super::*;
 
 /// Trial divisors for square factors under a root: `sqrt(8) = 2*sqrt(2)`.
 const SQUARE_FACTOR_LIMIT: i64 = 1_000;

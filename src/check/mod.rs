@@ -36,10 +36,13 @@ pub use side::{CheckError, Side};
 
 use std::path::Path;
 
-use crate::files::Place;
-use crate::import::{ImportError, SymbolNames};
-use crate::model::LatentVariable;
-use crate::symbolic::{Coefficient, ExprId, ExprPool, Number};
+use crate::files::{Place, size};
+use crate::import::{Format, ImportError, SymbolNames, read_equations};
+use crate::model::{LatentVariable, MAX_LATENT_DIM, ReducedModel};
+use crate::symbolic::{
+    CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPool, Interval, Node, Number,
+    ParseError, Reading, SymbolId,
+};
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {

@@ -1,11 +1,7 @@
 //! `romc compile`: a model file to equations and code.
 
-use super::simplification::{self, Outcome, exact_words};
+use super::simplification::Outcome;
 use super::*;
-use crate::deploy::{self, EmitOptions, PlannedJump, Target};
-use crate::equations::Equations;
-use crate::files::earlier_files;
-use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable};
 
 pub(super) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     let (inputs, simplification) = (inputs(arguments)?, &arguments.simplification);

@@ -1,9 +1,6 @@
 //! `romc convert`: recordings and logs of other programs into one format.
 
-use nalgebra::DMatrix;
-
 use super::*;
-use crate::recording::{RecordingFault, WriteOptions, write_as, write_mcap};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
     Inputs::reading(&arguments.reading)

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::identify::{Identification, identify};
-use crate::robot::{LegMoments, Robot};
 
 pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
     Inputs::reading(&arguments.reading)

@@ -1,13 +1,7 @@
 //! `romc import`: a model trained elsewhere in, a model file out.
 
 use super::*;
-use crate::evaluate::RoundTrip;
-use crate::import::{
-    Chosen, Format as FileKind, ImportError, ImportOptions, ImportReport, Imported, SymbolNames,
-    import, read_terms,
-};
-use crate::model::{LibraryChoice, LibraryOrder};
-use crate::robot_file::read_actuators;
+use crate::import::import;
 use crate::sim::with_input_statistics;
 
 pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {

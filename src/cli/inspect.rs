@@ -1,19 +1,10 @@
 //! `romc inspect`: what a recording or a model holds, and what is implausible in it.
 
-use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::simplification::exact_words;
 use super::*;
-use crate::equations::Equations;
-use crate::evaluate::Invariance;
-use crate::model::StateMap;
-use crate::recording::check::{Finding, check};
-use crate::recording::guess;
+use crate::recording::check::check;
 use crate::recording::mismatch::{Figures, notes as mismatches};
-use crate::recording::{PhaseRule, Reading, ReadingNotes};
-use crate::report::{invariance_table, range};
-use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot, WrenchFrame};
 
 /// Endings of models; those of other tools are refused with the lines that convert them.
 const OF_MODELS: &str = "json safetensors pt pth ckpt keras onnx tflite msgpack";

@@ -3,7 +3,6 @@
 use clap::CommandFactory as _;
 
 use super::*;
-use crate::files::write_files;
 
 pub(super) fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
     let mut root = Arguments::command();

@@ -1,16 +1,7 @@
 //! `romc mpc`: the latent-space controller along recordings.
 
-use super::simplification::RESTART_S;
 use super::*;
-use crate::evaluate::{
-    Assessment, ControlMetrics, ReferenceInput, Verdict, along_recording, control_metrics,
-    usual_settings, verdict,
-};
-use crate::mpc::{Lift, MpcSettings, controller};
-use crate::report::{
-    NamedRun, control_figures, control_table, failed_runs, failures, run_table, verdict_lines,
-};
-use crate::robot::{JOINT_DIM, Robot};
+use crate::evaluate::Verdict;
 
 pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let inputs = Inputs::reading(&arguments.reading)

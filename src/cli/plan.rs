@@ -3,8 +3,6 @@
 use super::convert::write_recording;
 use super::*;
 use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict};
-use crate::report::{plan_figures, plan_json, reach_figure};
-use crate::robot::Robot;
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     let inputs = Inputs::reading(&arguments.reading)

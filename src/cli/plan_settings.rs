@@ -1,11 +1,7 @@
 //! Settings of the controller for a plan: a file next to it, which `romc plan` writes and other commands read.
 
-use std::collections::BTreeMap;
-
 use super::*;
 use crate::mpc::interface::{SETTINGS, Settings};
-use crate::mpc::{ControlError, Effectiveness, MpcSettings};
-use crate::robot::{Leg, Robot};
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
 pub(super) fn path_for(plan: &Path) -> PathBuf {

@@ -1,14 +1,7 @@
 //! Recordings on their way into a training: divided into sets, checked, conditioned.
 
-use super::args::{ReadingArguments, TrainArguments, TrainSettings};
 use super::inspect::finding_json;
 use super::*;
-use crate::recording::as_recorded;
-use crate::recording::check::Finding;
-use crate::recording::{
-    ConditionOptions, ImplausibleSamples, Reader, RecordingError, RecordingFile, RecordingSet,
-};
-use crate::robot::Robot;
 
 /// A jump of a divided set: its file, its segment there, and the first row.
 type DividedJump = (PathBuf, usize, usize);

@@ -2,14 +2,6 @@
 
 use super::mpc::{judged, run_with_both_lifts};
 use super::*;
-use crate::evaluate::{Assessment, LAMBDA, verdict};
-use crate::report::{
-    Content, Introduction, PageOptions, all_figures, figure_files, introduction, page,
-    verdict_lines, without_statistics,
-};
-use crate::simplify::Tolerance;
-use crate::study::{Store, Summary};
-use crate::train::sha256;
 
 pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     let inputs = Inputs::reading(&arguments.reading)

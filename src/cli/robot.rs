@@ -1,8 +1,6 @@
 //! `--robot` of every command, and `romc robot`: what a robot's file says.
 
 use super::*;
-use crate::robot::{JOINT_NAMES, Leg, Robot};
-use crate::robot_file::{self, RobotEntry, RobotOptions};
 
 /// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
 pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {

@@ -1,24 +1,11 @@
 //! What every command reads, where it may write, its words and progress.
 
-use std::borrow::Cow;
-use std::collections::BTreeMap;
-use std::fmt::Display;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::de::DeserializeOwned;
-use serde_json::Value;
 
 use super::*;
-use crate::Error;
-use crate::files::size::read_toml;
-use crate::files::{Emitted, Overwrite, is_invisible, write_files_since, write_whole};
-use crate::model::ReducedModel;
-use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
-use crate::report::{Figure, figure_files};
-use crate::robot::Robot;
-use crate::train::sha256;
 
 pub(crate) use crate::files::{shell_path as quoted, shell_word as quoted_text};
 

@@ -1,16 +1,7 @@
 //! Simplification for the commands that offer it: the domain from files, the effect on rollouts.
 
 use super::*;
-use crate::equations::Equations;
-use crate::evaluate::Assessment;
-use crate::report::body_rms;
 use crate::sim::LatentSegment;
-use crate::simplify::{
-    Certificate, Domain, MARGIN, RolloutBasis, RolloutEffect, Samples, SimplifyError, Tolerance,
-    bound_words, certificate_json, change_table, equation_table, lost_words, markdown, printed,
-    rollout_table, rollouts_json, simplify,
-};
-use crate::typeset::Rounding;
 
 pub(super) const RESTART_S: f64 = 0.1;
 

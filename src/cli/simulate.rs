@@ -1,13 +1,6 @@
 //! `romc simulate`: rollouts over recordings, in full and restarted.
 
-use nalgebra::DVector;
-
 use super::*;
-use crate::evaluate::{Assessment, Horizon, verdict_by_default};
-use crate::report::{
-    assessment_json, baseline_table, coordinate_table, dynamics_table, horizon_json, horizon_table,
-    phase_table, verdict_lines,
-};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
     Inputs::reading(&arguments.reading)

@@ -1,11 +1,7 @@
 //! `romc study`: trainings over latent dimensions and seeds, joined and summarised.
 
-use super::prepared_recordings::RecordedSets;
 use super::*;
-use crate::files::check_folder;
-use crate::report::{figure_files, study_figures};
-use crate::study::{self, CellId, FOLDS, Outcome, Plan, Shard, Spread, Store, Summary, cell_table};
-use crate::train::{Method, Origin};
+use crate::study::{self, Outcome, Plan};
 
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 

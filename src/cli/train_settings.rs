@@ -1,18 +1,9 @@
 //! The settings of `romc train`: from flags and a file to options, and back to flags for the provenance.
 
-use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
-use super::prepared_recordings::RecordedSets;
 use super::robot::chosen;
 use super::*;
 use crate::identify::{IdentifyError, identify};
 use crate::limits::table::{LAYER_WIDTH, of_training};
-use crate::model::{Activation, LibraryChoice, StandardLibrary};
-use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
-use crate::robot::Robot;
-use crate::robot_file::read_actuators;
-use crate::train::{
-    Coordinates, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
-};
 
 /// The word for actuators that stands for no file.
 const NONE: &str = "none";

@@ -11,8 +11,6 @@
 
 use super::library::tokens;
 use super::*;
-use crate::model::MAX_LATENT_DIM;
-use crate::symbolic::ParseErrorKind;
 
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 

@@ -3,8 +3,6 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::Serializer;
-
 use super::measure::Measured;
 use super::*;
 

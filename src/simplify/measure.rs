@@ -1,14 +1,10 @@
 //! Differences of equations, also as printed with rounded coefficients: bounds over a box, size at samples, and the
 //! effect on rollouts over recordings.
 
-use serde_json::Map;
-
 use super::*;
 use crate::evaluate::{CoordinateSums, EvaluateError};
 use crate::lower::CompiledModel;
 use crate::recording::Segment;
-use crate::sim::{Restart, Rollout, Window, rollout};
-use crate::typeset::{Decimal, Rounding};
 
 /// How large an error is at recorded samples (scaled units per second squared).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -26,15 +26,15 @@ pub(crate) use tables::{
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use certificate::{Change, ChangeKind, PhaseCertificate};
 use nalgebra::DMatrix;
-use serde::Serialize;
-use serde_json::{Value, json};
+use ranges::{Ranges, Workspace};
+use serde::{Serialize, Serializer};
+use serde_json::{Map, Value, json};
 
-use crate::artifact;
 use crate::equations::{Equations, ExactStep};
 use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
-use crate::sim::LatentSegment;
-use crate::symbolic::{Interval, SymbolId};
-use crate::typeset::rounded;
-use certificate::{Change, ChangeKind, PhaseCertificate};
-use ranges::{Ranges, Workspace};
+use crate::sim::{LatentSegment, Restart, Rollout, Window, rollout};
+use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
+use crate::typeset::{Cell, Decimal, Rounding, Table, rounded, rounded_up, significant};
+use crate::{artifact, lower};

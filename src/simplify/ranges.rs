@@ -2,7 +2,6 @@
 
 use super::equation::Rewrite;
 use super::*;
-use crate::symbolic::{ExprId, ExprPool, Node};
 
 /// Relative error of the algebra's constants, with room to spare: a merged or halved float has an error of 2^-53.
 const CONSTANT_ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;

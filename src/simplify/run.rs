@@ -6,7 +6,7 @@ use super::equation::{Equation, is_same_decimal};
 use super::measure::Differences;
 use super::*;
 use crate::ir::{Program, Statement};
-use crate::lower::{self, Form};
+use crate::lower::Form;
 use crate::robot::{BODY_Z, GRAVITY_M_S2};
 
 /// What the search may use is lowered to this share of itself until the final evaluation confirms the tolerance.

@@ -1,6 +1,5 @@
 //! The trainings of a study, and their run on all cores.
 
-use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use super::summary::Metrics;

@@ -1,8 +1,6 @@
 //! The folder of a study: its plan, and one file a finished training.
 
-use std::fs;
-use std::io::{self, ErrorKind};
-use std::path::Path;
+use std::io::ErrorKind;
 
 use serde::de::DeserializeOwned;
 

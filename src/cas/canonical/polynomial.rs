@@ -1,14 +1,10 @@
 //! Sums of complex rational coefficients, known to a radius, times products of atoms and one exponential.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Add, Mul, Sub};
 
-use num_bigint::BigInt;
-use num_traits::{One, Signed, ToPrimitive, Zero};
+use super::*;
 
 pub(super) use num_rational::BigRational as Rational;
-
-use crate::{ExprId, Function, Number, SymbolId};
 
 const MAX_TERMS: usize = 2_000;
 

@@ -1,14 +1,9 @@
 //! The replacements of a sum, group by group.
 
-use std::collections::HashMap;
-
-use super::agreement::Agreement;
 use super::forms::{NestedSums, collected};
 use super::groups::Link;
-use super::{Scaled, Summands};
+use super::*;
 use crate::cost::Costs;
-use crate::simplify::MAX_WORK;
-use crate::{Exponent, ExprId, ExprPool, Function, IdMap, IdSet, Node, Number, SymbolId};
 
 const MAX_ROUNDS: usize = 4;
 

@@ -1,7 +1,6 @@
 //! What a user chooses of generated code: its numbers, sines and units; and why there is none.
 
 use super::*;
-use crate::model::Scaling;
 
 /// Floating-point numbers of generated code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]

@@ -9,18 +9,9 @@
 //! `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike. Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z,
 //! sigma dZ, upsilon U)`, numeric factors taken out of every term and into its coefficient.
 
-use std::borrow::Cow;
-use std::fmt;
 use std::ops::{Div, Mul};
 
-use nalgebra::{DMatrix, DVector};
-
-use super::system::{Equations, PhaseEquations, Summand};
-use crate::model::{
-    AffineMap, CandidateTerm, CoordinateNames, LatentVariable, LatentWords, ModelError,
-    ReducedModel, ScaleFactors, Scaling,
-};
-use crate::symbolic::{ExprId, ExprPool, Node, SymbolId};
+use super::*;
 
 const RULES: f64 = 0.5; // share of a row's sum of squares from which its unit rules it
 

@@ -1,18 +1,11 @@
 //! The accelerations of all phases as sums of coefficients times expressions, and their shortest form, equal as real
 //! functions: the algebra finds it ([`Shortener`]); a new term stands where the first that it replaces stood.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
-use std::fmt;
 
-use nalgebra::DMatrix;
 use serde::{Serialize, Serializer};
 
-use super::physical::LatentUnits;
-use crate::model::{
-    CandidateTerm, FeetRule, LatentVariable, Library, MAX_TERM_LEN, ModelError, Phase, ReducedModel,
-};
-use crate::symbolic::{ExprId, ExprPool, Shortened, Shortener, SymbolId};
+use super::*;
 
 /// One summand of an equation: `coefficient * terms[term]`.
 #[derive(Clone, Copy, Debug, PartialEq)]

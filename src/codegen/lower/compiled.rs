@@ -1,12 +1,7 @@
 //! A model's programs, ready to run: what integration and control evaluate.
 
-use nalgebra::DMatrix;
-
-use super::{Form, JacobianPattern, LowerError};
-use crate::equations::Equations;
-use crate::ir::Interpreter;
+use super::{Form, LowerError, *};
 use crate::lower;
-use crate::model::ReducedModel;
 
 /// The accelerations, Jacobians and Runge-Kutta steps of all phases of a model, run by the interpreter with the
 /// arithmetic of the generated code. Evaluation allocates nothing; clone it for another thread. All vectors have

@@ -1,15 +1,9 @@
 //! The accelerations `ddz = Xi^T Theta(z, dz, u_lat)` of a phase, their Jacobian, and a Runge-Kutta step.
 
-use super::combination::Combination;
 use super::dense::{DenseJacobian, Form, distinct, matrix_vector};
-use super::expression::ExpressionLowering;
-use super::nested::{Demand, Nested};
-use super::number::{Number, Sheet, ids, numbers};
+use super::number::Number;
 use super::polynomial::Polynomials;
-use crate::equations::{Equations, PhaseEquations};
-use crate::ir::{IrError, Program, ProgramBuilder, ValueId};
-use crate::model::{LatentVariable, ModelError};
-use crate::symbolic::{ExprId, ExprPool, SymbolId};
+use super::*;
 
 /// Why a program could not be made from a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -5,15 +5,9 @@
 //! through a table, [`crate::ir::Statement::Accumulate`]; activations and slopes are without branches. Velocities run
 //! forwards through the layers, lifted inputs backwards; the projection solves with the rows of the Jacobian.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::combination::{Term, linear_combination};
 use super::dynamics::LowerError;
-use super::number::{Number, Sheet, ids, numbers};
-use crate::ir::{Program, ProgramBuilder, Table, Unary};
-use crate::model::{
-    Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, ReducedModel, StateMap, TAIL,
-};
+use super::number::Number;
+use super::*;
 
 /// A map between robot coordinates (SI units) and latent ones; velocities take no bias.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,9 +2,8 @@
 //! links. Forces and moments as of [`InputRule::wrench`](crate::robot::InputRule::wrench), in closed form.
 
 use super::dynamics::LowerError;
-use super::number::{Number, Sheet};
-use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
-use crate::model::ReducedModel;
+use super::number::Number;
+use super::*;
 use crate::robot::{
     BODY_DIM, DRY_SPEED_RAD_S, FOOT_DIM, GRAVITY_M_S2, InputRule, JOINT_DIM, LEG_JOINT_DIM, Leg,
     LegShape, MovingLeg, Posture, STATE_DIM, TrunkMotion, WrenchFrame,

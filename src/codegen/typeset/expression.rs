@@ -1,8 +1,6 @@
 //! From canonical expressions to the typeset tree, with factors and terms in the order that readers expect.
 
 use super::*;
-use crate::model::MAX_LATENT_DIM;
-use crate::symbolic::{ExprId, ExprPool, Node, Number, SymbolId};
 
 /// Lays out an expression over the variables of a latent model.
 ///

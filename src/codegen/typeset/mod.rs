@@ -30,14 +30,14 @@ pub use tree::{Math, Signed, Symbol};
 use std::fmt;
 
 use askama::Template;
-use nalgebra::DMatrix;
-
-use crate::equations::{Equations, Unit};
-use crate::files::{EmittedFile, is_invisible};
-use crate::model::LatentVariable;
-use crate::symbolic::Function;
 use decimal::{Rounder, RoundingReport};
 use expression::terms;
 use latex::tex_cases;
+use nalgebra::{DMatrix, DVector};
 use tree::greek_letter;
 use words::{Page, Spelling, code_point, rendered};
+
+use crate::equations::{Equations, Unit};
+use crate::files::{EmittedFile, is_invisible};
+use crate::model::{AffineMap, FeetRule, LatentVariable, MAX_LATENT_DIM};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};

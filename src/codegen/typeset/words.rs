@@ -2,8 +2,6 @@
 
 use super::decimal::{LEAST_DECIMALS, Occurrence, RELATIVE_ERROR};
 use super::*;
-use crate::equations::Equations;
-use crate::model::{FeetRule, LatentVariable};
 use crate::robot::{ContactFlags, Leg};
 
 /// How a sentence spells words from outside and mathematics.

@@ -2,8 +2,6 @@
 //! [`without`], when asked. Numbers that are not finite never get here: reading refuses them.
 
 use super::*;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
 
 const TORQUE_FACTOR: f64 = 1.1; // torque and speed over a joint's limit that are still accepted
 const SPEED_FACTOR: f64 = 1.1;

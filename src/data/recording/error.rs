@@ -5,7 +5,6 @@ use thiserror::Error;
 use super::*;
 use crate::files::magic::OtherFormat;
 use crate::files::{Located, Place};
-use crate::robot::RobotError;
 
 /// A fault and its place: the file, a row (1 is the header) or a cell.
 pub type RecordingError = Located<RecordingFault>;

@@ -3,7 +3,6 @@
 //! join the launch or the landing they border (section IV-C4). Three phases describe an asynchronous jump.
 
 use super::*;
-use crate::robot::FeetRule;
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
 pub const CHATTER_SAMPLES: usize = 5;

@@ -6,7 +6,6 @@
 
 use std::str::FromStr;
 
-use super::segment::Rows;
 use super::*;
 
 /// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).

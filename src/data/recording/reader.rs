@@ -10,9 +10,7 @@ use super::delays::{BODY_RATES, RateFault, faulty_rates, mend_place, replace_rat
 use super::foreign::guess::guess_of;
 use super::foreign::{TextFormat, assemble, is_mcap, read_lines, read_mcap, read_texts};
 use super::lines::Lines;
-use super::segment::{DERIVED_DDX, divided};
 use super::*;
-use crate::robot::{FOOT_DIM, JOINT_NAMES};
 
 /// What becomes of clocks that disagree with the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]

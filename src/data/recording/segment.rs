@@ -2,7 +2,6 @@
 
 use super::preprocess::moving_average;
 use super::*;
-use crate::robot::InputRule;
 
 const ACCELERATION_WINDOW_S: f64 = 0.02; // joint accelerations are averaged over it before motor inertia counts
 

@@ -1,9 +1,7 @@
 use super::aslip::AslipRollout;
 use super::coordinates::LiftSums;
 use super::*;
-use crate::lower::LowerError;
 use crate::recording::mismatch::notes;
-use crate::sim::rollout;
 
 #[derive(Debug, Clone)]
 pub struct SegmentRun<'a> {

@@ -35,15 +35,31 @@ pub(crate) use prediction::{linearise_phases, state_matrix};
 pub use round_trip::RoundTrip;
 pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use coordinates::Mean;
+use nalgebra::{
+    Complex, DMatrix, DVector, Rotation3, SVector, Schur, SymmetricEigen, Vector2, Vector3,
+};
 use serde::Serialize;
 
-use crate::lower::CompiledModel;
-use crate::model::{LibraryOrder, ModelError, ReducedModel};
-use crate::mpc::{Command, Controller, Measurement, MpcError, STEP_SLACK};
-use crate::recording::{Recording, RecordingError, Segment};
-use crate::robot::{BODY_X, BODY_Z, ContactFlags, JOINT_DIM, Leg, Robot, STATE_DIM};
-use crate::sim::{LatentSegment, Restart, Rollout, SimError};
-use coordinates::Mean;
+use crate::lower::{CompiledModel, LowerError};
+use crate::model::{
+    CoordinateOrder, JumpPart, Library, LibraryChoice, LibraryOrder, ModelError, Phase,
+    ReducedModel, StateMap,
+};
+use crate::mpc::{
+    Command, Controller, Lift, Measurement, MpcError, MpcSettings, ReferenceSamples, STEP_SLACK,
+    Solver, StanceState, Status, foot_forces,
+};
+use crate::recording::{
+    CHATTER_SAMPLES, PhaseRule, Recording, RecordingError, Segment, Stance, between,
+};
+use crate::robot::{
+    BODY_DIM, BODY_X, BODY_Z, ContactFlags, GRAVITY_M_S2, InputRule, JOINT_DIM, Leg, Robot,
+    STATE_DIM, WrenchFrame, rotation,
+};
+use crate::sim::{
+    LatentSegment, Restart, Rollout, SimError, integrate_stretches, restart_windows, rollout,
+    rollout_over,
+};
 
 type Result<T, E = EvaluateError> = std::result::Result<T, E>;

@@ -5,14 +5,8 @@ use std::cell::Cell;
 use nalgebra::DVector;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_json::{Map, Number};
 
 use super::*;
-use crate::model::{
-    CoordinateNames, InputStatistics, JumpPrior, Landmarks, Library, LibraryChoice, Phase,
-    ScaleFactors, Scaling, StandardLibrary, StateMap,
-};
 use crate::robot::{Actuators, Robot, WrenchFrame};
 use crate::robot_file::{self, RobotEntry};
 

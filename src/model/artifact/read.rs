@@ -2,14 +2,11 @@
 
 use std::error::Error;
 use std::fs::File;
-use std::io::{self, Read};
-
-use serde::Deserialize;
+use std::io::Read;
 
 use super::manifest::{SCHEMA, SCHEMA_2, SchemaProbe};
 use super::*;
 use crate::files::size::Format;
-use crate::files::{Fault, Located, magic};
 
 pub type ArtifactError = Located<Fault<ModelError>>;
 

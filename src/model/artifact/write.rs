@@ -1,11 +1,8 @@
 //! From a model to a file and its digest. JSON as people like to compare it: one key, or one row of a matrix, per line.
 
-use std::{fs, io};
-
 use sha2::{Digest as _, Sha256};
 
 use super::*;
-use crate::files::{Overwrite, hex, write_whole};
 
 /// The model file as text: equal for equal models, numbers in the shortest form that reads back to the same bits.
 pub fn to_text(model: &ReducedModel) -> String {

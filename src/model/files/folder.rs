@@ -1,7 +1,6 @@
 //! Putting emitted files into a folder, whole or not at all.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::io::{Read as _, Seek as _, Write as _};
 
 use sha2::{Digest as _, Sha256};

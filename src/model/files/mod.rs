@@ -22,6 +22,6 @@ pub use located::{Fault, Located, Place};
 pub use text::{is_invisible, shell_path, shell_word};
 pub use whole::{EmittedFile, Overwrite, write_whole};
 
-use std::fs::{File, OpenOptions};
-use std::io;
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
+use std::{fmt, io};

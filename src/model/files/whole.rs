@@ -2,9 +2,8 @@
 
 use std::collections::hash_map::RandomState;
 use std::ffi::OsString;
-use std::fs::{self, TryLockError};
 use std::hash::{BuildHasher as _, Hasher as _};
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 
 use super::*;
 

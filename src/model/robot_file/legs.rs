@@ -1,18 +1,8 @@
 //! From an entry to a checked robot, and joint losses from a file or from a program's arrays.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use nalgebra::{Rotation3, Unit, Vector3};
-use serde::Deserialize;
-
-use super::identity::{JointEntry, LARGEST_ANGLE_RAD, LegEntry, RobotEntry, namesake};
-use super::read::{RobotFileError, from_toml_text, keep, text_of, word};
-use crate::files::is_invisible;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{
-    Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, LegMoments, Robot,
-};
+use super::*;
 
 const MAX_NAME_LEN: usize = 80;
 const MAX_LINK_M: f64 = 10.0;

@@ -28,3 +28,17 @@ mod urdf;
 pub use identity::{RobotEntry, RobotReading, to_toml};
 pub use legs::{ActuatorsEntry, leg_moments, read_actuators};
 pub use read::{RobotFileError, RobotOptions, by_name, find, from_text, known_names, open};
+
+use std::path::Path;
+
+use identity::{Axis, JointEntry, LARGEST_ANGLE_RAD, LegEntry, identified, namesake};
+use legs::{Part, Places, build};
+use nalgebra::{Rotation3, Unit, Vector3};
+use read::{from_toml_text, keep, text_of, word};
+use serde::{Deserialize, Serialize};
+
+use crate::files::{Fault, Located, Place, is_invisible};
+use crate::robot::{
+    Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, LEG_JOINT_DIM, Leg, LegGeometry,
+    LegMoments, Robot, RobotError,
+};

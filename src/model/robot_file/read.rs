@@ -1,17 +1,12 @@
 //! From a name or a file to a robot; the robots that romc brings, and those that were read.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use serde::de::DeserializeOwned;
 
-use super::identity::{RobotEntry, RobotReading, identified};
-use super::legs::{self, Places};
-use super::urdf;
+use super::*;
 use crate::files::size::{Format, read_text_capped, read_toml};
-use crate::files::{Fault, Located, Place};
-use crate::robot::{Robot, RobotError};
 
 /// A fault of a robot's file and its place; without a file, of a name or an option.
 pub type RobotFileError = Located<Fault>;

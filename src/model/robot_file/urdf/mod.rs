@@ -5,13 +5,10 @@
 mod limbs;
 mod tree;
 
-use nalgebra::{Rotation3, Vector3};
-
-use super::identity::{Axis, JointEntry, LegEntry, RobotEntry, RobotReading, identified};
-use super::legs::{Part, Places};
-use super::read::{RobotFileError, RobotOptions};
 use limbs::{Legs, Limb};
 use tree::{Element, Joint, Tree, document};
+
+use super::*;
 
 const ROUNDING: f64 = 1e-12; // components of axes and positions that are rounding of zero or one
 const ENDLESS_RAD: f64 = 2.0 * std::f64::consts::PI;
