@@ -58,7 +58,6 @@ impl Interval {
         self.lo > self.hi
     }
 
-    /// Whether `value` lies inside.
     pub fn contains(self, value: f64) -> bool {
         self.lo <= value && value <= self.hi
     }

@@ -31,6 +31,7 @@
 //! assert_eq!(pool.evaluate(slope, &|_| 0.0), -0.91);
 //! # Ok::<(), romc::symbolic::ParseError>(())
 //! ```
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
 
 mod build;
 mod canonical;

@@ -26,9 +26,7 @@ enum Repr {
 }
 
 impl Number {
-    /// The exact `0`.
     pub const ZERO: Number = Number::integer(0);
-    /// The exact `1`.
     pub const ONE: Number = Number::integer(1);
     pub(crate) const MINUS_ONE: Number = Number::integer(-1);
     pub(crate) const HALF: Number = Number(Repr::Rational(1, 2));
@@ -90,7 +88,6 @@ impl Number {
         self == Number::ZERO
     }
 
-    /// Whether this is one.
     pub fn is_one(self) -> bool {
         self == Number::ONE
     }
@@ -128,7 +125,6 @@ impl Number {
         self.as_integer().is_some_and(|value| value % 2 == 0)
     }
 
-    /// The magnitude.
     pub fn abs(self) -> Number {
         if self.is_negative() { -self } else { self }
     }

@@ -34,7 +34,6 @@ pub struct ParseError {
 
 /// The fault at a place of a text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum ParseErrorKind {
     #[error("found `{}`, expected {}", .0.escape_debug(), spelling(*.0))]
     Character(char),

@@ -189,18 +189,15 @@ impl ExprPool {
         id
     }
 
-    /// The variable of that name as an expression.
     pub fn symbol(&mut self, name: &str) -> ExprId {
         let id = self.symbol_id(name);
         self.symbol_expr(id)
     }
 
-    /// A variable as an expression.
     pub fn symbol_expr(&self, symbol: SymbolId) -> ExprId {
         self.symbols[symbol.index()].expr
     }
 
-    /// The name of a variable.
     pub fn symbol_name(&self, symbol: SymbolId) -> &str {
         &self.symbols[symbol.index()].key.name
     }
@@ -227,7 +224,6 @@ impl ExprPool {
         self.as_number(expr)?.as_integer()
     }
 
-    /// The variable that `expr` is.
     pub fn as_symbol(&self, expr: ExprId) -> Option<SymbolId> {
         match self.node(expr) {
             Node::Symbol(symbol) => Some(*symbol),

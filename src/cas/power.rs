@@ -7,7 +7,6 @@ use super::*;
 const SQUARE_FACTOR_LIMIT: i64 = 1_000;
 
 impl ExprPool {
-    /// `base ^ exponent` for an integer exponent.
     pub(crate) fn powi(&mut self, base: ExprId, exponent: i32) -> ExprId {
         self.pow_number(base, Number::integer(i64::from(exponent)))
     }

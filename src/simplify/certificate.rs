@@ -119,7 +119,6 @@ pub(crate) struct PhaseCertificate {
 /// numbers. Floating-point rounding, about 1e-16 of the largest summand, comes on top for both models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
-    /// The requested tolerance.
     pub(crate) tolerance: Tolerance,
     /// What exact simplification did before: equal as real functions, without any error.
     pub(crate) exact: Vec<ExactStep>,
@@ -138,7 +137,6 @@ impl Certificate {
         self.equations().map(|(_, equation)| count(equation)).sum()
     }
 
-    /// Number of changes.
     pub fn n_changes(&self) -> usize {
         self.equations().map(|(_, e)| e.changes.len()).sum()
     }
@@ -176,7 +174,6 @@ impl Certificate {
     }
 }
 
-/// The whole certificate.
 pub fn certificate_json(certificate: &Certificate) -> Value {
     json!({
         "tolerance": certificate.tolerance.to_string(),

@@ -8,9 +8,7 @@ use crate::lower::LowerError;
 /// How far a domain reaches beyond the samples unless given, as a share of each variable's range.
 pub const MARGIN: f64 = 0.1;
 
-/// Errors of simplification.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 #[non_exhaustive]
 pub enum SimplifyError {
     #[error("the domain {0}")]

@@ -59,7 +59,6 @@ impl Differences {
 /// How far a printed equation can be from the model's.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PrintedEquation {
-    /// The phase's name.
     pub phase: String,
     /// Index of the latent coordinate.
     pub output: usize,
@@ -119,7 +118,6 @@ pub(crate) struct RolloutErrors {
 pub(crate) struct RolloutEffect {
     /// Names of the robot's body coordinates.
     pub names: Vec<String>,
-    /// Their units.
     pub units: Vec<String>,
     /// Time between restarts, s.
     pub restart_every_s: f64,

@@ -3,6 +3,7 @@
 //! leaves with a [`Certificate`] that lists every change with the interval in which its error lies over the whole box,
 //! and with its error at the recorded samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then
 //! `equation.rs` (the changes made to one equation) and `ranges.rs` (the intervals).
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
 
 mod certificate;
 #[cfg(test)]

@@ -134,7 +134,6 @@ impl CanonicalForm {
         self.terms.values().all(Coefficient::may_be_zero)
     }
 
-    /// The coefficients.
     pub fn coefficients(&self) -> impl Iterator<Item = &Coefficient> {
         self.terms.values()
     }
@@ -305,7 +304,6 @@ impl Coefficient {
         self.re.is_zero() && self.im.is_zero()
     }
 
-    /// The magnitude of the value.
     pub fn magnitude(&self) -> f64 {
         nearest(&self.re).hypot(nearest(&self.im))
     }
@@ -334,7 +332,6 @@ impl Coefficient {
         self.im.is_zero().then_some(&self.re)
     }
 
-    /// Whether the value is an integer.
     pub fn is_integer(&self) -> bool {
         self.as_real().is_some_and(Rational::is_integer)
     }

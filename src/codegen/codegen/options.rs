@@ -80,7 +80,6 @@ fn beyond_single(program: &Program) -> Option<f64> {
         .or(inner)
 }
 
-/// Where sines and cosines come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum SineCosine {
     // Within about one unit of the last place, without branches, so that loops over it vectorise.
@@ -133,10 +132,8 @@ pub enum CodegenError {
     BeyondSingle {
         /// The function, without the model's name.
         function: String,
-        /// The constant.
         value: f64,
     },
-    /// A template failed to render.
     #[error("a template failed")]
     Template(#[from] askama::Error),
 }

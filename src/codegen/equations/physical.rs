@@ -17,7 +17,6 @@ const RULES: f64 = 0.5; // share of a row's sum of squares from which its unit r
 
 /// Why equations cannot be in physical units.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum PhysicalError {
     #[error(
         "physical units need an affine encoder and decoder, scale factors, and names and units of state and input"

@@ -14,10 +14,8 @@ pub struct Summand {
     pub term: usize,
 }
 
-/// The accelerations of one phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseEquations {
-    /// Name, such as `contact`.
     pub name: String,
     /// Foot patterns that select the phase.
     pub feet: FeetRule,
@@ -32,7 +30,6 @@ pub struct Equations<'a> {
     pub model: Cow<'a, ReducedModel>,
     /// The pool of the terms. Clone it to build on them: ids stay valid in the clone.
     pub pool: ExprPool,
-    /// The terms of all phases.
     pub terms: Vec<CandidateTerm>,
     /// In the model's order.
     pub phases: Vec<PhaseEquations>,
@@ -130,12 +127,10 @@ impl<'a> Equations<'a> {
         self.physical.as_ref().map(|(units, _)| units)
     }
 
-    /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
         self.model.latent_dim()
     }
 
-    /// The phase with this index.
     pub fn phase(&self, phase: usize) -> Result<&PhaseEquations, ModelError> {
         self.phases.get(phase).ok_or(ModelError::PhaseIndex {
             found: phase,
@@ -181,7 +176,6 @@ impl PhaseEquations {
 /// Terms of one equation that a shorter form took the place of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExactStep {
-    /// The phase's name.
     pub phase: String,
     /// Index of the latent coordinate.
     pub output: usize,

@@ -31,7 +31,6 @@ pub(crate) struct ProgramBuilder {
 }
 
 impl ProgramBuilder {
-    /// An empty program.
     pub(crate) fn new(name: &str) -> Self {
         Self {
             program: Program {
@@ -60,7 +59,6 @@ impl ProgramBuilder {
             .collect()
     }
 
-    /// A constant.
     pub(crate) fn constant(&mut self, value: f64) -> ValueId {
         self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
     }
@@ -177,7 +175,6 @@ impl ProgramBuilder {
             .extend(entries.map(|(index, &value)| ResultEntry { slot, index, value }));
     }
 
-    /// The finished program.
     pub(crate) fn finish(self) -> Result<Program, IrError> {
         let of_table = |table: &usize| {
             let mut entries = self.program.tables[*table].entries.iter().copied();

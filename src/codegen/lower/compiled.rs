@@ -23,7 +23,6 @@ struct CompiledPhase {
 }
 
 impl CompiledModel {
-    /// Lowers all phases of a model.
     pub fn new(model: &ReducedModel) -> Result<Self, LowerError> {
         let system = &Equations::of(model);
         let form = Form::default();
@@ -46,7 +45,6 @@ impl CompiledModel {
         })
     }
 
-    /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
         self.latent_dim
     }

@@ -14,7 +14,6 @@ pub enum LowerError {
     /// A coefficient is too large once folded with the numbers of its term.
     #[error("phase `{phase}`, output {output}: a folded coefficient is {value}")]
     NonFinite {
-        /// Name of the phase.
         phase: String,
         /// Row of the equations, from 1.
         output: usize,
@@ -40,7 +39,6 @@ impl JacobianPattern {
         self.rows.iter().copied().zip(self.cols.iter().copied())
     }
 
-    /// Number of entries.
     pub fn len(&self) -> usize {
         self.rows.len()
     }

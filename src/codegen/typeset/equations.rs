@@ -1,5 +1,4 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
-#![allow(missing_docs, reason = "the names say it")]
 
 use super::*;
 

@@ -1,6 +1,5 @@
 //! The typeset tree: mathematics as it is laid out, before it has a spelling, with its estimated width in em (metrics
 //! of Computer Modern, good to a few percent) and where a long equation is broken.
-#![allow(missing_docs, reason = "the names say it")]
 
 use super::*;
 

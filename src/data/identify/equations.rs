@@ -28,7 +28,6 @@ pub(crate) fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
     unknowns
 }
 
-/// The equations of a segment; one column a sample.
 #[derive(Debug, Clone)]
 pub(crate) struct SampleEquations {
     pub body: DMatrix<f64>, // axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2

@@ -16,8 +16,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod equations;
 mod estimate;
 mod fit;

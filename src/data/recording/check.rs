@@ -19,7 +19,6 @@ const STEP_SHARE: f64 = 0.5; // departure of a time step from the median, as a s
 
 /// What is wrong with a run of samples; a finding's `bound` is what its `value` breaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[allow(missing_docs, reason = "`description` has the words")]
 pub enum Implausible {
     Torque,
     JointAngle,
@@ -41,7 +40,6 @@ impl Implausible {
         !matches!(self, Self::NearSingular)
     }
 
-    /// The finding in words.
     pub const fn description(self) -> &'static str {
         match self {
             Self::Torque => "torque above the joint's limit",
@@ -59,7 +57,6 @@ impl Implausible {
 
 /// A run of implausible samples in one column, with its first row in the file and that of its worst value.
 #[derive(Debug, Clone, PartialEq)]
-#[allow(missing_docs, reason = "the names say it")]
 pub struct Finding {
     pub kind: Implausible,
     pub segment: usize,

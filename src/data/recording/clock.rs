@@ -21,7 +21,6 @@ const EVEN: f64 = 0.01; // unevenness of time steps, relative, from which a segm
 pub(crate) struct Timed {
     /// At even steps.
     pub segment: Segment,
-    /// What was mended.
     pub mended: Mended,
     /// Samples that stand in for lost ones: straight lines across more than five steps.
     pub lost: Vec<bool>,

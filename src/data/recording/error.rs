@@ -14,7 +14,6 @@ pub(super) type Checked<T> = Result<T, RecordingFault>;
 
 /// What is wrong at a place.
 #[derive(Debug, Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum RecordingFault {
     #[error("found {found}, expected {expected}")]
     Unexpected { found: String, expected: String },

@@ -9,7 +9,6 @@ pub const CHATTER_SAMPLES: usize = 5;
 
 /// A phase by its name, and the feet that select it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the types say it")]
 pub struct PhasePattern {
     pub name: String,
     pub feet: FeetRule,
@@ -38,7 +37,6 @@ pub enum Stance {
 
 /// Consecutive samples of a segment of one phase, by its index in [`PhaseRule::patterns`].
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the types say it")]
 pub struct PhaseSpan {
     pub phase: usize,
     pub kind: Stance,
@@ -85,7 +83,6 @@ impl PhaseRule {
         self
     }
 
-    /// Names of the phases.
     pub fn names(&self) -> Vec<String> {
         self.patterns.iter().map(|p| p.name.clone()).collect()
     }

@@ -275,7 +275,6 @@ pub struct ReadingNotes {
 }
 
 impl ReadingNotes {
-    /// Counts one recording.
     pub fn add(&mut self, reading: &Reading) {
         self.recordings += 1;
         for (count, (is_made, _)) in self.repaired.iter_mut().zip(REPAIRS) {
@@ -315,7 +314,6 @@ impl ReadingNotes {
 
 /// The quantity in a column, in SI units; indices follow the state, the wrench and the feet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "`name` has the words")]
 pub enum Column {
     Time,
     Position(usize),

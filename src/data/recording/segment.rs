@@ -62,7 +62,6 @@ pub struct Segment {
     pub ddx: DMatrix<f64>,
     /// Joint torques, 12 x n, in N m.
     pub torque_nm: DMatrix<f64>,
-    /// Contact of each foot.
     pub feet: Vec<ContactFlags>,
     /// `[F_lin; F_ang]`, 6 x n (N, N m), when the file carries it.
     pub body_wrench: Option<DMatrix<f64>>,
@@ -165,7 +164,6 @@ impl Segment {
         }
     }
 
-    /// Number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()
     }

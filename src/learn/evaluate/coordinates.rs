@@ -151,7 +151,6 @@ impl CoordinateSums {
         Ok(())
     }
 
-    /// Adds the residual of one coordinate.
     pub(super) fn add_one(
         &mut self,
         segment: &Segment,

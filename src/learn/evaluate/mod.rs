@@ -4,8 +4,6 @@
 //! under the same inputs, stability, the losses of the lift and a [`Verdict`]. `docs/mathematics.md` defines each
 //! figure once. Start with `assessment`, then [`coordinates`](Fit).
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod along_recording;
 mod aslip;
 mod assessment;

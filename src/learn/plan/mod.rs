@@ -12,8 +12,6 @@
 //! assert!(Goal::new(0.35, -0.1).is_err());
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod costs;
 mod motion;
 mod seed;

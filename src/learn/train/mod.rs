@@ -4,8 +4,6 @@
 //! it, and a [`TrainReport`]. Read [`closed_form()`] first: it walks from the dataset over the encoder's row space
 //! (`subspace`) and the decoder (`latent`) to the dynamics (`weak_form`, `sparse`, `select`), judged by rollouts.
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod body;
 mod closed_form;
 mod dataset;

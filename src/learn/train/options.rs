@@ -143,7 +143,6 @@ pub struct RegressionOptions {
     pub smoothing: usize,
     /// Parts of the recipe for named coordinates that are left out.
     pub leave_out: Vec<RecipePart>,
-    /// Equations of the momentum rows.
     pub body_equations: BodyEquations,
     /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
     pub slack: f64,

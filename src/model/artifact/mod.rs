@@ -27,8 +27,6 @@
 //!
 //! [`ReducedModel`]: crate::model::ReducedModel
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod manifest;
 mod read;
 mod write;

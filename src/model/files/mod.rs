@@ -5,8 +5,6 @@
 //! is replaced. Stages that read state the place of a fault with [`Located`], stop where [`size`] says, and name
 //! formats that they do not read by [`magic`]. `text` has what texts of files may do on a terminal or in a shell.
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 pub mod magic;
 pub mod size;
 

@@ -27,8 +27,6 @@
 //! # }
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod builder;
 mod coordinates;
 mod error;

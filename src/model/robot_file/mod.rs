@@ -18,8 +18,6 @@
 //! # Ok::<(), romc::robot_file::RobotFileError>(())
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod identity;
 mod legs;
 mod read;

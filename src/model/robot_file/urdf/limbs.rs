@@ -1,12 +1,8 @@
 //! Which links of a tree are the trunk, which joints the legs, and where the feet are.
 
-use nalgebra::Vector3;
-
-use super::tree::{Body, Tree};
+use super::tree::Body;
+use super::*;
 use crate::files::shell_word;
-use crate::robot::FOOT_DIM;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot_file::RobotFileError;
 
 const SAME_PLACE_M: f64 = 1e-12; // largest distance of two feet that are one
 

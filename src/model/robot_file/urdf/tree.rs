@@ -2,11 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Rotation3, Vector3};
 use roxmltree::{Attribute, Document, Node};
 
-use crate::files::{Place, shell_word};
-use crate::robot_file::RobotFileError;
+use super::*;
+use crate::files::shell_word;
 use crate::robot_file::identity::LARGEST_ANGLE_RAD;
 
 /// Kinds of joints; of them `fixed` alone does not move.
