@@ -67,7 +67,6 @@ pub use canonical::{
     polynomial::{CanonicalForm, Coefficient},
 };
 pub use defined::Reading;
-pub use display::Display;
 
 pub use function::Function;
 pub use interval::Interval;

@@ -30,7 +30,7 @@ mod units;
 pub(crate) use compare::TermDifference;
 pub use compare::{Comparison, Difference, Verdict, compare};
 pub(crate) use point::CheckDomain;
-pub use point::Gap;
+pub(crate) use point::Gap;
 pub(crate) use side::read_sides;
 pub use side::{CheckError, Side};
 

@@ -6,7 +6,7 @@ use crate::check::{
     read_sides,
 };
 
-pub(super) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &CheckArguments) -> Result<Answer> {
     let options = CheckOptions {
         exact: arguments.exact,
         symbols: SymbolNames::parse(&arguments.symbols)?,

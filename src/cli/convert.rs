@@ -2,7 +2,7 @@
 
 use super::*;
 
-pub(super) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &ConvertArguments) -> Result<Answer> {
     Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
@@ -53,7 +53,7 @@ pub(super) fn write_recording(
     segments: Vec<Segment>,
     inputs: Option<&[DMatrix<f64>]>,
     overwrite: Overwrite,
-) -> Result<(), Error> {
+) -> Result<()> {
     let is_mcap = (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
     let written = match &segments[..] {
         [segment] if is_mcap => {

@@ -15,7 +15,7 @@ const JUMPS: [(&str, &[u8]); 3] = [
 
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
-pub(super) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     let folder = &arguments.out_dir;
     let inputs = Inputs::default().into_folder(Some(folder))?;
     let progress = spinner("reading the shipped model and recordings");

@@ -3,7 +3,7 @@
 use super::*;
 use crate::identify::{Identification, identify};
 
-pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer> {
     Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and_robot(Some(&arguments.robot))

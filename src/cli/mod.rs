@@ -96,6 +96,8 @@ use crate::typeset::words::counted;
 use crate::typeset::{Cell, NumberStyle, PrintOptions, Rounding, SymbolTable, Table, significant};
 use crate::{Error, artifact};
 
+type Result<T, E = Error> = std::result::Result<T, E>;
+
 #[derive(Debug, Clone)]
 pub(crate) struct Answer {
     pub text: String,
@@ -166,7 +168,7 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-fn execute(arguments: &Arguments) -> Result<Answer, Error> {
+fn execute(arguments: &Arguments) -> Result<Answer> {
     arguments.refuse_idle()?;
     let (name, mut answer) = match &arguments.command {
         Command::Check(arguments) => ("check", check::run(arguments)?),

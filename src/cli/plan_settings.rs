@@ -20,7 +20,7 @@ pub(super) fn path_for(plan: &Path) -> PathBuf {
 }
 
 /// The settings next to a recording; the usual ones where there is no file.
-pub(super) fn read_for(recording: &Path) -> Result<MpcSettings, Error> {
+pub(super) fn read_for(recording: &Path) -> Result<MpcSettings> {
     let path = path_for(recording);
     let usual = MpcSettings::default();
     if !path.is_file() {

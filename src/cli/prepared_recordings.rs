@@ -24,7 +24,7 @@ impl RecordedSets {
         settings: &TrainSettings,
         robot: &'static Robot,
         seed: u64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let (training, validation) = (&arguments.recordings, &arguments.validation);
         let paths = [training.as_slice(), validation, &arguments.test];
         let mut recorded = Self::whole(paths, &arguments.reading, settings, robot)?;
@@ -45,7 +45,7 @@ impl RecordedSets {
         reading: &ReadingArguments,
         settings: &TrainSettings,
         robot: &'static Robot,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let clocks = match settings.paper {
             true => Clocks::Recorded,
             false => Clocks::Repaired,
@@ -174,7 +174,7 @@ impl RecordedSets {
     }
 }
 
-fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<DividedJump>, Error> {
+fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<DividedJump>> {
     let mut jumps = Vec::new();
     for path in paths {
         let recording = reader.read(path)?.recording;

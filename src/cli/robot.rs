@@ -3,7 +3,7 @@
 use super::*;
 
 /// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
-pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
+pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot> {
     let read = robot_file::open(name_or_file, &RobotOptions::default())?;
     let robot = read.robot;
     if robot_file::by_name(name_or_file).is_err() {
@@ -21,7 +21,7 @@ fn note_all(file: &str, notes: &[String]) {
     notes.for_each(|text| note(&format!("{file}: {text}")));
 }
 
-pub(super) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &RobotArguments) -> Result<Answer> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::*;
 
-pub(super) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &TrainArguments) -> Result<Answer> {
     let settings = TrainSettings::effective(arguments)?;
     Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)

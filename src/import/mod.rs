@@ -30,10 +30,10 @@ mod tensors;
 #[path = "../../tests/import/units.rs"]
 mod units;
 
-pub use latex::variables::{NameError, SymbolNames};
+pub(crate) use latex::variables::{NameError, SymbolNames};
 pub(crate) use library::read_terms;
 pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
-pub use role::Mapping;
+pub(crate) use role::Mapping;
 pub(crate) use run::{Chosen, import, read_equations};
 pub use run::{ImportReport, Imported, import_from_bytes, import_tensors};
 pub use tensors::Tensor;

@@ -82,10 +82,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::Domain`] for another number of boxes or ranges, and for a range that is empty or infinite.
-    pub(crate) fn new(
-        model: &ReducedModel,
-        boxes: Vec<Option<Vec<Interval>>>,
-    ) -> Result<Self, SimplifyError> {
+    pub(crate) fn new(model: &ReducedModel, boxes: Vec<Option<Vec<Interval>>>) -> Result<Self> {
         check_count(boxes.len(), model.phases().len())?;
         let refused = |message| Err(SimplifyError::Domain(message));
         let variables: Vec<_> = LatentVariable::all(model.latent_dim()).collect();
@@ -110,11 +107,7 @@ impl Domain {
     }
 
     /// The smallest boxes that hold all samples, each side moved out by `margin` times the width.
-    pub fn around(
-        model: &ReducedModel,
-        samples: &Samples,
-        margin: f64,
-    ) -> Result<Self, SimplifyError> {
+    pub fn around(model: &ReducedModel, samples: &Samples, margin: f64) -> Result<Self> {
         let boxes = samples.phases.iter().map(|samples| {
             let ranges = samples.row_iter().map(|row| {
                 let points = row.iter().copied().map(Interval::point);
@@ -131,7 +124,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::DomainFile`] for an unknown phase or variable, one without a range, and as `Domain::new`.
-    pub fn from_toml(model: &ReducedModel, path: &Path, text: &str) -> Result<Self, SimplifyError> {
+    pub fn from_toml(model: &ReducedModel, path: &Path, text: &str) -> Result<Self> {
         let refused = |message: String| SimplifyError::DomainFile {
             path: path.to_owned(),
             message,
@@ -209,7 +202,7 @@ impl Domain {
     }
 }
 
-pub(super) fn check_count(found: usize, expected: usize) -> Result<(), SimplifyError> {
+pub(super) fn check_count(found: usize, expected: usize) -> Result<()> {
     match found == expected {
         true => Ok(()),
         false => Err(SimplifyError::Domain(format!(

@@ -74,7 +74,7 @@ pub(crate) fn printed(
     domain: &Domain,
     samples: Option<&Samples>,
     rounding: Rounding,
-) -> Result<Vec<PrintedEquation>, SimplifyError> {
+) -> Result<Vec<PrintedEquation>> {
     let workspace = Workspace::new(equations)?;
     let mut all = Vec::new();
     for (index, phase) in equations.phases.iter().enumerate() {

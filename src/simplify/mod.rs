@@ -39,3 +39,5 @@ use crate::sim::{LatentSegment, Restart, Rollout, Window, rollout};
 use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
 use crate::typeset::{Cell, Decimal, Rounding, Table, rounded, rounded_up, significant};
 use crate::{artifact, lower};
+
+type Result<T, E = SimplifyError> = std::result::Result<T, E>;

@@ -65,11 +65,7 @@ impl Workspace {
     }
 
     /// A model of these coefficients, one matrix per phase; appended terms that no phase uses are left out.
-    pub(crate) fn finish(
-        &self,
-        model: ReducedModel,
-        xi: &[DMatrix<f64>],
-    ) -> Result<ReducedModel, SimplifyError> {
+    pub(crate) fn finish(&self, model: ReducedModel, xi: &[DMatrix<f64>]) -> Result<ReducedModel> {
         let used = |row: &usize| xi.iter().any(|xi| xi.row(*row).iter().any(|&c| c != 0.0));
         let rows: Vec<usize> = (0..self.original)
             .chain((self.original..self.library.terms().len()).filter(used))

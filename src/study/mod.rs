@@ -16,3 +16,5 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
+
+type Result<T, E = StudyError> = std::result::Result<T, E>;

@@ -19,7 +19,7 @@ pub struct Shortened {
 /// Shortens sums over one pool, and remembers what it found about their terms.
 #[derive(Debug)]
 pub struct Shortener<'a> {
-    pub(super) pool: &'a mut ExprPool,
+    pub pool: &'a mut ExprPool,
     pub(super) costs: Costs,
     singles: IdMap<ExprId>,
     pub(super) plain: IdMap<bool>,
@@ -79,11 +79,6 @@ impl<'a> Shortener<'a> {
             plain: IdMap::default(),
             links: HashMap::new(),
         }
-    }
-
-    /// The pool, with the expressions that were made.
-    pub fn pool(&self) -> &ExprPool {
-        self.pool
     }
 
     /// The replacements that make `sum coefficient * expr` shortest, ordered by first position; none if it is short.

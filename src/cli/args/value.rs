@@ -35,7 +35,7 @@ pub(super) fn choice<T: Copy + Send + Sync>(
 }
 
 pub(super) fn overwrite() -> impl TypedValueParser<Value = Overwrite> {
-    BoolValueParser::new().map(Overwrite::when_forced)
+    BoolValueParser::new().map(Overwrite::from)
 }
 
 /// Takes any text and offers the names of romc's own robots to shells.

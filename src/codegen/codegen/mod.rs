@@ -43,3 +43,5 @@ use crate::ir::{
 };
 use crate::lower::{Form, JacobianPattern, LowerError, Map};
 use crate::model::{CoordinateNames, ModelError, ReducedModel, Scaling};
+
+type Result<T, E = CodegenError> = std::result::Result<T, E>;

@@ -57,7 +57,7 @@ impl Precision {
     }
 
     /// Whether every constant of the functions is finite in this precision.
-    pub fn check(self, entries: &ModelInterface) -> Result<(), CodegenError> {
+    pub fn check(self, entries: &ModelInterface) -> Result<()> {
         let beyond =
             |entry: &FunctionSpec| Some((entry.name.clone(), beyond_single(&entry.program)?));
         match entries.all().find_map(beyond).filter(|_| self.is_single()) {

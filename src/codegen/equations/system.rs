@@ -254,7 +254,7 @@ impl Equations<'_> {
                 let mut all: Vec<Summand> = Vec::new();
                 for Shortened { replaced, by } in shortener.shorten(&summands) {
                     let first = equation[replaced[0]].term;
-                    let after = new.placed(shortener.pool(), &mut self.terms, first, &by);
+                    let after = new.placed(shortener.pool, &mut self.terms, first, &by);
                     let Some((placed, texts)) = after else {
                         continue;
                     };

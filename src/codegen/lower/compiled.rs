@@ -1,6 +1,6 @@
 //! A model's programs, ready to run: what integration and control evaluate.
 
-use super::{Form, LowerError, *};
+use super::*;
 use crate::lower;
 
 /// The accelerations, Jacobians and Runge-Kutta steps of all phases of a model, run by the interpreter with the
@@ -23,7 +23,7 @@ struct CompiledPhase {
 }
 
 impl CompiledModel {
-    pub fn new(model: &ReducedModel) -> Result<Self, LowerError> {
+    pub fn new(model: &ReducedModel) -> Result<Self> {
         let system = &Equations::of(model);
         let form = Form::default();
         let phases = (0..model.phases().len())
@@ -38,7 +38,7 @@ impl CompiledModel {
                     next: vec![0.0; 2 * model.latent_dim()],
                 })
             })
-            .collect::<Result<_, LowerError>>()?;
+            .collect::<Result<_>>()?;
         Ok(Self {
             latent_dim: model.latent_dim(),
             phases,
@@ -76,13 +76,12 @@ impl CompiledModel {
         let CompiledPhase {
             jacobian, pattern, ..
         } = &mut self.phases[phase];
-        if pattern.is_empty() {
-            jacobian.run(&[z, dz, u_lat], &mut [ddz]);
-        } else {
-            let outputs = &mut [ddz, &mut entries[..pattern.len()]];
-            jacobian.run(&[z, dz, u_lat], outputs);
+        let count = pattern.len();
+        match count {
+            0 => jacobian.run(&[z, dz, u_lat], &mut [ddz]),
+            _ => jacobian.run(&[z, dz, u_lat], &mut [ddz, &mut entries[..count]]),
         }
-        pattern.len()
+        count
     }
 
     /// Rows and columns of the entries of a phase's Jacobian.

@@ -41,3 +41,5 @@ use crate::model::{
     StateMap, TAIL,
 };
 use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId, sum_of_floats};
+
+type Result<T, E = LowerError> = std::result::Result<T, E>;

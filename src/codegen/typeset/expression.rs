@@ -6,7 +6,7 @@ use super::*;
 ///
 /// # Panics
 /// If it has a symbol that is no such variable; libraries of models refuse these.
-pub fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signed {
+pub(crate) fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signed {
     Layout { pool, symbols }.signed(expr)
 }
 

@@ -6,7 +6,7 @@
 
 mod decimal;
 mod equations;
-mod expression;
+pub(crate) mod expression;
 pub mod latex;
 pub mod markdown;
 pub mod mathml;
@@ -19,13 +19,11 @@ pub mod words;
 pub use decimal::{Decimal, Rounding};
 pub(crate) use equations::{CoefficientRow, CoefficientTable};
 pub use equations::{Equation, EquationSystem, Typeset};
-pub use expression::expression;
 pub(crate) use robot::RobotTypeset;
 pub(crate) use symbols::Emitted;
 pub use symbols::{Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError};
 pub use table::{Cell, Table, rounded, rounded_up, significant};
-pub(crate) use tree::{EQUALS, Glyph, break_lines, symbol_width, width};
-pub use tree::{Math, Signed, Symbol};
+pub(crate) use tree::{EQUALS, Glyph, Math, Signed, Symbol, break_lines, symbol_width, width};
 
 use std::fmt;
 

@@ -10,7 +10,7 @@ pub struct Spelling {
     /// Text, so that it shows as it is.
     pub text: fn(&str) -> String,
     /// Mathematics within a line or cell, which the text spells in the library's syntax.
-    pub math: fn(&Math, &str) -> String,
+    pub(crate) math: fn(&Math, &str) -> String,
 }
 
 impl Spelling {

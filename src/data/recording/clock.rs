@@ -41,7 +41,7 @@ pub struct Mended {
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
-pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
+pub(crate) fn timed(segment: &Segment) -> Outcome<Timed> {
     let (elapsed, elapsed_ratio) = elapsed(segment);
     let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT
         && elapsed_ratio > 0.0

@@ -39,7 +39,7 @@ impl RecordingSet {
         robot: &'static Robot,
         options: &ConditionOptions,
         reader: &Reader,
-    ) -> Result<(), RecordingError> {
+    ) -> Outcome<()> {
         let reader = reader.clone().for_robot(robot);
         let read = |file| read_file(file, robot, options, &reader);
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(2));
@@ -76,7 +76,7 @@ pub fn as_recorded(
     files: &[RecordingFile],
     robot: &'static Robot,
     reader: &Reader,
-) -> Result<Vec<Recording>, RecordingError> {
+) -> Outcome<Vec<Recording>> {
     let mut reader = reader.clone().for_robot(robot);
     reader.clocks = Clocks::Recorded;
     let mut recordings = Vec::new();
@@ -196,7 +196,7 @@ pub fn condition(
     recording: Recording,
     findings: &[Finding],
     options: &ConditionOptions,
-) -> Result<(Recording, usize), RecordingError> {
+) -> Outcome<(Recording, usize)> {
     let n_samples = recording.sample_count();
     let mut kept = match options.implausible {
         ImplausibleSamples::LeaveOut if !findings.is_empty() => {

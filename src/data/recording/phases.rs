@@ -97,7 +97,7 @@ impl PhaseRule {
     ///
     /// # Errors
     /// [`RecordingError`] if no sample matches any pattern.
-    pub fn spans(&self, segment: &Segment) -> Result<Vec<PhaseSpan>, RecordingError> {
+    pub fn spans(&self, segment: &Segment) -> Outcome<Vec<PhaseSpan>> {
         let feet = &segment.feet;
         let mut phases: Vec<Option<usize>> = feet.iter().map(|f| self.phase_of(*f)).collect();
         if phases.iter().all(Option::is_none) {

@@ -60,7 +60,7 @@ impl Reader {
     }
 
     /// Reads a file, or with a map a folder of files that are one recording; errors name row and column or map's key.
-    pub fn read(&self, path: &Path) -> Result<Reading, RecordingError> {
+    pub fn read(&self, path: &Path) -> Outcome<Reading> {
         let mut reading = match &self.map {
             Some(map) if is_mcap(path) => assemble(path, &read_mcap(path)?, map)?,
             Some(map) => assemble(path, &read_texts(path, map)?, map)?,
@@ -135,12 +135,12 @@ fn rate_notes(faults: &[(&'static str, RateFault)]) -> Vec<String> {
 }
 
 /// Reads a recording, plain or gzip; errors name file, row and column.
-pub fn read(path: &Path) -> Result<Recording, RecordingError> {
+pub fn read(path: &Path) -> Outcome<Recording> {
     read_noted(path, Lines::open(path)?).map(|reading| reading.recording)
 }
 
 /// [`read`] from memory; `name` stands for the file in messages. No bytes make it panic.
-pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Result<Recording, RecordingError> {
+pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Outcome<Recording> {
     let path = Path::new(name);
     read_noted(path, Lines::of(path, bytes, u64::MAX)?).map(|reading| reading.recording)
 }

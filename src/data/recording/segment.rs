@@ -253,7 +253,7 @@ impl Segment {
     ///
     /// # Errors
     /// [`RecordingFault::Wrench`] with the row of an angle or torque that is not finite.
-    pub fn input(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
+    pub fn input(&self, rule: &InputRule) -> Outcome<DMatrix<f64>> {
         let torque_nm = self.torque_within_limits(rule.robot());
         let mut out = DMatrix::zeros(STATE_DIM, self.len());
         let net = &torque_nm - self.losses(rule);

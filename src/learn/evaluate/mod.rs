@@ -23,9 +23,9 @@ pub use along_recording::{ReferenceInput, Run, StepRow, along_recording};
 pub use aslip::{Aslip, AslipSums, Baseline};
 pub use assessment::{Assessment, EvaluateError, Horizon, SegmentRun, remarks};
 pub use control_metrics::{ControlMetrics, Summary, control_metrics, usual_settings};
+pub(crate) use coordinates::is_plausible;
 pub use coordinates::{
     ByContact, Comparison, CoordinateSums, Fit, FitSums, LAMBDA, PointwiseSums, combined_loss,
-    is_plausible,
 };
 pub use invariance::Invariance;
 pub use prediction::{LinearisedPhase, PredictionError, eigenvalues};

@@ -67,7 +67,7 @@ pub fn refine_from(
     robot: &'static Robot,
     actuators: Option<Actuators>,
     origin: &Origin,
-) -> Result<Refined, TrainError> {
+) -> Result<Refined> {
     let rule = InputRule::new(robot, actuators.clone(), model.wrench_frame());
     let data = Data {
         model,
@@ -175,11 +175,7 @@ impl Encoded {
     }
 }
 
-fn encoded(
-    model: &ReducedModel,
-    recordings: &[Recording],
-    rule: &InputRule,
-) -> Result<Encoded, TrainError> {
+fn encoded(model: &ReducedModel, recordings: &[Recording], rule: &InputRule) -> Result<Encoded> {
     let scaling = Scaling {
         state: model.state_factors()?,
         input: model.input_factors()?,

@@ -103,7 +103,7 @@ impl Manifest {
         manifest
     }
 
-    pub(super) fn model(self, file: &str) -> Result<ReducedModel, ArtifactError> {
+    pub(super) fn model(self, file: &str) -> Result<ReducedModel> {
         let refused = |source: ModelError| ArtifactError::unusable(file, source);
         let incomplete = |part, needs| Err(refused(ModelError::Incomplete { part, needs }));
         let prior = match (self.landmarks, self.prior) {
@@ -193,7 +193,7 @@ impl RobotValue {
         }
     }
 
-    fn robot(self, file: &str) -> Result<&'static Robot, ArtifactError> {
+    fn robot(self, file: &str) -> Result<&'static Robot> {
         match self {
             Self::Name(name) => {
                 robot_file::by_name(&name).map_err(|source| ArtifactError::unusable(file, source))

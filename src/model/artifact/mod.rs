@@ -31,7 +31,7 @@ mod manifest;
 mod read;
 mod write;
 
-pub use read::{ArtifactError, MAX_FILE_BYTES, describe, is_standard_input, read, read_from_bytes};
+pub use read::{ArtifactError, describe, is_standard_input, read, read_from_bytes};
 pub use write::{Digest, check_place, digest, to_text, write};
 
 use std::path::Path;
@@ -46,3 +46,5 @@ use crate::model::{
     CoordinateNames, InputStatistics, JumpPrior, Landmarks, Library, LibraryChoice, ModelError,
     Phase, ReducedModel, ScaleFactors, Scaling, StandardLibrary, StateMap,
 };
+
+type Result<T, E = ArtifactError> = std::result::Result<T, E>;

@@ -43,7 +43,7 @@ mod state_map;
 mod statistics;
 
 pub use crate::robot::FeetRule;
-pub use builder::ModelBuilder;
+pub(crate) use builder::ModelBuilder;
 pub use coordinates::{CoordinateNames, ScaleFactors, Scaling};
 pub use error::ModelError;
 pub use identifier::{Identifier, IdentifierError, check_name};

@@ -29,7 +29,7 @@ pub(super) fn identified(
     places: &Places<'_>,
     chosen: Option<&str>,
     mut notes: Vec<String>,
-) -> Result<RobotReading, RobotFileError> {
+) -> Result<RobotReading> {
     if let Some(name) = chosen {
         entry.name = name.to_owned();
     }

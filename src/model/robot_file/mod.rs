@@ -40,3 +40,5 @@ use crate::robot::{
     Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, LEG_JOINT_DIM, Leg, LegGeometry,
     LegMoments, Robot, RobotError,
 };
+
+type Result<T, E = RobotFileError> = std::result::Result<T, E>;

@@ -43,7 +43,7 @@ pub struct Guess {
 ///
 /// # Errors
 /// [`RecordingError`] for a file that is no table, or whose columns have no names.
-pub fn guess(path: &Path, robot: &Robot) -> Result<Guess, RecordingError> {
+pub fn guess(path: &Path, robot: &Robot) -> Outcome<Guess> {
     if is_mcap(path) {
         return guess_of(path, &read_mcap(path)?, robot);
     }
