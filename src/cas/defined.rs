@@ -8,7 +8,6 @@ use super::*;
 const MAX_PROOF: usize = 300;
 const SMALL: f64 = 1e-6;
 
-/// An expression that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     /// The expression in canonical form.

@@ -53,7 +53,6 @@ impl Interval {
         self.hi
     }
 
-    /// Whether there are no points.
     pub fn is_empty(self) -> bool {
         self.lo > self.hi
     }
@@ -90,7 +89,6 @@ impl Interval {
         Interval::between(self.lo.min(other.lo), self.hi.max(other.hi))
     }
 
-    /// The points that lie in both.
     pub fn intersection(self, other: Interval) -> Interval {
         Interval::new(self.lo.max(other.lo), self.hi.min(other.hi))
     }

@@ -92,7 +92,6 @@ impl Number {
         self == Number::ONE
     }
 
-    /// Whether the value is below zero.
     pub fn is_negative(self) -> bool {
         match self.0 {
             Repr::Rational(numerator, _) => numerator < 0,
@@ -113,7 +112,6 @@ impl Number {
         Some([a, b, c, d].map(i128::from))
     }
 
-    /// The value if it is an exact integer.
     pub fn as_integer(self) -> Option<i64> {
         match self.as_rational() {
             Some((numerator, 1)) => Some(numerator),

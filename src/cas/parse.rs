@@ -318,7 +318,6 @@ impl<'p> Parser<'p> {
     }
 }
 
-/// A token and the byte at which it starts.
 #[derive(Clone, Copy)]
 struct Token<'a> {
     kind: TokenKind,

@@ -211,7 +211,6 @@ impl ExprPool {
         &self.nodes[expr.index()]
     }
 
-    /// The value of a constant number.
     pub fn as_number(&self, expr: ExprId) -> Option<Number> {
         match self.node(expr) {
             Node::Number(number) => Some(*number),
@@ -323,13 +322,11 @@ impl ExprPool {
         found
     }
 
-    /// The variables that occur in an expression.
     pub fn symbols_of(&self, expr: ExprId) -> BTreeSet<SymbolId> {
         let varying = self.walk(&[expr], |node| !self.is_constant(node), |_| true);
         (varying.into_iter().filter_map(|node| self.as_symbol(node))).collect()
     }
 
-    /// Whether no variable occurs.
     pub fn is_constant(&self, expr: ExprId) -> bool {
         self.facts[expr.index()].symbols == 0
     }

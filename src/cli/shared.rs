@@ -349,7 +349,6 @@ pub(super) fn quoted_all(paths: &[PathBuf]) -> String {
     words.join(" ")
 }
 
-/// Replaces an option's value if one is given.
 pub(super) fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
     if let Some(value) = given {
         *option = value.into();

@@ -277,7 +277,6 @@ pub(crate) struct UnusedTensor {
     pub shape: Vec<usize>,
 }
 
-/// An equation that became a column of Xi.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct ReadEquation {
     pub phase: String,

@@ -6,7 +6,6 @@ use std::str::FromStr;
 use super::measure::Measured;
 use super::*;
 
-/// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub(crate) struct BeforeAfter {
     pub before: usize,
@@ -229,7 +228,6 @@ pub struct ToleranceError {
 }
 
 impl Tolerance {
-    /// The tolerance with its unit, in words.
     pub(crate) fn words(self) -> String {
         let unit = match self {
             Self::ShareOfRms(_) => "of the root mean square of each ddz over the recordings",

@@ -116,7 +116,6 @@ pub(crate) struct RolloutErrors {
 /// Rollouts of a model and of its simplification beside the recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RolloutEffect {
-    /// Names of the robot's body coordinates.
     pub names: Vec<String>,
     pub units: Vec<String>,
     /// Time between restarts, s.

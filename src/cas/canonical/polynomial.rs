@@ -318,7 +318,6 @@ impl Coefficient {
         f64::from_bits(self.radius)
     }
 
-    /// Whether zero is among the numbers that it may stand for.
     pub fn may_be_zero(&self) -> bool {
         let is_within = || self.magnitude() <= self.radius() * (1.0 + 1e-9);
         self.is_zero() || (self.radius > 0 && is_within())

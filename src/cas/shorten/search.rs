@@ -70,7 +70,6 @@ fn merge(blocks: &mut [Block], places: &[usize], summands: Summands) {
 }
 
 impl<'a> Shortener<'a> {
-    /// A shortener of sums over `pool`.
     pub fn new(pool: &'a mut ExprPool) -> Self {
         Self {
             pool,

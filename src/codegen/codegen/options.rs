@@ -122,7 +122,6 @@ impl Units {
 /// Why no code could be generated from a model.
 #[derive(Debug, thiserror::Error)]
 pub enum CodegenError {
-    /// The model cannot be lowered.
     #[error(transparent)]
     Lower(#[from] LowerError),
     /// A constant is beyond the largest single-precision number.

@@ -63,7 +63,6 @@ impl ProgramBuilder {
         self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
     }
 
-    /// A scalar operation on one value.
     pub(crate) fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
         self.numbered(Key::Unary(op, a), Statement::Unary(op, a))
     }
@@ -94,7 +93,6 @@ impl ProgramBuilder {
         self.numbered(Key::Select(operands), Statement::Select(operands))
     }
 
-    /// Sines and cosines of all arguments.
     pub(crate) fn sin_cos(&mut self, arguments: &[ValueId]) -> (Vec<ValueId>, Vec<ValueId>) {
         let n = arguments.len();
         let statement = Statement::SinCos {

@@ -5,7 +5,6 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::interpret::{double, single};
 
-/// Operations on one scalar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Unary {
     Neg,

@@ -61,7 +61,6 @@ pub enum Statement {
         slot: usize,
         index: usize,
     },
-    /// A scalar operation on one value.
     Unary(Unary, ValueId),
     /// A scalar operation on two values.
     Binary(Binary, ValueId, ValueId),

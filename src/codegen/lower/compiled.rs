@@ -49,7 +49,6 @@ impl CompiledModel {
         self.latent_dim
     }
 
-    /// Number of phases, in the order of the model's.
     pub fn n_phases(&self) -> usize {
         self.phases.len()
     }

@@ -26,7 +26,6 @@ pub(crate) struct Timed {
     pub lost: Vec<bool>,
 }
 
-/// What was mended in a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mended {
     /// Where times were rebuilt, time that passed by the motion over time that passed by the stamps.

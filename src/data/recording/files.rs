@@ -181,7 +181,6 @@ pub struct ConditionOptions {
     pub implausible: ImplausibleSamples,
     /// Shortest piece between samples left out that is kept; shorter ones go too.
     pub least_samples: usize,
-    /// Where accelerations come from.
     pub accelerations: Accelerations,
     /// Filter over whole segments.
     pub smoothing: Option<(SavitzkyGolay, SmoothedRows)>,

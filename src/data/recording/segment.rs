@@ -7,7 +7,6 @@ const ACCELERATION_WINDOW_S: f64 = 0.02; // joint accelerations are averaged ove
 
 pub(crate) type Rows = DMatrix<f64>; // quantities by row, one column a sample
 
-/// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The file, or the name that its bytes were given.
@@ -27,7 +26,6 @@ impl Recording {
         }
     }
 
-    /// Number of samples in all segments.
     pub fn sample_count(&self) -> usize {
         self.segments.iter().map(Segment::len).sum()
     }
@@ -168,7 +166,6 @@ impl Segment {
         self.time_s.len()
     }
 
-    /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }

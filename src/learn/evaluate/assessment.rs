@@ -33,7 +33,6 @@ pub struct Assessment<'a> {
     pub remarks: Vec<String>,
 }
 
-/// Prediction errors over one horizon.
 #[derive(Debug, Clone)]
 pub struct Horizon {
     pub name: String,

@@ -160,7 +160,6 @@ impl Encoded {
         EncodedSet::new(&self.dataset, &self.latent)
     }
 
-    /// A set for each jump.
     fn each(self) -> Vec<Self> {
         let Self { dataset, latent } = self;
         let jumps = dataset.jumps.iter().zip(latent);

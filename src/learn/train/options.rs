@@ -247,7 +247,6 @@ impl TrainOptions {
         (0..count).map(|i| self.seed.wrapping_add(i)).collect()
     }
 
-    /// Library of the given or default terms.
     pub(crate) fn library(&self) -> Result<Library> {
         let choice = match &self.library {
             Some(given) => given.clone(),

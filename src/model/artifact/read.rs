@@ -11,14 +11,8 @@ use crate::files::size::Format;
 pub type ArtifactError = Located<Fault<ModelError>>;
 
 pub fn describe(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(source) = cause {
-        text.push_str(": ");
-        text.push_str(&source.to_string());
-        cause = source.source();
-    }
-    text
+    let causes = std::iter::successors(error.source(), |&cause| cause.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
 const MAX_FILE_BYTES: u64 = Format::Model.most_bytes();

@@ -25,7 +25,6 @@ use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 const MOST_SKIPPED: usize = 20; // most lines before the header of a text
 const LEAST_COLUMNS: usize = 3; // fewest columns of a table
 
-/// A first map of a log.
 #[derive(Debug, Clone)]
 pub struct Guess {
     /// The map, TOML with comments.
