@@ -1,6 +1,6 @@
 //! Equations laid out for print, before they have a spelling.
 //!
-//! A model enters; a [`Typeset`] leaves: one [`EquationSystem`] a phase, of [`Math`] trees with all parentheses, signs
+//! A model enters; a [`Typeset`] leaves: one [`EquationSystem`] a phase, of `Math` trees with all parentheses, signs
 //! and rounded coefficients in place, which [`latex`], [`markdown`] and [`mathml`] spell. Read `tree` first, then
 //! `expression` and `equations`.
 

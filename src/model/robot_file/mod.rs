@@ -1,6 +1,6 @@
 //! Robots from files: TOML, URDF, the object in a model file; those that romc brings; and tables of joint losses.
 //!
-//! Enters: a name, or the path or text of a file. Leaves: a checked [`Robot`](crate::robot::Robot) with its legs in
+//! Enters: a name, or the path or text of a file. Leaves: a checked [`Robot`] with its legs in
 //! romc's order, or file, place, what was found and what was expected. Legs are matched by where their first joints
 //! stand, joints by their order from the trunk. Read `identity.rs` first, the grammar, which doubts numbers; `legs.rs`
 //! makes a robot of it, `urdf` finds the legs of a tree. `docs/robots.md` describes the file.
