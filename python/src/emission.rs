@@ -190,7 +190,7 @@ pub fn write_files(
     let files: Vec<_> = files
         .map(|(path, text)| EmittedFile::new(path, text))
         .collect();
-    let overwrite = Overwrite::when_forced(force);
+    let overwrite = Overwrite::from(force);
     let written = py.detach(|| romc::files::write_files(&folder, &files, overwrite));
     written.map_err(|error| python_error(py, error))
 }

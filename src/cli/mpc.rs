@@ -1,18 +1,9 @@
 //! `romc mpc`: the latent-space controller along recordings.
 
-use super::simplification::RESTART_S;
 use super::*;
-use crate::evaluate::{
-    Assessment, ControlMetrics, ReferenceInput, Run, Verdict, along_recording, control_metrics,
-    usual_settings, verdict,
-};
-use crate::mpc::{Lift, MpcSettings, controller};
-use crate::report::{
-    NamedRun, control_figures, control_table, failed_runs, failures, run_table, verdict_lines,
-};
-use crate::robot::{JOINT_DIM, Robot};
+use crate::evaluate::{Run, Verdict};
 
-pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &MpcArguments) -> Result<Answer> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -81,7 +72,7 @@ impl JudgedRuns {
 }
 
 /// Those next to the recordings, where an option does not replace them.
-fn settings(arguments: &MpcArguments) -> Result<MpcSettings, Error> {
+fn settings(arguments: &MpcArguments) -> Result<MpcSettings> {
     let mut settings = plan_settings::read_for(&arguments.recordings[0])?;
     for path in &arguments.recordings[1..] {
         if plan_settings::read_for(path)? != settings {
@@ -111,7 +102,7 @@ pub(super) fn run_all(
     recordings: &[Recording],
     settings: MpcSettings,
     reference_input: ReferenceInput,
-) -> Result<Vec<NamedRun>, Error> {
+) -> Result<Vec<NamedRun>> {
     let mut controller = controller(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
@@ -131,7 +122,7 @@ pub(super) fn run_all(
 pub(super) fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
-) -> Result<[Vec<NamedRun>; 2], Error> {
+) -> Result<[Vec<NamedRun>; 2]> {
     let usual = usual_settings(recordings);
     let default = MpcSettings::default();
     if usual.step_s != default.step_s {

@@ -2,16 +2,8 @@
 
 use super::mpc::{judged, run_with_both_lifts};
 use super::*;
-use crate::evaluate::{Assessment, LAMBDA, verdict};
-use crate::report::{
-    Content, Introduction, PageOptions, all_figures, figure_files, introduction, page,
-    verdict_lines, without_statistics,
-};
-use crate::simplify::Tolerance;
-use crate::study::{Store, Summary};
-use crate::train::sha256;
 
-pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &ReportArguments) -> Result<Answer> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -90,7 +82,7 @@ fn answer(
     Answer::new(text, json).failed_if(verdict.fit_for.is_empty())
 }
 
-fn summary(folder: &Path) -> Result<Summary, Error> {
+fn summary(folder: &Path) -> Result<Summary> {
     let summary = Summary::of(&Store::open(folder)?.cells()?, LAMBDA);
     if summary.dimensions.is_empty() {
         let folder = folder.display();
@@ -112,7 +104,7 @@ pub(super) fn page_of(
     content: &Content<'_>,
     tolerance: Tolerance,
     commands: Vec<String>,
-) -> Result<Made, Error> {
+) -> Result<Made> {
     let figures = all_figures(content)?;
     let [ladder, equations, changes] =
         simplification::ladder(content.model, content.assessment, tolerance)?;

@@ -66,14 +66,6 @@ fn stepped(controller: &mut Controller, seen: &Seen) -> Command {
     })
 }
 
-fn exchange_sides(seen: &mut Seen) {
-    for values in [&mut seen.x, &mut seen.dx] {
-        for joint in [0, 1, 2, 6, 7, 8] {
-            values.swap(joint, joint + 3);
-        }
-    }
-}
-
 type Change = fn(&mut Seen, &Segment, f64);
 
 /// Faults from [`NOW_S`] on, with the statuses that may follow.
