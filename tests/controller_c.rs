@@ -22,6 +22,8 @@ mod boards;
 mod emitted;
 #[path = "controller_c/legs.rs"]
 mod legs;
+#[path = "controller_c/log.rs"]
+mod log;
 #[path = "controller/programs.rs"]
 mod programs;
 #[path = "mpc/random.rs"]

@@ -1,16 +1,53 @@
-//! `romc report`: a one-page assessment of a model, and its figures as files.
+//! `romc report`: a one-page assessment of a model, and its figures as files; or a page on a controller's log.
 
 use super::mpc::{judged, run_with_both_lifts};
 use super::*;
+use crate::recording::ControllerLog;
+use crate::report::{LogFacts, log_figures, log_page};
 
 pub(super) fn run(arguments: &ReportArguments) -> Result<Answer> {
+    match (&arguments.log, &arguments.model) {
+        (Some(log), _) => of_log(arguments, log),
+        (None, model) => {
+            let model = model.as_ref().expect("the parser wants it without a log");
+            of_model(arguments, model)
+        }
+    }
+}
+
+fn of_log(arguments: &ReportArguments, path: &Path) -> Result<Answer> {
+    let output = &arguments.output;
+    let inputs = Inputs::default()
+        .and([path])
+        .into_folder(arguments.figures.as_deref())?;
+    inputs.check_output(Some(output), Format::PAGE, arguments.force)?;
+    let log = ControllerLog::read(path)?;
+    let facts = LogFacts::of(&log);
+    let figures = log_figures(&log, &facts);
+    let words = [path, output].map(quoted);
+    let command = format!("romc report --log {} --output {}", words[0], words[1]);
+    let page = log_page(path, &facts, &figures, &command)?;
+    let (shown, bytes) = (output.display().to_string(), page.len());
+    let mut text = format!("{}\n{}", facts.headline, lines("", &facts.sentences));
+    text += &format!("{shown}: {} kB, {} figures\n", bytes / 1000, figures.len());
+    let json = json!({ "log": path.display().to_string(), "output": shown, "bytes": bytes });
+    let mut answer = Answer::new(text, json);
+    extend(&mut answer.json, json!(facts));
+    let figures = || Ok(figures.into_iter().map(|(_, figure)| figure).collect());
+    let folder = arguments.figures.as_deref();
+    inputs.write_figures(folder, figures, arguments.force, &mut answer)?;
+    write_file(output, page.as_bytes(), arguments.force)?;
+    Ok(answer)
+}
+
+fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer> {
     let inputs = Inputs::reading(&arguments.reading)
-        .and([&arguments.model])
+        .and([model_path])
         .and(&arguments.recordings)
         .and(&arguments.plan)
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
-    let model = artifact::read(&arguments.model)?;
+    let model = artifact::read(model_path)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_late_restarts(&recordings, arguments.restart_every);
     let study = (arguments.study.as_deref()).map(summary).transpose()?;
@@ -37,7 +74,7 @@ pub(super) fn run(arguments: &ReportArguments) -> Result<Answer> {
         plan: plan.as_ref(),
         digests: &paths.filter_map(digest).collect::<Vec<_>>(),
     };
-    let commands = commands(arguments, can_control);
+    let commands = commands(arguments, model_path, can_control);
     let made = page_of(&content, arguments.tolerance, commands)?;
     progress.finish_and_clear();
     // The figures come first: files that romc did not make are refused with nothing written.
@@ -46,11 +83,11 @@ pub(super) fn run(arguments: &ReportArguments) -> Result<Answer> {
         None => Vec::new(),
     };
     write_file(&arguments.output, made.page.as_bytes(), arguments.force)?;
-    Ok(answer(arguments, &content, &made, &written))
+    Ok(answer((arguments, model_path), &content, &made, &written))
 }
 
 fn answer(
-    arguments: &ReportArguments,
+    (arguments, model_path): (&ReportArguments, &Path),
     content: &Content<'_>,
     made: &Made,
     written: &[PathBuf],
@@ -70,7 +107,7 @@ fn answer(
         text += &format!("{folder}: {files} files, each figure as .svg, .pdf and .csv\n");
     }
     let json = json!({
-        "model": arguments.model.display().to_string(),
+        "model": model_path.display().to_string(),
         "output": output,
         "bytes": made.page.len(),
         "headline": headline,
@@ -129,8 +166,8 @@ pub(super) fn page_of(
 
 const LADDER_CAPTION: &str = "Size of the equations within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
 
-fn commands(arguments: &ReportArguments, has_control: bool) -> Vec<String> {
-    let (model, output) = (quoted(&arguments.model), quoted(&arguments.output));
+fn commands(arguments: &ReportArguments, model_path: &Path, has_control: bool) -> Vec<String> {
+    let (model, output) = (quoted(model_path), quoted(&arguments.output));
     let recordings = quoted_all(&arguments.recordings) + &arguments.reading.as_flags();
     let (every, tolerance) = (arguments.restart_every, arguments.tolerance);
     let within = format!("--tolerance {tolerance}");

@@ -1,6 +1,7 @@
 //! A one-page assessment of a model, its tables and its figures.
 //!
-//! An assessment and controller runs come in; a self-contained HTML page and figures leave. `introduction.rs` has the
+//! An assessment and controller runs come in; a self-contained HTML page and figures leave. `log.rs` makes another page of
+//! a generated controller's log. `introduction.rs` has the
 //! first words, `tables.rs` holds the tables and the same numbers for programs, `contents.rs` and `jump.rs` pick
 //! what is drawn, `figures/` draws it, `sections.rs` and `page.rs` place all. Start with `page.rs`. What this file
 //! imports is what its files import with `use super::*`.
@@ -9,6 +10,7 @@ mod contents;
 mod figures;
 mod introduction;
 mod jump;
+mod log;
 mod page;
 mod plan;
 mod sections;
@@ -19,6 +21,7 @@ pub(crate) use contents::{
 };
 pub(crate) use figures::{Figure, figure_files, range};
 pub(crate) use introduction::{Introduction, introduction};
+pub(crate) use log::{LogFacts, log_figures, log_page};
 pub(crate) use page::{PageOptions, page};
 pub(crate) use plan::{plan_figures, reach_figure};
 pub(crate) use tables::{

@@ -9,6 +9,7 @@ use crate::equations::{Equations, PhaseEquations};
 use crate::typeset::latex::tex_cases;
 
 const WIDTH_EM: f64 = 44.0;
+const WIDE: f64 = 500.0; // width of a panel that is drawn across the page
 
 pub(crate) struct PageOptions {
     pub simplification: Vec<Table>,
@@ -66,11 +67,11 @@ struct Page<'a> {
     commands: &'a [String],
 }
 
-fn html(text: &str) -> String {
+pub(super) fn html(text: &str) -> String {
     HtmlText(text).to_string()
 }
 
-fn prose(text: &str) -> String {
+pub(super) fn prose(text: &str) -> String {
     HtmlProse(text).to_string()
 }
 
@@ -96,8 +97,9 @@ fn latex(equations: &EquationSystem) -> String {
     lines.collect()
 }
 
-fn layout(figure: &Figure) -> &'static str {
+pub(super) fn layout(figure: &Figure) -> &'static str {
     match (figure.panels.len(), figure.columns) {
+        (1, _) if figure.panel_size.0 > WIDE => "wide",
         (1, _) => "one",
         (_, 2) => "two",
         _ => "many",

@@ -132,7 +132,7 @@ const ELSEWHERE: &str = "json help version force output out-dir \
     inspect: guess robot: name check: domain convert: inputs-of clock columns identify: robot clock columns \
     simulate: restart-every verbose clock columns mpc: horizon step lift reference-input solver figures clock columns \
     plan: distance apex start figures reach settings \
-    report: study figures plan restart-every tolerance clock columns \
+    report: log study figures plan restart-every tolerance clock columns \
     import: format map weights xi-layout library library-order latent-dim phase input-scaling wrench-frame \
     actuators sample-time inputs-from unchecked name description \
     train: from validation test split config latent-dim method robot paper seed seeds epochs encoder-layers \

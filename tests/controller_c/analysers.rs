@@ -129,8 +129,12 @@ fn headers_are_clean_in_cpp() {
     let emitted = Emitted::new(&shipped("go1-d6"), Precision::Single);
     let name = &emitted.name;
     let caller = format!(
-        "#include \"{name}_controller.h\"\n#include \"{name}_robot.h\"\n\
-         int main() {{ static {name}_controller c; return {name}_controller_init(&c, nullptr); }}\n"
+        "#include \"{name}_controller.h\"\n#include \"{name}_robot.h\"\n#include \"{name}_log.h\"\n\
+         static int put(void *, const char *, size_t) {{ return 0; }}\n\
+         int main() {{ static {name}_controller c; static {name}_log_row rows[2]; {name}_log log;\n\
+         {name}_command command = {{}}; {name}_log_init(&log, rows, 2);\n\
+         {name}_log_add(&log, 0, nullptr, nullptr, nullptr, &command);\n\
+         return {name}_log_write(&log, put, nullptr) + {name}_controller_init(&c, nullptr); }}\n"
     );
     fs::write(emitted.folder().join("caller.cpp"), caller).expect("written");
     let strict = ["-Wall", "-Wextra", "-pedantic", "-Werror"];

@@ -307,14 +307,20 @@ pub(crate) struct PlanArguments {
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  romc report models/go1-d4.json examples/recordings/go1/test_*.csv.gz --output report.html"
+    after_help = "Examples:\n  romc report models/go1-d4.json examples/recordings/go1/test_*.csv.gz --output report.html\n  \
+                  romc report --log log.csv --output log.html"
 )]
 pub(crate) struct ReportArguments {
     /// Model file
-    pub model: PathBuf,
+    #[arg(required_unless_present = "log")]
+    pub model: Option<PathBuf>,
     /// Recordings that the model is compared with
-    #[arg(required = true, value_name = "RECORDING")]
+    #[arg(required_unless_present = "log", value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
+    /// Instead: the log of a generated controller (`NAME_log_write`), its statuses, motion and torques over time
+    #[arg(long, value_name = "FILE.csv")]
+    #[arg(conflicts_with_all = ["model", "recordings", "study", "plan", "restart_every", "tolerance", "columns", "clock"])]
+    pub log: Option<PathBuf>,
     /// The page to write
     #[arg(long, value_name = "FILE.html")]
     pub output: PathBuf,

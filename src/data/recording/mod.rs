@@ -35,6 +35,7 @@ pub(crate) mod clock;
 #[cfg(test)]
 #[path = "../../../tests/recording/clock.rs"]
 mod clock_tests;
+mod controller_log;
 mod decimals;
 mod delays;
 mod error;
@@ -48,6 +49,7 @@ mod write;
 
 pub use self::write::{Notation, WriteOptions, write, write_as, write_mcap, write_to};
 pub use clock::Mended;
+pub use controller_log::{ControllerLog, LogColumn};
 pub use error::{RecordingError, RecordingFault};
 pub use files::{
     Accelerations, ConditionOptions, ImplausibleSamples, RecordingFile, RecordingSet, SmoothedRows,

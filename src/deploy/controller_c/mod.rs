@@ -20,6 +20,7 @@ use crate::files::EmittedFile;
 use crate::mpc::ControlModel;
 use crate::mpc::interface::{Accepts, SETTINGS, Setting};
 use crate::mpc::problem::StageRows;
+use crate::recording::LogColumn;
 use crate::solver::ROW_NUMBERS;
 use source::{Numbers, Source};
 
@@ -43,6 +44,8 @@ struct Facts<'a> {
     /// Whether the model knows what its states say of its inputs, in all phases.
     has_given_state: bool,
     rows: &'a StageRows,
+    /// Names of the columns of a log.
+    log_columns: Vec<String>,
 }
 
 extends! { <'a> Facts<'a>: controller::Facts<'a>, controller }
@@ -51,6 +54,7 @@ templates! {
     #[derive(askama::Template)]
     "NAME_controller.h": Header "controller_c/header.askama",
     "NAME_robot.h": RobotHeader "controller_c/robot.askama",
+    "NAME_log.h": LogHeader "controller_c/log.askama",
     "NAME_example.c": Example "controller_c/example.askama",
     "CMakeLists.txt": Cmake "controller_c/cmake.askama",
     "README.md": Readme "controller_c/readme.askama",
@@ -139,6 +143,9 @@ impl<'a> Facts<'a> {
             n_phases: plant.phases().len(),
             has_given_state: (plant.phases().iter()).all(|phase| phase.given_state.is_some()),
             rows,
+            log_columns: (LogColumn::all(entries.latent_dim).into_iter())
+                .map(LogColumn::name)
+                .collect(),
         }
     }
 }

@@ -97,6 +97,7 @@ pub(crate) fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<
     let title = panel.title.as_str();
     match &panel.drawing {
         Drawing::Lines { series, shaded } => draw_lines(title, (series, shaded), size, x_label),
+        Drawing::Spans { rows, over } => draw_spans(title, (rows, *over), size, x_label),
         Drawing::Heat(map) => draw_heat(title, map, size, x_label),
         Drawing::Sticks(plot) => draw_sticks(title, plot, size),
     }
@@ -105,6 +106,7 @@ pub(crate) fn draw_panel(panel: &Panel, size: (f64, f64), x_label: &str) -> Vec<
 struct Axes {
     x: (f64, f64),
     y: (f64, f64),
+    left: f64,
     right: f64,
     bottom: f64,
 }
@@ -112,7 +114,7 @@ struct Axes {
 impl Axes {
     fn x_at(&self, value: f64) -> f64 {
         let share = (value - self.x.0) / (self.x.1 - self.x.0);
-        LEFT + share * (self.right - LEFT)
+        self.left + share * (self.right - self.left)
     }
 
     fn y_at(&self, value: f64) -> f64 {
@@ -135,6 +137,7 @@ fn draw_lines(
             false => padded(points().map(|point| point.0)),
         },
         y: padded(visible(series)),
+        left: LEFT,
         right: size.0 - RIGHT,
         bottom: size.1 - BOTTOM,
     };
@@ -189,20 +192,57 @@ fn thinned(points: &[(f64, Option<f64>)]) -> Vec<(f64, Option<f64>)> {
 }
 
 fn draw_axes(axes: &Axes, x_label: &str, marks: &mut Vec<Mark>) {
-    let (bottom, right) = (axes.bottom, axes.right);
     for (value, text) in ticks(axes.y) {
         let y = axes.y_at(value);
-        marks.push(Mark::Rule([LEFT, y, right, y], Paint::Grid));
+        marks.push(Mark::Rule([LEFT, y, axes.right, y], Paint::Grid));
         marks.push(Mark::text(LEFT - 4.0, y + 3.0, Anchor::End, text));
     }
+    draw_x_axis(axes, x_label, marks);
+}
+
+fn draw_x_axis(axes: &Axes, x_label: &str, marks: &mut Vec<Mark>) {
+    let (left, bottom, right) = (axes.left, axes.bottom, axes.right);
     for (value, text) in ticks(axes.x) {
         let x = axes.x_at(value);
         marks.push(Mark::Rule([x, bottom, x, bottom + 3.0], Paint::Axis));
         marks.push(Mark::text(x, bottom + 12.0, Anchor::Middle, text));
     }
-    marks.push(Mark::Rule([LEFT, bottom, right, bottom], Paint::Axis));
-    marks.push(Mark::Rule([LEFT, TOP, LEFT, bottom], Paint::Axis));
+    marks.push(Mark::Rule([left, bottom, right, bottom], Paint::Axis));
+    marks.push(Mark::Rule([left, TOP, left, bottom], Paint::Axis));
     marks.push(Mark::text(right, bottom + 22.0, Anchor::End, x_label));
+}
+
+fn draw_spans(
+    title: &str,
+    (rows, over): (&[(String, Vec<(f64, f64)>)], (f64, f64)),
+    size: (f64, f64),
+    x_label: &str,
+) -> Vec<Mark> {
+    const NAMES: f64 = 104.0; // names of statuses, and the same for all figures of a page
+    const THINNEST: f64 = 1.0;
+    let axes = Axes {
+        x: match over.1 > over.0 {
+            true => over,
+            false => padded([over.0].into_iter()),
+        },
+        y: (rows.len() as f64, 0.0),
+        left: NAMES,
+        right: size.0 - RIGHT,
+        bottom: size.1 - BOTTOM,
+    };
+    let mut marks = vec![Mark::text(axes.left, TOP - 6.0, Anchor::Start, title)];
+    for (row, (name, spans)) in rows.iter().enumerate() {
+        let [top, bottom] = [0.2, 0.8].map(|part| axes.y_at(row as f64 + part));
+        let middle = 0.5 * (top + bottom) + 3.0;
+        marks.push(Mark::text(axes.left - 4.0, middle, Anchor::End, name));
+        marks.extend(spans.iter().map(|&(from, to)| {
+            let [from, to] = [from, to].map(|x| axes.x_at(x));
+            let rectangle = [from, top, (to - from).max(THINNEST), bottom - top];
+            Mark::Rectangle(rectangle, Paint::Heat(1.0))
+        }));
+    }
+    draw_x_axis(&axes, x_label, &mut marks);
+    marks
 }
 
 fn draw_heat(title: &str, map: &HeatMap, size: (f64, f64), x_label: &str) -> Vec<Mark> {

@@ -62,6 +62,11 @@ pub(crate) enum Drawing {
         series: Vec<Series>,
         shaded: Vec<(f64, f64)>,
     },
+    /// Ranges of x in named rows, such as the times at which a foot is down.
+    Spans {
+        rows: Vec<(String, Vec<(f64, f64)>)>,
+        over: (f64, f64),
+    },
     Heat(HeatMap),
     Sticks(StickPlot),
 }

@@ -64,6 +64,14 @@ fn csv(figure: &Figure) -> String {
                     }
                 }
             }
+            Drawing::Spans { rows, .. } => {
+                for (name, spans) in rows {
+                    for (from, to) in spans {
+                        row([title, name, &from.to_string(), "1"]);
+                        row([title, name, &to.to_string(), ""]);
+                    }
+                }
+            }
             Drawing::Heat(map) => {
                 let rows = map.values.chunks(map.columns.len().max(1));
                 for (name, values) in map.rows.iter().zip(rows) {
