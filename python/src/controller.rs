@@ -1,60 +1,76 @@
 //! The controller, step by step and along recordings.
 
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use nalgebra::DMatrix;
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use romc::evaluate::{ReferenceInput, StepRow, along_recording};
+use romc::Error;
+use romc::cli::JudgedRuns;
+use romc::evaluate::{ReferenceInput, StepRow, along_recording, control_metrics};
 use romc::limits::table;
-use romc::mpc::{Command, Measurement, MpcError, MpcSettings, ReferenceSamples};
+use romc::model::ReducedModel;
+use romc::mpc::interface::{SETTINGS, Settings, status_text};
+use romc::mpc::{
+    Command, Measurement, MpcError, MpcSettings, ReferenceSamples, Status, words_of_setting,
+};
 use romc::robot::{ContactFlags, FOOT_DIM};
 
 use crate::arrays::into_rows;
-use crate::errors::{bad_reference, choice, count_within, lift, python_error, within};
+use crate::errors::{bad_reference, choice, known_word, python_error, unknown, usage, within};
 use crate::model::Model;
 use crate::recording::{Recording, Segment};
 
-/// Settings of the controller; those not given are the library's.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-pub struct Settings {
-    horizon: usize,
-    step: f64,
-    lift: String,
-    input_weight: Option<f64>,
-    velocity_weight: Option<f64>,
-    max_iterations: Option<u32>,
+/// Settings of the controller by their names in the library's table; those not given are the library's.
+fn settings(py: Python<'_>, given: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<MpcSettings> {
+    let mut settings = Settings::default();
+    for (name, value) in given {
+        let Some(row) = SETTINGS.iter().find(|row| row.name == name) else {
+            let names: Vec<&str> = SETTINGS.iter().map(|row| row.name).collect();
+            return Err(unknown(py, "setting", &name, &names.join(", ")));
+        };
+        let words = words_of_setting(&name);
+        let number = match (value.extract::<f64>(), value.extract::<String>()) {
+            (Ok(number), _) => number,
+            (_, Ok(word)) if !words.is_empty() => known_word(py, &name, &word, &words)? as f64,
+            _ => {
+                let message = format!("{name}: found {}, expected a number", value.repr()?);
+                return Err(usage(py, &message));
+            }
+        };
+        match row.name {
+            "horizon" => within(py, table::HORIZON, number)?,
+            "step_s" => within(py, table::STEP, number)?,
+            _ if row.kind == "i32" && number != f64::from(number as i32) => {
+                let message = format!("{name} is {number}, expected a whole number");
+                return Err(usage(py, &message));
+            }
+            _ => number,
+        };
+        settings.set(&name, number);
+    }
+    let settings = settings.to_mpc();
+    settings.map_err(|error| python_error(py, MpcError::from(error)))
 }
 
-impl Settings {
-    fn settings(&self, py: Python<'_>) -> PyResult<MpcSettings> {
-        let lift = lift(py, &self.lift)?;
-        let mut settings = MpcSettings {
-            horizon: count_within(py, table::HORIZON, self.horizon)?,
-            step_s: within(py, table::STEP, self.step)?,
-            lift,
-            ..MpcSettings::default()
-        };
-        if let Some(weight) = self.input_weight {
-            settings.input_weight = weight;
-        }
-        if let Some(weight) = self.velocity_weight {
-            settings.velocity_weight = weight;
-        }
-        if let Some(iterations) = self.max_iterations {
-            settings.qp.max_iterations = iterations;
-        }
-        Ok(settings)
-    }
+/// Each status in a word, and its meaning.
+#[pyfunction]
+pub fn statuses() -> Vec<(&'static str, String)> {
+    let all = Status::ALL.iter();
+    all.map(|status| {
+        let text = status_text(status.code()).to_string_lossy();
+        let meaning = text.split_once(": ").map_or(&*text, |(_, meaning)| meaning);
+        (status.word(), meaning.to_owned())
+    })
+    .collect()
 }
 
 /// A controller; threads take turns.
 #[pyclass(frozen, module = "romc._romc")]
 pub struct Controller {
     controller: Mutex<romc::mpc::Controller>,
-    phases: Vec<String>,
+    model: Arc<ReducedModel>,
 }
 
 /// What a step returns besides arrays.
@@ -63,6 +79,8 @@ struct StepResult<'py> {
     torque: Bound<'py, PyArray1<f64>>,
     joint_position: Bound<'py, PyArray1<f64>>,
     joint_velocity: Bound<'py, PyArray1<f64>>,
+    stiffness: f64,
+    damping: f64,
     u_lat: Bound<'py, PyArray1<f64>>,
     status: &'static str,
     status_code: i32,
@@ -77,14 +95,32 @@ struct StepResult<'py> {
 #[pymethods]
 impl Controller {
     #[new]
-    fn new(py: Python<'_>, model: &Model, settings: Settings) -> PyResult<Self> {
-        let settings = settings.settings(py)?;
+    fn new(
+        py: Python<'_>,
+        model: &Model,
+        given: Vec<(String, Bound<'_, PyAny>)>,
+    ) -> PyResult<Self> {
+        let settings = settings(py, given)?;
         let made = py.detach(|| romc::mpc::controller(&model.data, settings));
-        let phases = model.data.phases().iter();
         Ok(Controller {
             controller: Mutex::new(made.map_err(|error| python_error(py, error))?),
-            phases: phases.map(|phase| phase.name.clone()).collect(),
+            model: Arc::clone(&model.data),
         })
+    }
+
+    /// Every setting by its name, as a word if it has some.
+    #[getter]
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let dict = PyDict::new(py);
+        let settings = py.detach(|| *self.lock().settings());
+        for (row, number) in SETTINGS.iter().zip(Settings::from(&settings).numbers()) {
+            match words_of_setting(row.name).get(number as usize) {
+                Some(word) => dict.set_item(row.name, word)?,
+                None if row.kind == "i32" => dict.set_item(row.name, number as i32)?,
+                None => dict.set_item(row.name, number)?,
+            }
+        }
+        Ok(dict)
     }
 
     /// Follows a recorded segment, with its inputs within the motors' limits or without any.
@@ -138,6 +174,11 @@ impl Controller {
         taken.map_err(|error| python_error(py, MpcError::from(error)))
     }
 
+    /// Prepares the step at a time.
+    fn prepare(&self, py: Python<'_>, t: f64) {
+        py.detach(|| self.lock().prepare(t));
+    }
+
     /// The command for a measurement. Arrays of the wrong length give a safe command.
     fn step<'py>(
         &self,
@@ -163,12 +204,14 @@ impl Controller {
             torque: PyArray1::from_slice(py, &command.torque_nm),
             joint_position: PyArray1::from_slice(py, &command.joint_position_rad),
             joint_velocity: PyArray1::from_slice(py, &command.joint_velocity_rad_s),
+            stiffness: command.drives.stiffness_nm_rad,
+            damping: command.drives.damping_nm_s_rad,
             u_lat: PyArray1::from_slice(py, &command.u_lat),
             status: command.status.word(),
             status_code: command.status.code(),
             has_plan: command.status.has_plan(),
             source: command.source.word(),
-            phase: command.phase.map(|phase| self.phases[phase].clone()),
+            phase: command.phase.map(|phase| self.phase(phase).to_owned()),
             iterations: command.iterations,
             solve_us: command.solve_us,
             slack: command.slack,
@@ -180,27 +223,37 @@ impl Controller {
         py.detach(|| self.lock().reset());
     }
 
-    /// Runs along a recording; returns the summary as JSON and a dictionary of arrays.
+    /// Runs along a recording; returns what the command line prints, as JSON and as text, and a dictionary of arrays.
     fn along<'py>(
         &self,
         py: Python<'py>,
         recording: &Recording,
         input: &str,
-    ) -> PyResult<(String, Bound<'py, PyDict>)> {
+    ) -> PyResult<(String, String, Bound<'py, PyDict>)> {
         let input: ReferenceInput = choice(py, "reference_input", input)?;
         let recording = &recording.data;
-        let run = py.detach(|| {
+        let made = py.detach(|| -> Result<_, Error> {
             let mut controller = self.lock();
+            let settings = *controller.settings();
             controller.reset();
-            along_recording(&mut controller, recording, input, |_, _| {})
+            let mut run = along_recording(&mut controller, recording, input, |_, _| {})?;
+            drop(controller);
+            run.metrics = Some(control_metrics(&self.model, recording, settings)?);
+            let (runs, rows) = (vec![(recording.path.clone(), run.clone())], run.rows);
+            let judged = JudgedRuns::of(&self.model, std::slice::from_ref(recording), runs)?;
+            Ok((judged, rows))
         });
-        let run = run.map_err(|error| python_error(py, error))?;
-        let summary = serde_json::json!(run.summary).to_string();
-        Ok((summary, self.arrays_of(py, &run.rows)?))
+        let (judged, rows) = made.map_err(|error| python_error(py, error))?;
+        let arrays = self.arrays_of(py, &rows)?;
+        Ok((judged.json().to_string(), judged.text(), arrays))
     }
 }
 
 impl Controller {
+    fn phase(&self, index: usize) -> &str {
+        &self.model.phases()[index].name
+    }
+
     /// The controller; after a panic in a step it begins anew, as its plan may contradict itself.
     fn lock(&self) -> MutexGuard<'_, romc::mpc::Controller> {
         self.controller.lock().unwrap_or_else(|poisoned| {
@@ -223,7 +276,7 @@ impl Controller {
         let words: Vec<&str> = rows.iter().map(|row| row.command.status.word()).collect();
         let phases = rows
             .iter()
-            .map(|row| row.command.phase.map(|phase| self.phases[phase].as_str()));
+            .map(|row| row.command.phase.map(|phase| self.phase(phase)));
         dict.set_item(
             "segment",
             PyArray1::from_iter(py, rows.iter().map(|r| r.segment as i64)),

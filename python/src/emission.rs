@@ -10,9 +10,10 @@ use romc::deploy::{self, EmitOptions, Target};
 use romc::equations::Equations;
 use romc::files::{EmittedFile, Overwrite};
 use romc::limits::table;
+use romc::model::CandidateTerm;
 use romc::typeset::latex::tex_cases;
 use romc::typeset::words;
-use romc::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset};
+use romc::typeset::{Decimal, NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset};
 
 use crate::errors::{choice, count_within, python_error, within};
 use crate::model::Model;
@@ -111,8 +112,8 @@ pub struct PhaseText {
     feet: String,
     /// A `cases` environment.
     latex: String,
-    /// Coefficient and term of each summand of each acceleration.
-    terms: Vec<Vec<(f64, String)>>,
+    /// Coefficient, its digits in print and term of each summand of each acceleration.
+    terms: Vec<Vec<(f64, String, String)>>,
 }
 
 /// Path and text of each file of the targets.
@@ -146,6 +147,11 @@ pub fn equations(
         let equations = emission.equations(model)?;
         let print = &emission.options.print;
         let typeset = Typeset::new(&equations, &print.symbols, print.rounding);
+        // Text is read back: it has all digits unless some are asked for.
+        let in_text = match print.rounding {
+            Rounding::Adaptive => Rounding::Exact,
+            rounding => rounding,
+        };
         let width_em = print.width_em.unwrap_or(NOTEBOOK_EM);
         let phases = typeset.systems.iter().zip(&equations.phases);
         let phases = phases
@@ -153,7 +159,11 @@ pub fn equations(
             .map(|((system, phase), rule)| {
                 let summands = |output| {
                     let summands = phase.summands(&equations, output);
-                    summands.map(|(xi, term)| (xi, term.text.clone())).collect()
+                    let summand = |(xi, term): (f64, &CandidateTerm)| {
+                        let digits = Decimal::rounded(xi, in_text).to_string();
+                        (xi, digits, term.text.clone())
+                    };
+                    summands.map(summand).collect()
                 };
                 PhaseText {
                     name: phase.name.clone(),
@@ -180,7 +190,7 @@ pub fn write_files(
     let files: Vec<_> = files
         .map(|(path, text)| EmittedFile::new(path, text))
         .collect();
-    let overwrite = Overwrite::when_forced(force);
+    let overwrite = Overwrite::from(force);
     let written = py.detach(|| romc::files::write_files(&folder, &files, overwrite));
     written.map_err(|error| python_error(py, error))
 }

@@ -15,7 +15,7 @@ use romc::files::{Fault as FileFault, Place};
 use romc::limits::{OutOfRange, Range};
 use romc::lower::LowerError;
 use romc::model::ModelError;
-use romc::mpc::{ControlError, LIFTS, Lift, MpcError};
+use romc::mpc::{ControlError, MpcError};
 use romc::plan::PlanError;
 use romc::recording::RecordingError;
 use romc::robot::WrenchFrame;
@@ -323,18 +323,14 @@ pub fn choice<T: clap::ValueEnum>(py: Python<'_>, option: &str, name: &str) -> P
     })
 }
 
-/// The controller's lift, by its name on the command line.
-pub fn lift(py: Python<'_>, name: &str) -> PyResult<Lift> {
-    let found = LIFTS
-        .iter()
-        .find(|(known, ..)| known.eq_ignore_ascii_case(name));
-    found.map(|(_, _, lift)| *lift).ok_or_else(|| {
-        let names = LIFTS.map(|(known, ..)| known).join(", ");
-        unknown(py, "lift", name, &names)
-    })
+/// The place of a word among those that an option has.
+pub fn known_word(py: Python<'_>, option: &str, word: &str, known: &[&str]) -> PyResult<usize> {
+    let mut all = known.iter();
+    let place = all.position(|known| known.eq_ignore_ascii_case(word));
+    place.ok_or_else(|| unknown(py, option, word, &known.join(", ")))
 }
 
-fn unknown(py: Python<'_>, option: &str, name: &str, expected: &str) -> PyErr {
+pub fn unknown(py: Python<'_>, option: &str, name: &str, expected: &str) -> PyErr {
     usage(
         py,
         &format!("{option}: found {name:?}, expected one of {expected}"),

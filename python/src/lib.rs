@@ -34,6 +34,7 @@ fn _romc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::Recording>()?;
     module.add_class::<recording::Segment>()?;
     for function in [
+        wrap_pyfunction!(controller::statuses, module)?,
         wrap_pyfunction!(emission::emit, module)?,
         wrap_pyfunction!(emission::equations, module)?,
         wrap_pyfunction!(emission::write_files, module)?,

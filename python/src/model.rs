@@ -116,7 +116,7 @@ impl Model {
     }
 
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
-        let overwrite = Overwrite::when_forced(force);
+        let overwrite = Overwrite::from(force);
         let written = py.detach(|| artifact::write(&path, &self.data, overwrite));
         written.map_err(|error| python_error(py, error))
     }

@@ -64,7 +64,7 @@ impl Recording {
     /// Writes the format of recordings; an existing file only if forced.
     fn save(&self, py: Python<'_>, path: PathBuf, force: bool) -> PyResult<()> {
         let written = py.detach(|| {
-            let (options, overwrite) = (WriteOptions::default(), Overwrite::when_forced(force));
+            let (options, overwrite) = (WriteOptions::default(), Overwrite::from(force));
             let written = write_as(&path, &self.data, None, &options, overwrite);
             written.map_err(|error| match &error.kind {
                 RecordingFault::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {

@@ -51,6 +51,8 @@ def test_latex_is_the_file_for_papers(model, tmp_path):
     equations = model.equations(significant=3)
     [path] = [path for path in model.compile("latex", tmp_path, significant=3) if path.name == "go1_d4.tex"]
     assert equations.latex() == path.read_text()
+    assert "ddz1 = -0.596*dz1 - 0.581*dz2 + 1.53*u1\n" in str(equations)
+    assert equations.terms("contact")[0][2] == (pytest.approx(1.532, abs=1e-3), "u1")
     assert equations.markdown().startswith("<!-- romc")
 
 

@@ -359,7 +359,7 @@ def test_order_of_the_terms_is_stated_or_asked_for():
 def test_arguments_that_are_missing_are_named_with_a_remedy():
     with pytest.raises(romc.ModelError, match="no candidate terms for `xi.contact`") as caught:
         romc.Model.from_arrays(xi={"contact": np.ones((7, 2))})
-    assert 'library="degree=1,inputs"' in str(caught.value)
+    assert 'library=[...], the list of terms; for this shape perhaps library="degree=1,inputs"' in str(caught.value)
     with pytest.raises(romc.ModelError, match="no tensor for xi.PHASE"):
         romc.Model.from_arrays(library=romc.Library())
 

@@ -1,6 +1,7 @@
 """Rollouts and the controller, compared with the command line bit for bit."""
 
 import csv
+import json
 import threading
 import time
 
@@ -67,9 +68,11 @@ def test_controller_along_a_recording_is_that_of_the_command_line(
     answer = command_line.json("mpc", MODELS / "go1-d4.json", PATHS[0], *arguments)
     run = romc.Controller(model, lift=lift).along(PATHS[0], reference_input)
     [expected] = answer["runs"]
-    # The command line's other figures leave the recorded input out, so that they show what the model is worth.
-    counts = ["steps", "solved", "softened", "failed", "limit_violations", "friction_violations"]
-    assert {key: run.summary[key] for key in counts} == {key: expected[key] for key in counts}
+    expected.update(verdict=answer["verdict"], remarks=answer["remarks"], failures=answer["failed"])
+    untimed = expected.keys() - {"recording", "step_us", "prepare_us"}
+    assert run.summary.keys() == expected.keys()
+    assert {key: run.summary[key] for key in untimed} == {key: expected[key] for key in untimed}
+    assert run.summary["verdict"]["failed"] == [] and "FAILED" not in str(run)
     columns = table(tmp_path / "mpc.csv")
     torques = np.array([column for name, column in columns.items() if name.endswith(" torque")]).T
     assert np.array_equal(run.torque, torques)
@@ -97,6 +100,20 @@ def test_reference_of_arrays_is_that_of_the_recording(model, jump):
     assert one.status == "solved" and np.array_equal(one.torque, other.torque)
 
 
+def test_torques_of_a_reference_make_its_input_as_those_of_a_recording_do(model, jump):
+    arrays = {"t": jump.t, "x": jump.x, "dx": jump.dx, "torque": jump.torque, "feet": jump.feet}
+    recording = romc.Recording.from_arrays(**arrays)
+    inputs = {"t": jump.t, "x": jump.x, "dx": jump.dx, "u": recording.inputs(model), "feet": jump.feet}
+    references = [{"reference": recording}, arrays, inputs]
+    controllers = [romc.Controller(model).set_reference(**reference) for reference in references]
+    torques = [of.step(jump.t[40], jump.x[40], jump.dx[40], jump.feet[40]).torque for of in controllers]
+    assert np.array_equal(torques[0], torques[1]) and np.array_equal(torques[0], torques[2])
+    with pytest.raises(romc.RecordingError, match="`torque`: found `u` too"):
+        romc.Controller(model).set_reference(**inputs, torque=jump.torque)
+    with pytest.raises(romc.RecordingError, match="`torque`"):
+        romc.Controller(model).set_reference(**{**arrays, "torque": jump.torque[:, :11]})
+
+
 def test_settings_reach_the_controller(model, jump):
     def torque(**settings):
         controller = romc.Controller(model, **settings).set_reference(jump)
@@ -115,8 +132,72 @@ def test_settings_reach_the_controller(model, jump):
             romc.Controller(model, step=step)
     with pytest.raises(romc.RomcError, match="restart_every is 1e-300, expected a number from 1e-3 to 1e4"):
         model.simulate(PATHS, restart_every=1e-300)
-    with pytest.raises(romc.RomcError, match="lift: found \"up\", expected one of transpose, consistent"):
-        romc.Controller(model, lift="up")
+
+
+def test_failures_are_printed_as_the_command_line_prints_them(model, command_line, tmp_path):
+    wrong = model.to_dict()
+    for phase in wrong["phases"]:
+        phase["xi"] = (-np.array(phase["xi"])).tolist()
+    (tmp_path / "wrong.json").write_text(json.dumps(wrong))
+    printed = command_line.run("mpc", "wrong.json", PATHS[0]).stdout.splitlines()
+    run = romc.Controller(romc.Model.load(tmp_path / "wrong.json")).along(PATHS[0])
+    shown = str(run).splitlines()
+    verdict = next(place for place, line in enumerate(shown) if line.startswith(("FAILED", "verdict")))
+    assert any(line.startswith("FAILED along test_01") for line in shown)
+    assert any(line.startswith("FAILED control") for line in shown)
+    assert [line for line in shown[verdict:] if line not in printed] == []
+    assert "control" in run.summary["verdict"]["failed"] and run.summary["failure"]
+
+
+def test_settings_are_those_of_the_table(model, jump):
+    settings = romc.Controller(model).settings
+    assert (settings["horizon"], settings["step_s"], settings["lift"]) == (20, 0.01, "transpose")
+    others = {"solver": "riccati", "after_end": "damp", "linearisation": "last_plan", "body_friction": 0.5, "horizon": 9}
+    others.update(tilt_rad=float("inf"), frozen_steps=0, drive_stiffness_nm_rad=30.0)
+    controller = romc.Controller(model, **others)
+    assert controller.settings == {**settings, **others}
+    assert romc.Controller(model, **controller.settings).settings == controller.settings
+    assert romc.Controller(model, lift=1, after_end=2).settings["after_end"] == "stop"
+    for name, value, message in [
+        ("lift", "up", 'lift: found "up", expected one of transpose, consistent'),
+        ("after_end", "now", 'after_end: found "now", expected one of hold, damp, stop'),
+        ("after_end", 3, "setting `after_end` is 3, expected 0 .hold., 1 .damp. or 2 .stop."),
+        ("tilt_rad", -1.0, "setting `tilt_rad` is -1, expected a positive number or infinity"),
+        ("tilt_rad", "far", "tilt_rad: found 'far', expected a number"),
+        ("frozen_steps", 1.5, "frozen_steps is 1.5, expected a whole number"),
+        ("tilt", 0.5, 'setting: found "tilt", expected one of horizon, .*, tilt_rad, '),
+        ("step_s", 0.02, "step: found step_s too, expected one of them"),
+    ]:
+        with pytest.raises(romc.RomcError, match=message):
+            romc.Controller(model, **{name: value, "step": 0.01})
+
+
+def test_bounds_and_the_end_reach_the_command(model, jump):
+    def last(x=jump.x[40], t=jump.t[40], **settings):
+        controller = romc.Controller(model, clock_gap_s=float("inf"), **settings).set_reference(jump)
+        controller.step(t, x, jump.dx[40], jump.feet[40])
+        return controller.step(t + 0.03, x, jump.dx[40], jump.feet[40])
+
+    tilted = np.array(jump.x[40])
+    tilted[16] += 0.7
+    assert last(tilted).source == "damping" and last(tilted).status in ("not_at_start", "tilt")
+    assert last(tilted, tilt_rad=float("inf")).source != "damping"
+    assert set(romc.STATUSES) >= {"solved", "ended", "tilt", "poor_steps", "no_reference"}
+    assert romc.STATUSES["tilt"].endswith("damping until reset")
+    ends = {end: last(t=jump.t[-1] + 1.0, after_end=end) for end in ("hold", "damp", "stop")}
+    assert ends["hold"].status != "ended" and ends["hold"].stiffness == 20.0 and ends["hold"].damping == 0.8
+    for end in ("damp", "stop"):
+        assert ends[end].status == "ended" and ends[end].stiffness < 20.0, end
+
+
+def test_prepared_step_gives_the_same_command(model, jump):
+    commands = []
+    for is_prepared in (False, True):
+        controller = romc.Controller(model, solver="riccati").set_reference(jump)
+        if is_prepared:
+            controller.prepare(jump.t[40])
+        commands.append(controller.step(jump.t[40], jump.x[40], jump.dx[40], jump.feet[40]))
+    assert np.array_equal(commands[0].torque, commands[1].torque) and commands[1].has_plan
 
 
 def test_measurement_that_makes_no_sense_gets_a_safe_command(model, jump):

@@ -2,7 +2,7 @@
 
 use super::number::exact_sum;
 use super::power::half_integer;
-use crate::{Exponent, ExprId, ExprPool, Node, Number};
+use super::*;
 
 /// Bound on passes over operands that become flat only after collecting: each removes a level, two or three suffice.
 const MAX_PASSES: usize = 64;
@@ -17,12 +17,10 @@ impl ExprPool {
         self.constant(number)
     }
 
-    /// The exact integer `value`.
     pub fn integer(&mut self, value: i64) -> ExprId {
         self.constant(Number::integer(value))
     }
 
-    /// A constant from a [`Number`].
     pub fn constant(&mut self, number: Number) -> ExprId {
         let number = match self.is_exact {
             true => half_integer(number),
@@ -31,7 +29,6 @@ impl ExprPool {
         self.intern(Node::Number(number))
     }
 
-    /// `a + b`.
     pub fn add(&mut self, a: ExprId, b: ExprId) -> ExprId {
         self.sum(&[a, b])
     }
@@ -51,7 +48,6 @@ impl ExprPool {
         if condition { self.neg(a) } else { a }
     }
 
-    /// `a * b`.
     pub fn mul(&mut self, a: ExprId, b: ExprId) -> ExprId {
         self.product(&[a, b])
     }

@@ -10,7 +10,7 @@
 //! | 1 | a whole number before a term of an argument |
 //! | 1 | a symbol, a power, a fraction bar, a digit of a coefficient (at most three) |
 
-use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number};
+use super::*;
 
 /// Of an added term, and of one inside a function's argument.
 const TERM: u64 = 4;

@@ -2,13 +2,12 @@
 //! Canonical forms would forget them (`0*log(z)` is 0 wherever it has a value), so each is checked when it is read.
 //! `0^0` is 1, as in floating point; powers that are not integers have values for bases from zero on only.
 
-use crate::{CanonicalForms, ExprId, ExprPool, Function, IdMap, Interval, SymbolId};
+use super::*;
 
 /// Largest constant, in nodes, of which it is proven that it is zero.
 const MAX_PROOF: usize = 300;
 const SMALL: f64 = 1e-6;
 
-/// An expression that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reading {
     /// The expression in canonical form.

@@ -1,6 +1,6 @@
 //! Derivatives, memoised per expression and symbol.
 
-use crate::{Exponent, ExprId, ExprPool, Function, IdSet, Node, SymbolId};
+use super::*;
 
 impl ExprPool {
     /// The derivative of `expr` by `symbol`, where `d|x| = sign(x) dx` and `d sign(x) = 0`, which hold except at zero.

@@ -1,8 +1,6 @@
 //! Prints expressions in the grammar they are read from.
 
-use std::fmt;
-
-use crate::{Exponent, ExprId, ExprPool, Node, Number};
+use super::*;
 
 /// The text of an expression; made by [`ExprPool::display`].
 pub struct Display<'p> {

@@ -1,8 +1,6 @@
 //! Identities of the factors of a product: a table of those of two factors, and what magnitudes and signs share.
 
-use std::sync::Arc;
-
-use crate::{ExprId, ExprPool, Function, Node, Number, SymbolId};
+use super::*;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {

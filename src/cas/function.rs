@@ -1,12 +1,9 @@
 //! The elementary functions, each a row of a table.
 
-use std::fmt;
-
-use crate::{ExprId, ExprPool, Interval, Number};
+use super::*;
 
 /// The elementary functions. Arguments are real, in radians where they are angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[allow(missing_docs, reason = "the names say it")]
 pub enum Function {
     Sin,
     Cos,
@@ -154,7 +151,6 @@ impl Function {
         &ROWS[self as usize]
     }
 
-    /// The name in the term grammar.
     pub fn name(self) -> &'static str {
         self.row().names[0]
     }

@@ -2,11 +2,9 @@
 //! or `p - t`, sums of terms `c t^r` for small positive `t`, with expressions at the point as coefficients and real
 //! exponents (Puiseux series). `sqrt(abs(x))*sin(x)` at 0 is `t^(3/2) - ...`; smooth expressions have Taylor series.
 
-use std::cmp::Ordering;
-
 use super::series::Series;
 use super::slope::Facts;
-use crate::{ExprId, ExprPool, Function, IdMap, Node, Number, SymbolId};
+use super::*;
 
 pub(super) const LAST_ORDER: i64 = 8;
 

@@ -2,10 +2,8 @@
 //! Sums, products, quotients and square roots err outward by a unit in the last place at most; elementary functions by
 //! a few, more than the error of any current mathematical library.
 
-use std::fmt;
-
 use super::number::power;
-use crate::Function;
+use super::*;
 
 /// Arguments beyond this are not reduced: sines of them are only known to lie in `[-1, 1]`.
 const LARGEST_ANGLE: f64 = 1e9;
@@ -55,12 +53,10 @@ impl Interval {
         self.hi
     }
 
-    /// Whether there are no points.
     pub fn is_empty(self) -> bool {
         self.lo > self.hi
     }
 
-    /// Whether `value` lies inside.
     pub fn contains(self, value: f64) -> bool {
         self.lo <= value && value <= self.hi
     }
@@ -93,7 +89,6 @@ impl Interval {
         Interval::between(self.lo.min(other.lo), self.hi.max(other.hi))
     }
 
-    /// The points that lie in both.
     pub fn intersection(self, other: Interval) -> Interval {
         Interval::new(self.lo.max(other.lo), self.hi.min(other.hi))
     }

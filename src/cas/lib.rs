@@ -31,6 +31,7 @@
 //! assert_eq!(pool.evaluate(slope, &|_| 0.0), -0.91);
 //! # Ok::<(), romc::symbolic::ParseError>(())
 //! ```
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
 
 mod build;
 mod canonical;
@@ -66,7 +67,6 @@ pub use canonical::{
     polynomial::{CanonicalForm, Coefficient},
 };
 pub use defined::Reading;
-pub use display::Display;
 
 pub use function::Function;
 pub use interval::Interval;
@@ -78,6 +78,14 @@ pub use shorten::search::{Shortened, Shortener};
 pub use values::integer_power;
 
 // Names that most files use.
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::fmt;
+use std::sync::Arc;
+
+use defined::Guards;
+use germ::{Germs, LAST_ORDER, Stop};
 use node::{IdMap, IdSet};
+use num_integer::{Integer, Roots};
 use order::Exponent;
 use pool::Sign;

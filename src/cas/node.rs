@@ -1,9 +1,6 @@
 //! What an expression is made of, and maps of expressions.
 
-use std::collections::{HashMap, HashSet};
-use std::sync::Arc;
-
-use crate::{Function, Number};
+use super::*;
 
 /// A canonical expression of one [`ExprPool`](super::ExprPool): structurally equal exactly if the ids are equal.
 /// Children have smaller ids than parents; sort by [`ExprPool::compare`](super::ExprPool::compare), not by ids.
@@ -35,9 +32,7 @@ impl SymbolId {
 /// One level of a canonical expression; see [`ExprPool`](super::ExprPool) for the invariants.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Node {
-    /// A constant.
     Number(Number),
-    /// A variable.
     Symbol(SymbolId),
     /// Two or more terms `coefficient * rest`, sorted, with distinct rests; never a sum itself.
     Sum(Arc<[ExprId]>),
@@ -45,7 +40,6 @@ pub enum Node {
     Product(Arc<[ExprId]>),
     /// Base and exponent; the exponent is neither 0 nor 1.
     Power(ExprId, ExprId),
-    /// A function of one argument.
     Apply(Function, ExprId),
 }
 

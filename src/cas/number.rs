@@ -5,10 +5,7 @@
 //! integer powers as multiplication chains), so that results are the same on every machine. An operation whose result
 //! would be infinite, undefined or denormal is refused ([`None`]) and stays symbolic.
 
-use std::cmp::Ordering;
-use std::fmt;
-
-use num_integer::{Integer, Roots};
+use super::*;
 
 /// Largest magnitude below which every integer is a float: `2^53`.
 const EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
@@ -29,9 +26,7 @@ enum Repr {
 }
 
 impl Number {
-    /// The exact `0`.
     pub const ZERO: Number = Number::integer(0);
-    /// The exact `1`.
     pub const ONE: Number = Number::integer(1);
     pub(crate) const MINUS_ONE: Number = Number::integer(-1);
     pub(crate) const HALF: Number = Number(Repr::Rational(1, 2));
@@ -93,12 +88,10 @@ impl Number {
         self == Number::ZERO
     }
 
-    /// Whether this is one.
     pub fn is_one(self) -> bool {
         self == Number::ONE
     }
 
-    /// Whether the value is below zero.
     pub fn is_negative(self) -> bool {
         match self.0 {
             Repr::Rational(numerator, _) => numerator < 0,
@@ -119,7 +112,6 @@ impl Number {
         Some([a, b, c, d].map(i128::from))
     }
 
-    /// The value if it is an exact integer.
     pub fn as_integer(self) -> Option<i64> {
         match self.as_rational() {
             Some((numerator, 1)) => Some(numerator),
@@ -131,7 +123,6 @@ impl Number {
         self.as_integer().is_some_and(|value| value % 2 == 0)
     }
 
-    /// The magnitude.
     pub fn abs(self) -> Number {
         if self.is_negative() { -self } else { self }
     }

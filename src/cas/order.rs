@@ -2,10 +2,9 @@
 //! polynomial terms by degree (`z1`, `z2`, `dz1`, `z1^2`, `z1*z2`, ...), then everything else (`sin(z1)`, ...), as in a
 //! library of candidate terms. Coefficients do not matter, so that a term keeps its place when its sign changes.
 
-use std::cmp::Ordering;
 use std::ops::ControlFlow;
 
-use crate::{ExprId, ExprPool, Function, Node, Number};
+use super::*;
 
 /// Grades from here on are not polynomial.
 const NOT_POLYNOMIAL: u32 = 1 << 31;

@@ -11,8 +11,9 @@
 //! `^` binds to the right and more tightly than a sign: `-x^2 = -(x^2)`. Each rule is a function; nesting is limited.
 //! Chains of sums and products are handed over whole, so time is near linear in the length of the text.
 
-use super::defined::{Guards, Reading};
-use crate::{Exponent, ExprId, ExprPool, Function, Number};
+use super::*;
+
+type Result<T, E = ParseError> = std::result::Result<T, E>;
 
 /// Longest text, in bytes.
 const MAX_LENGTH: usize = 65_536;
@@ -35,7 +36,6 @@ pub struct ParseError {
 
 /// The fault at a place of a text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum ParseErrorKind {
     #[error("found `{}`, expected {}", .0.escape_debug(), spelling(*.0))]
     Character(char),
@@ -95,11 +95,7 @@ impl ExprPool {
     ///
     /// # Errors
     /// [`ParseError`] with the position, what was found and what was expected.
-    pub fn parse(
-        &mut self,
-        text: &str,
-        allowed: &dyn Fn(&str) -> bool,
-    ) -> Result<ExprId, ParseError> {
+    pub fn parse(&mut self, text: &str, allowed: &dyn Fn(&str) -> bool) -> Result<ExprId> {
         Parser::of(self, text, allowed, &|_, _| None)?.expression(TokenKind::End)
     }
 
@@ -113,7 +109,7 @@ impl ExprPool {
         text: &str,
         allowed: &dyn Fn(&str) -> bool,
         literal: &dyn Fn(&mut ExprPool, &str) -> Option<ExprId>,
-    ) -> Result<Reading, ParseError> {
+    ) -> Result<Reading> {
         let mut parser = Parser::of(self, text, allowed, literal)?;
         parser.needs_values = true;
         Ok(Reading {
@@ -143,7 +139,7 @@ impl<'p> Parser<'p> {
         text: &'p str,
         allowed: &'p dyn Fn(&str) -> bool,
         literal: Literal<'p>,
-    ) -> Result<Self, ParseError> {
+    ) -> Result<Self> {
         if text.len() > MAX_LENGTH {
             let (found, limit) = (text.len(), MAX_LENGTH);
             return Err(ParseErrorKind::TooLong { found, limit }.at(text, 0));
@@ -171,7 +167,7 @@ impl<'p> Parser<'p> {
     }
 
     /// A sum of terms up to a closing parenthesis or the end, which is read too.
-    fn expression(&mut self, end: TokenKind) -> Result<ExprId, ParseError> {
+    fn expression(&mut self, end: TokenKind) -> Result<ExprId> {
         let (mut terms, mut is_subtracted) = (Vec::new(), false);
         loop {
             let term = self.term()?;
@@ -189,7 +185,7 @@ impl<'p> Parser<'p> {
         }
     }
 
-    fn term(&mut self) -> Result<ExprId, ParseError> {
+    fn term(&mut self) -> Result<ExprId> {
         let start = self.peek().start;
         let mut factors = vec![self.signed(start)?];
         loop {
@@ -210,7 +206,7 @@ impl<'p> Parser<'p> {
         }
     }
 
-    fn signed(&mut self, start: usize) -> Result<ExprId, ParseError> {
+    fn signed(&mut self, start: usize) -> Result<ExprId> {
         let mut is_negative = false;
         while let TokenKind::Sign(sign @ ('+' | '-')) = self.peek().kind {
             self.next += 1;
@@ -228,7 +224,7 @@ impl<'p> Parser<'p> {
         Ok(self.pool.negated_if(is_negative, value))
     }
 
-    fn atom(&mut self) -> Result<ExprId, ParseError> {
+    fn atom(&mut self) -> Result<ExprId> {
         let token = self.token();
         match token.kind {
             TokenKind::Number(number) => {
@@ -241,7 +237,7 @@ impl<'p> Parser<'p> {
         }
     }
 
-    fn name(&mut self, token: Token<'p>) -> Result<ExprId, ParseError> {
+    fn name(&mut self, token: Token<'p>) -> Result<ExprId> {
         let (name, after) = (token.text, self.peek());
         let is_called = after.kind == TokenKind::Sign('(');
         let refused = match Function::by_name(name) {
@@ -262,14 +258,14 @@ impl<'p> Parser<'p> {
     }
 
     /// What stands between parentheses; the first is read, and is reported with `opener` if it is one too many.
-    fn parenthesis(&mut self, opener: Token<'p>) -> Result<ExprId, ParseError> {
+    fn parenthesis(&mut self, opener: Token<'p>) -> Result<ExprId> {
         self.deepen(opener)?;
         let expr = self.expression(TokenKind::Sign(')'))?;
         self.depth -= 1;
         Ok(expr)
     }
 
-    fn deepen(&mut self, token: Token) -> Result<(), ParseError> {
+    fn deepen(&mut self, token: Token) -> Result<()> {
         self.depth += 1;
         if self.depth > MAX_DEPTH {
             return Err(ParseErrorKind::TooDeep(MAX_DEPTH).at(self.text, token.start));
@@ -282,7 +278,7 @@ impl<'p> Parser<'p> {
         &mut self,
         start: usize,
         has_value: impl FnOnce(&mut Guards, &mut ExprPool) -> bool,
-    ) -> Result<(), ParseError> {
+    ) -> Result<()> {
         let end = self.peek().start;
         if !self.needs_values || has_value(&mut self.guards, self.pool) {
             return Ok(());
@@ -291,12 +287,7 @@ impl<'p> Parser<'p> {
         Err(ParseErrorKind::NoValue(short(found)).at(self.text, start))
     }
 
-    fn checked_pow(
-        &mut self,
-        base: ExprId,
-        exponent: ExprId,
-        start: usize,
-    ) -> Result<ExprId, ParseError> {
+    fn checked_pow(&mut self, base: ExprId, exponent: ExprId, start: usize) -> Result<ExprId> {
         let (text, limit, after) = (self.text, MAX_EXPONENT, self.peek().start);
         let too_large = |found: Number| {
             if found.to_f64().abs() > f64::from(limit) {
@@ -327,7 +318,6 @@ impl<'p> Parser<'p> {
     }
 }
 
-/// A token and the byte at which it starts.
 #[derive(Clone, Copy)]
 struct Token<'a> {
     kind: TokenKind,
@@ -345,7 +335,7 @@ enum TokenKind {
 }
 
 /// All tokens, [`TokenKind::End`] last. Characters outside the grammar are found here, before anything is built.
-fn tokenize(text: &str) -> Result<Vec<Token<'_>>, ParseError> {
+fn tokenize(text: &str) -> Result<Vec<Token<'_>>> {
     let mut tokens = Vec::new();
     let mut start = 0;
     while let Some(first) = text[start..].chars().next() {

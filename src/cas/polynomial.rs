@@ -1,12 +1,8 @@
 //! Sums as polynomials in powers of common bases: common denominators, exact division, perfect powers.
 
-use std::collections::BTreeMap;
-
-use num_integer::Integer;
-
 use super::region::{Terms, WIDE};
 use super::rules::common_unit;
-use crate::{Exponent, ExprId, ExprPool, Function, Node, Number};
+use super::*;
 
 const MAX_STEPS: usize = 500;
 /// Largest exponent of a monomial, in units of its base.

@@ -1,13 +1,10 @@
 //! The pool that owns all expressions: storage, symbols and traversal.
 
-use std::collections::{BTreeSet, HashMap};
-use std::sync::Arc;
-
 use super::factors::Identity;
 use super::node::BuildIdHasher;
 use super::order::SymbolKey;
 use super::slope::Slope;
-use crate::{Coefficient, ExprId, Function, IdSet, Node, Number, SymbolId};
+use super::*;
 
 /// Owner of hash-consed, canonical expressions, made only by constructors ([`sum`](ExprPool::sum),
 /// [`product`](ExprPool::product), [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and what is built on them) with
@@ -192,18 +189,15 @@ impl ExprPool {
         id
     }
 
-    /// The variable of that name as an expression.
     pub fn symbol(&mut self, name: &str) -> ExprId {
         let id = self.symbol_id(name);
         self.symbol_expr(id)
     }
 
-    /// A variable as an expression.
     pub fn symbol_expr(&self, symbol: SymbolId) -> ExprId {
         self.symbols[symbol.index()].expr
     }
 
-    /// The name of a variable.
     pub fn symbol_name(&self, symbol: SymbolId) -> &str {
         &self.symbols[symbol.index()].key.name
     }
@@ -217,7 +211,6 @@ impl ExprPool {
         &self.nodes[expr.index()]
     }
 
-    /// The value of a constant number.
     pub fn as_number(&self, expr: ExprId) -> Option<Number> {
         match self.node(expr) {
             Node::Number(number) => Some(*number),
@@ -230,7 +223,6 @@ impl ExprPool {
         self.as_number(expr)?.as_integer()
     }
 
-    /// The variable that `expr` is.
     pub fn as_symbol(&self, expr: ExprId) -> Option<SymbolId> {
         match self.node(expr) {
             Node::Symbol(symbol) => Some(*symbol),
@@ -330,13 +322,11 @@ impl ExprPool {
         found
     }
 
-    /// The variables that occur in an expression.
     pub fn symbols_of(&self, expr: ExprId) -> BTreeSet<SymbolId> {
         let varying = self.walk(&[expr], |node| !self.is_constant(node), |_| true);
         (varying.into_iter().filter_map(|node| self.as_symbol(node))).collect()
     }
 
-    /// Whether no variable occurs.
     pub fn is_constant(&self, expr: ExprId) -> bool {
         self.facts[expr.index()].symbols == 0
     }

@@ -1,15 +1,12 @@
 //! Canonical constructors of powers and functions.
 
-use num_integer::Integer;
-
 use super::function::Parity;
-use crate::{Exponent, ExprId, ExprPool, Function, Node, Number, Sign};
+use super::*;
 
 /// Trial divisors for square factors under a root: `sqrt(8) = 2*sqrt(2)`.
 const SQUARE_FACTOR_LIMIT: i64 = 1_000;
 
 impl ExprPool {
-    /// `base ^ exponent` for an integer exponent.
     pub(crate) fn powi(&mut self, base: ExprId, exponent: i32) -> ExprId {
         self.pow_number(base, Number::integer(i64::from(exponent)))
     }

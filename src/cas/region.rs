@@ -2,7 +2,7 @@
 //! expression through sums, products and integer powers. Function calls and other powers are its atoms; their arguments
 //! are regions of their own.
 
-use crate::{Exponent, ExprId, ExprPool, Function, IdMap, Node, Number, SymbolId};
+use super::*;
 
 #[derive(Clone, Copy)]
 pub(super) struct Limits {

@@ -17,7 +17,7 @@
 //! | `(exp(a) - exp(b))/(exp(a) + exp(b))` | `tanh((a - b)/2)` |
 
 use super::factors::Stage;
-use crate::{Exponent, ExprId, ExprPool, Function, Node, Number};
+use super::*;
 
 /// Largest power that merging logarithms may create, and most parts of a number that are tried as unit.
 const MAX_LOG_POWER: i64 = 4;

@@ -1,9 +1,6 @@
 //! Arithmetic of series with terms `c t^r`, whose coefficients and exponents are expressions.
 
-use std::cmp::Ordering;
-
-use super::germ::{Germs, LAST_ORDER, Stop};
-use crate::{ExprId, ExprPool, Number};
+use super::*;
 
 /// Differences of exponents that count as zero: 0.1 + 0.9 and 1 are the same.
 const SAME_EXPONENT: f64 = 1e-12;

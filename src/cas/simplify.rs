@@ -7,7 +7,7 @@
 //! [`ExprPool`]); no term is dropped for being small.
 
 use super::cost::Costs;
-use crate::{CanonicalForms, Exponent, ExprId, ExprPool, Function, Node};
+use super::*;
 
 /// Most angles whose squares are tried both as sines and as cosines.
 const MAX_CHOICES: usize = 4;

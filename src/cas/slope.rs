@@ -5,10 +5,7 @@
 //! sign or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a
 //! difference of values replaces a derivative that is not a number.
 
-use std::cmp::Ordering;
-
-use super::germ::{Germs, LAST_ORDER, Stop};
-use crate::{ExprId, ExprPool, Function, IdMap, Node, Number, Sign, SymbolId};
+use super::*;
 
 /// Most cases of one slope; those that are not decided have the derivative by the rules, or a difference.
 const MOST_CASES: usize = 256;

@@ -1,11 +1,7 @@
 //! Trigonometric identities, each in the direction asked for, in sums, products and integer powers, not in arguments.
 
-use std::collections::BTreeMap;
-
-use num_integer::Integer;
-
 use super::region::NARROW;
-use crate::{ExprId, ExprPool, Function, Node, Number};
+use super::*;
 
 /// Largest multiple of an angle, and most angles in one argument, that are expanded.
 const MAX_MULTIPLE: i64 = 6;

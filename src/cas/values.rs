@@ -3,7 +3,7 @@
 use std::ops::Neg;
 
 use super::interval::power_by;
-use crate::{ExprId, ExprPool, Interval, Node, Number, SymbolId};
+use super::*;
 
 impl ExprPool {
     /// The value of `expr` for values of variables by `value_of`; NaN or infinite where it has none. Each subexpression

@@ -7,7 +7,6 @@ use serde::Serialize;
 use super::point::{Sides, search};
 use super::side::{Floats, RightSide, SidePhase};
 use super::*;
-use crate::symbolic::{CanonicalForm, CanonicalForms, Node};
 
 const MAX_TERMS: usize = 5;
 

@@ -30,16 +30,19 @@ mod units;
 pub(crate) use compare::TermDifference;
 pub use compare::{Comparison, Difference, Verdict, compare};
 pub(crate) use point::CheckDomain;
-pub use point::Gap;
+pub(crate) use point::Gap;
 pub(crate) use side::read_sides;
 pub use side::{CheckError, Side};
 
 use std::path::Path;
 
-use crate::files::Place;
-use crate::import::{ImportError, SymbolNames};
-use crate::model::LatentVariable;
-use crate::symbolic::{Coefficient, ExprId, ExprPool, Number};
+use crate::files::{Place, size};
+use crate::import::{Format, ImportError, SymbolNames, read_equations};
+use crate::model::{LatentVariable, MAX_LATENT_DIM, ReducedModel};
+use crate::symbolic::{
+    CanonicalForm, CanonicalForms, Coefficient, ExprId, ExprPool, Interval, Node, Number,
+    ParseError, Reading, SymbolId,
+};
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {

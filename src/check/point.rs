@@ -6,8 +6,6 @@ use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 
 use super::*;
-use crate::model::MAX_LATENT_DIM;
-use crate::symbolic::{Interval, SymbolId};
 
 /// Points that are tried without a proof of equality, and with one, where they only show where both sides have values.
 const POINTS: usize = 3_000;

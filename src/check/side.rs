@@ -3,10 +3,6 @@
 use super::*;
 use crate::artifact;
 use crate::equations::Equations;
-use crate::files::size;
-use crate::import::{Format, read_equations};
-use crate::model::ReducedModel;
-use crate::symbolic::{ParseError, Reading};
 
 /// Digits that a rounded float has at least; decimals with more digits are nearer to one float than to any other.
 const FLOAT_DIGITS: usize = 16;

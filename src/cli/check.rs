@@ -5,10 +5,8 @@ use crate::check::{
     CheckDomain, CheckError, CheckOptions, Comparison, Gap, Side, TermDifference, Verdict, compare,
     read_sides,
 };
-use crate::files::{Place, size::read_toml};
-use crate::import::{ImportError, SymbolNames};
 
-pub(super) fn run(arguments: &CheckArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &CheckArguments) -> Result<Answer> {
     let options = CheckOptions {
         exact: arguments.exact,
         symbols: SymbolNames::parse(&arguments.symbols)?,

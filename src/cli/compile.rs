@@ -1,13 +1,9 @@
 //! `romc compile`: a model file to equations and code.
 
-use super::simplification::{self, Outcome, exact_words};
+use super::simplification::Outcome;
 use super::*;
-use crate::deploy::{self, EmitOptions, PlannedJump, Target};
-use crate::equations::Equations;
-use crate::files::earlier_files;
-use crate::typeset::{NumberStyle, PrintOptions, Rounding, SymbolTable};
 
-pub(super) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &CompileArguments) -> Result<Answer> {
     let (inputs, simplification) = (inputs(arguments)?, &arguments.simplification);
     let save_model = simplification.save_model.as_deref();
     let read = artifact::read(&arguments.model)?;
@@ -65,7 +61,7 @@ pub(super) fn run(arguments: &CompileArguments) -> Result<Answer, Error> {
     Ok(Answer::new(text, json))
 }
 
-fn inputs(arguments: &CompileArguments) -> Result<Inputs<'_>, Error> {
+fn inputs(arguments: &CompileArguments) -> Result<Inputs<'_>> {
     let simplification = &arguments.simplification;
     let inputs = Inputs::reading(&simplification.reading)
         .and([&arguments.model])
@@ -121,7 +117,7 @@ fn text(
     text
 }
 
-fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<PlannedJump>, Error> {
+fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<PlannedJump>> {
     let Some(path) = &arguments.plan else {
         return Ok(None);
     };
@@ -153,7 +149,7 @@ fn emit(
     equations: &Equations<'_>,
     arguments: &CompileArguments,
     rounding: Rounding,
-) -> Result<Vec<EmittedFile>, Error> {
+) -> Result<Vec<EmittedFile>> {
     let model = &*equations.model;
     let (code, print) = (&arguments.code, &arguments.equations);
     let options = EmitOptions {

@@ -1,11 +1,8 @@
 //! `romc convert`: recordings and logs of other programs into one format.
 
-use nalgebra::DMatrix;
-
 use super::*;
-use crate::recording::{RecordingFault, WriteOptions, write_as, write_mcap};
 
-pub(super) fn run(arguments: &ConvertArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &ConvertArguments) -> Result<Answer> {
     Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and(&arguments.inputs_of)
@@ -56,7 +53,7 @@ pub(super) fn write_recording(
     segments: Vec<Segment>,
     inputs: Option<&[DMatrix<f64>]>,
     overwrite: Overwrite,
-) -> Result<(), Error> {
+) -> Result<()> {
     let is_mcap = (path.extension()).is_some_and(|ending| ending.eq_ignore_ascii_case("mcap"));
     let written = match &segments[..] {
         [segment] if is_mcap => {

@@ -1,18 +1,7 @@
 //! `romc demo`: the main job on the shipped model and recordings, which are part of the binary.
 
-use std::process::Command;
-
-use super::simplification::RESTART_S;
 use super::*;
-use crate::deploy::{self, EmitOptions, Target};
-use crate::equations::Equations;
-use crate::evaluate::{Assessment, Verdict, verdict};
-use crate::report::{
-    Content, NamedRun, assessment_json, baseline_table, control_table, failed_runs, failures,
-    run_table, verdict_lines,
-};
-use crate::simplify::Tolerance;
-use crate::train::sha256;
+use crate::evaluate::Verdict;
 
 const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4.json"));
 const JUMP_1: &[u8] = include_bytes!("../../examples/recordings/go1/test_01.csv.gz");
@@ -26,7 +15,7 @@ const JUMPS: [(&str, &[u8]); 3] = [
 
 const REPORT_TOLERANCE: Tolerance = Tolerance::ShareOfRms(0.01);
 
-pub(super) fn run(arguments: &DemoArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     let folder = &arguments.out_dir;
     let inputs = Inputs::default().into_folder(Some(folder))?;
     let progress = spinner("reading the shipped model and recordings");
@@ -110,7 +99,7 @@ fn self_test(model: &ReducedModel, folder: &Path) -> Result<String, String> {
     let name = model.identifier().as_str();
     let scratch = tempfile::tempdir().map_err(|_| "no temporary folder")?;
     let binary = scratch.path().join("selftest");
-    let compiled = Command::new("cc")
+    let compiled = process::Command::new("cc")
         .args(["-std=c99", "-O2", "-o"])
         .arg(&binary)
         .arg(folder.join(format!("{name}.c")))
@@ -127,7 +116,7 @@ fn self_test(model: &ReducedModel, folder: &Path) -> Result<String, String> {
         }
         Ok(_) => {}
     }
-    match Command::new(&binary).output() {
+    match process::Command::new(&binary).output() {
         Ok(output) if output.status.success() => Ok("passed".to_owned()),
         Ok(output) => Err(String::from_utf8_lossy(&output.stdout).into_owned()),
         Err(error) => Err(error.to_string()),

@@ -2,9 +2,8 @@
 
 use super::*;
 use crate::identify::{Identification, identify};
-use crate::robot::{LegMoments, Robot};
 
-pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer> {
     Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)
         .and_robot(Some(&arguments.robot))

@@ -1,16 +1,10 @@
 //! `romc import`: a model trained elsewhere in, a model file out.
 
 use super::*;
-use crate::evaluate::RoundTrip;
-use crate::import::{
-    Chosen, Format as FileKind, ImportError, ImportOptions, ImportReport, Imported, SymbolNames,
-    import, read_terms,
-};
-use crate::model::{LibraryChoice, LibraryOrder};
-use crate::robot_file::read_actuators;
+use crate::import::import;
 use crate::sim::with_input_statistics;
 
-pub(super) fn run(arguments: &ImportArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &ImportArguments) -> Result<Answer> {
     let library = match &arguments.library {
         Some(LibraryArgument::File(path)) => Some(path),
         Some(LibraryArgument::Shorthand(_) | LibraryArgument::Terms(_)) | None => None,
@@ -87,7 +81,7 @@ pub fn import_compared(
     mut options: ImportOptions,
     segments: &[&Segment],
     unchecked: bool,
-) -> Result<Compared, Error> {
+) -> Result<Compared> {
     if segments.is_empty() {
         return Ok(Compared {
             imported: read(&options)?,
@@ -95,7 +89,7 @@ pub fn import_compared(
             fault: None,
         });
     }
-    let compared = |options: &ImportOptions| -> Result<(Imported, RoundTrip), Error> {
+    let compared = |options: &ImportOptions| -> Result<(Imported, RoundTrip)> {
         let mut imported = read(options)?;
         imported.model = with_input_statistics(imported.model, segments)?;
         let tensors = |part: &str| {
@@ -161,7 +155,7 @@ fn lacking(model: &ReducedModel) -> Option<&'static str> {
     })
 }
 
-fn options(arguments: &ImportArguments) -> Result<ImportOptions, Error> {
+fn options(arguments: &ImportArguments) -> Result<ImportOptions> {
     let robot = arguments.robot.as_deref().map(robot::chosen).transpose()?;
     let actuators = arguments.actuators.as_deref();
     let actuators = actuators.map(|path| read_actuators(path, robot));

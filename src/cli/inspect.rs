@@ -1,24 +1,15 @@
 //! `romc inspect`: what a recording or a model holds, and what is implausible in it.
 
-use nalgebra::DMatrix;
 use serde::Serialize;
 
-use super::simplification::exact_words;
 use super::*;
-use crate::equations::Equations;
-use crate::evaluate::Invariance;
-use crate::model::StateMap;
-use crate::recording::check::{Finding, check};
-use crate::recording::guess;
+use crate::recording::check::check;
 use crate::recording::mismatch::{Figures, notes as mismatches};
-use crate::recording::{PhaseRule, Reading, ReadingNotes};
-use crate::report::{invariance_table, range};
-use crate::robot::{JOINT_DIM, JOINT_NAMES, Robot, WrenchFrame};
 
 /// Endings of models; those of other tools are refused with the lines that convert them.
 const OF_MODELS: &str = "json safetensors pt pth ckpt keras onnx tflite msgpack";
 
-pub(super) fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &InspectArguments) -> Result<Answer> {
     let robot = robot::chosen(&arguments.robot)?;
     if arguments.guess {
         return guessed(arguments, robot);
@@ -38,7 +29,7 @@ pub(super) fn run(arguments: &InspectArguments) -> Result<Answer, Error> {
     Ok(Answer::new(texts.join("\n"), json!({ "files": files })))
 }
 
-fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer, Error> {
+fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer> {
     let [log] = &arguments.files[..] else {
         return Err(Error::NotOne {
             found: format!("{} files", arguments.files.len()),
@@ -236,7 +227,7 @@ const BAR_WIDTH: usize = 60;
 const CHATTER: usize = 10;
 const FINDINGS_SHOWN: usize = 12;
 
-fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer, Error> {
+fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer> {
     let recording = &reading.recording;
     let file = recording.path.display().to_string();
     let samples = recording.sample_count();
@@ -305,7 +296,7 @@ fn time_bar(segment: &Segment) -> String {
     feet.map(character).collect()
 }
 
-fn segment_json(segment: &Segment) -> Result<Value, Error> {
+fn segment_json(segment: &Segment) -> Result<Value> {
     let rule = PhaseRule::three_phase().with_min_samples(CHATTER);
     let (names, spans) = (rule.names(), rule.spans(segment)?);
     let phases = spans.iter().map(|span| {

@@ -3,9 +3,8 @@
 use clap::CommandFactory as _;
 
 use super::*;
-use crate::files::write_files;
 
-pub(super) fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
+pub(super) fn pages(arguments: &ManualArguments) -> Result<Answer> {
     let mut root = Arguments::command();
     root.build();
     let commands = root.get_subcommands().filter(|of| of.get_name() != "help");
@@ -26,7 +25,7 @@ pub(super) fn pages(arguments: &ManualArguments) -> Result<Answer, Error> {
                 })?;
             Ok(EmittedFile::new(path, String::from_utf8_lossy(&page)))
         });
-    let files = files.collect::<Result<Vec<_>, Error>>()?;
+    let files = files.collect::<Result<Vec<_>>>()?;
     let paths = names(&write_files(&arguments.out_dir, &files, arguments.force)?);
     let text = format!("{}\n", paths.join("\n"));
     Ok(Answer::new(text, json!({ "files": paths })))

@@ -31,26 +31,73 @@ mod train_settings;
 
 pub use args::compile::UnitsChoice;
 pub use import::{Compared, import_compared};
+pub use mpc::JudgedRuns;
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{self, ExitCode};
 
+use args::{PhaseSet, ReadingArguments, TrainArguments, TrainSettings, Widths, *};
 use clap::Parser;
+use nalgebra::{DMatrix, DVector};
+use prepared_recordings::RecordedSets;
 use serde_json::{Map, Value, json};
+use shared::{Format, Inputs, *};
+use simplification::{RESTART_S, exact_words};
 
-use crate::files::{EmittedFile, Overwrite};
-use crate::model::ReducedModel;
-use crate::recording::{Clocks, Recording, Segment};
+use crate::deploy::{self, EmitOptions, PlannedJump, Target};
+use crate::equations::Equations;
+use crate::evaluate::{
+    Assessment, ControlMetrics, Horizon, Invariance, LAMBDA, ReferenceInput, RoundTrip,
+    along_recording, control_metrics, usual_settings, verdict, verdict_by_default,
+};
+use crate::files::size::read_toml;
+use crate::files::{
+    Emitted, EmittedFile, Overwrite, Place, check_folder, earlier_files, is_invisible, write_files,
+    write_files_since, write_whole,
+};
+use crate::import::{
+    Chosen, Format as FileKind, ImportError, ImportOptions, ImportReport, Imported, SymbolNames,
+    read_terms,
+};
+use crate::model::{
+    Activation, LibraryChoice, LibraryOrder, ReducedModel, StandardLibrary, StateMap,
+};
+use crate::mpc::{ControlError, Drives, Lift, MpcSettings, controller};
+use crate::recording::check::Finding;
+use crate::recording::{
+    Clocks, ColumnMap, ConditionOptions, ImplausibleSamples, PhaseRule, Reader, Reading,
+    ReadingNotes, Recording, RecordingError, RecordingFault, RecordingFile, RecordingSet, Segment,
+    WriteOptions, as_recorded, guess, mismatch, write_as, write_mcap,
+};
+use crate::report::{
+    Content, Figure, Introduction, NamedRun, PageOptions, all_figures, assessment_json,
+    baseline_table, body_rms, control_figures, control_table, coordinate_table, dynamics_table,
+    failed_runs, failures, figure_files, horizon_json, horizon_table, introduction,
+    invariance_table, page, phase_table, plan_figures, plan_json, range, reach_figure, run_table,
+    study_figures, verdict_lines, without_statistics,
+};
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, JOINT_NAMES, Leg, LegMoments, Robot, WrenchFrame};
+use crate::robot_file::{self, RobotEntry, RobotOptions, read_actuators};
+use crate::simplify::{
+    Certificate, Domain, MARGIN, RolloutBasis, RolloutEffect, Samples, SimplifyError, Tolerance,
+    bound_words, certificate_json, change_table, equation_table, lost_words, markdown, printed,
+    rollout_table, rollouts_json, simplify,
+};
+use crate::study::{CellId, FOLDS, Shard, Spread, Store, Summary, cell_table};
+use crate::train::{
+    Coordinates, MIN_SAMPLES, MapOptions, Method, Monitor, Origin, Progress, Recordings,
+    ScaleOptions, SetMetrics, TrainError, TrainOptions, TrainReport, Trained, assess, sha256,
+};
 use crate::typeset::words::counted;
-use crate::typeset::{Cell, Table, significant};
+use crate::typeset::{Cell, NumberStyle, PrintOptions, Rounding, SymbolTable, Table, significant};
 use crate::{Error, artifact};
-use args::*;
-use shared::*;
-use shared::{Format, Inputs};
+
+type Result<T, E = Error> = std::result::Result<T, E>;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Answer {
@@ -122,7 +169,7 @@ const DONE: u8 = 0;
 const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 
-fn execute(arguments: &Arguments) -> Result<Answer, Error> {
+fn execute(arguments: &Arguments) -> Result<Answer> {
     arguments.refuse_idle()?;
     let (name, mut answer) = match &arguments.command {
         Command::Check(arguments) => ("check", check::run(arguments)?),

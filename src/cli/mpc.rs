@@ -1,18 +1,9 @@
 //! `romc mpc`: the latent-space controller along recordings.
 
-use super::simplification::RESTART_S;
 use super::*;
-use crate::evaluate::{
-    Assessment, ControlMetrics, ReferenceInput, Verdict, along_recording, control_metrics,
-    usual_settings, verdict,
-};
-use crate::mpc::{Lift, MpcSettings, controller};
-use crate::report::{
-    NamedRun, control_figures, control_table, failed_runs, failures, run_table, verdict_lines,
-};
-use crate::robot::{JOINT_DIM, Robot};
+use crate::evaluate::{Run, Verdict};
 
-pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &MpcArguments) -> Result<Answer> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -22,24 +13,66 @@ pub(super) fn run(arguments: &MpcArguments) -> Result<Answer, Error> {
     let settings = settings(arguments)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
-    let assessment = Assessment::over(&model, &recordings, RESTART_S)?;
-    let verdict = verdict(&model, &assessment, &judged(&runs));
-    let failed = failed_runs(&runs);
-    let is_failed = !failed.is_empty() || verdict.fails_control();
-    let remarks = &assessment.remarks;
-    let mut answer = answer(arguments, &settings, &runs, (&failed, &verdict), remarks);
-    let figures = || Ok(control_figures(&model, &settings, &runs));
+    let runs = JudgedRuns::of(&model, &recordings, runs)?;
+    let mut answer = answer(arguments, &settings, &runs);
+    let figures = || Ok(control_figures(&model, &settings, &runs.runs));
     let folder = arguments.figures.as_deref();
     inputs.write_figures(folder, figures, arguments.force, &mut answer)?;
     if let Some(path) = &arguments.output {
-        let table = command_table(&model, &runs);
+        let table = command_table(&model, &runs.runs);
         write_file(path, table.csv().as_bytes(), arguments.force)?;
     }
-    Ok(answer.failed_if(is_failed))
+    Ok(answer.failed_if(!runs.failed.is_empty() || runs.verdict.fails_control()))
+}
+
+/// A controller's runs along recordings with their verdict.
+#[derive(Debug)]
+pub struct JudgedRuns {
+    runs: Vec<NamedRun>,
+    /// Runs most of whose steps have no plan, in words.
+    failed: Vec<String>,
+    verdict: Verdict,
+    remarks: Vec<String>,
+}
+
+impl JudgedRuns {
+    /// Judges runs along these recordings, each with its path and metrics.
+    pub fn of(
+        model: &ReducedModel,
+        recordings: &[Recording],
+        runs: Vec<(PathBuf, Run)>,
+    ) -> Result<Self, Error> {
+        let assessment = Assessment::over(model, recordings, RESTART_S)?;
+        Ok(Self {
+            failed: failed_runs(&runs),
+            verdict: verdict(model, &assessment, &judged(&runs)),
+            remarks: assessment.remarks,
+            runs,
+        })
+    }
+
+    /// Tables, failures and verdict as `romc mpc` prints them.
+    pub fn text(&self) -> String {
+        let (runs, failed) = (&self.runs, &self.failed);
+        let mut text = format!("{}\n{}\n", control_table(runs), run_table(runs));
+        text += &lines("FAILED along ", failures(runs).iter().chain(failed));
+        text += &verdict_lines(&self.verdict);
+        text + &lines("note: ", &self.remarks)
+    }
+
+    /// The same for programs.
+    pub fn json(&self) -> Value {
+        json!({
+            "remarks": self.remarks,
+            "failed": self.failed,
+            "verdict": self.verdict,
+            "runs": runs_json(&self.runs),
+        })
+    }
 }
 
 /// Those next to the recordings, where an option does not replace them.
-fn settings(arguments: &MpcArguments) -> Result<MpcSettings, Error> {
+fn settings(arguments: &MpcArguments) -> Result<MpcSettings> {
     let mut settings = plan_settings::read_for(&arguments.recordings[0])?;
     for path in &arguments.recordings[1..] {
         if plan_settings::read_for(path)? != settings {
@@ -69,7 +102,7 @@ pub(super) fn run_all(
     recordings: &[Recording],
     settings: MpcSettings,
     reference_input: ReferenceInput,
-) -> Result<Vec<NamedRun>, Error> {
+) -> Result<Vec<NamedRun>> {
     let mut controller = controller(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
@@ -89,7 +122,7 @@ pub(super) fn run_all(
 pub(super) fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
-) -> Result<[Vec<NamedRun>; 2], Error> {
+) -> Result<[Vec<NamedRun>; 2]> {
     let usual = usual_settings(recordings);
     let default = MpcSettings::default();
     if usual.step_s != default.step_s {
@@ -106,40 +139,27 @@ pub(super) fn run_with_both_lifts(
     Ok([with(Lift::Transpose)?, with(Lift::Consistent)?])
 }
 
-fn answer(
-    arguments: &MpcArguments,
-    settings: &MpcSettings,
-    runs: &[NamedRun],
-    (failed, verdict): (&[String], &Verdict),
-    remarks: &[String],
-) -> Answer {
+fn answer(arguments: &MpcArguments, settings: &MpcSettings, judged: &JudgedRuns) -> Answer {
     let mut text = format!(
-        "{}: latent MPC, {} stages of {} s\n\n{}\n{}\n",
+        "{}: latent MPC, {} stages of {} s\n\n{}",
         arguments.model.display(),
         settings.horizon,
         settings.step_s,
-        control_table(runs),
-        run_table(runs)
+        judged.text()
     );
-    text += &lines("FAILED along ", failures(runs).iter().chain(failed));
-    text += &verdict_lines(verdict);
-    text += &lines("note: ", remarks);
-    let mut rows = runs.iter().flat_map(|(_, run)| &run.rows);
+    let mut rows = judged.runs.iter().flat_map(|(_, run)| &run.rows);
     let first = rows.find(|row| row.command.status.has_plan());
     let torques = first.map(|row| row.command.torque_nm.map(|torque| format!("{torque:.2}")));
     text += &lines("first torque command (N m): ", torques.map(|t| t.join(" ")));
     let output = shown(&arguments.output);
     text += &lines("every step: ", &output);
-    let json = json!({
+    let mut json = json!({
         "model": arguments.model.display().to_string(),
         "horizon": settings.horizon,
         "step_s": settings.step_s,
-        "remarks": remarks,
-        "failed": failed,
-        "verdict": verdict,
-        "runs": runs_json(runs),
-        "output": output,
     });
+    extend(&mut json, judged.json());
+    extend(&mut json, json!({ "output": output }));
     Answer::new(text, json)
 }
 

@@ -3,10 +3,8 @@
 use super::convert::write_recording;
 use super::*;
 use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict};
-use crate::report::{plan_figures, plan_json, reach_figure};
-use crate::robot::Robot;
 
-pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.start)
@@ -68,7 +66,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer, Error> {
     Ok(answer)
 }
 
-fn goal(arguments: &PlanArguments, robot: &'static Robot) -> Result<Goal, Error> {
+fn goal(arguments: &PlanArguments, robot: &'static Robot) -> Result<Goal> {
     let (Some(distance_m), Some(apex_m)) = (arguments.distance, arguments.apex) else {
         unreachable!("clap asks for both without --reach");
     };

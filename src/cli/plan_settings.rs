@@ -1,11 +1,7 @@
 //! Settings of the controller for a plan: a file next to it, which `romc plan` writes and other commands read.
 
-use std::collections::BTreeMap;
-
 use super::*;
 use crate::mpc::interface::{SETTINGS, Settings};
-use crate::mpc::{ControlError, Drives, MpcSettings};
-use crate::robot::Robot;
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
 pub(super) fn path_for(plan: &Path) -> PathBuf {
@@ -24,7 +20,7 @@ pub(super) fn path_for(plan: &Path) -> PathBuf {
 }
 
 /// The settings next to a recording; the usual ones where there is no file.
-pub(super) fn read_for(recording: &Path) -> Result<MpcSettings, Error> {
+pub(super) fn read_for(recording: &Path) -> Result<MpcSettings> {
     let path = path_for(recording);
     let usual = MpcSettings::default();
     if !path.is_file() {
@@ -53,7 +49,7 @@ pub(super) fn read_for(recording: &Path) -> Result<MpcSettings, Error> {
 fn of_plans(robot: &Robot) -> MpcSettings {
     MpcSettings {
         input_weight: 8.0,
-        effectiveness_time_s: Some(1.0),
+        effectiveness: Some(1.0),
         drives: Drives::of(robot),
         ..MpcSettings::default()
     }

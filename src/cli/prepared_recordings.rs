@@ -1,14 +1,7 @@
 //! Recordings on their way into a training: divided into sets, checked, conditioned.
 
-use super::args::{ReadingArguments, TrainArguments, TrainSettings};
 use super::inspect::finding_json;
 use super::*;
-use crate::recording::as_recorded;
-use crate::recording::check::Finding;
-use crate::recording::{
-    ConditionOptions, ImplausibleSamples, Reader, RecordingError, RecordingFile, RecordingSet,
-};
-use crate::robot::Robot;
 
 /// A jump of a divided set: its file, its segment there, and the first row.
 type DividedJump = (PathBuf, usize, usize);
@@ -31,7 +24,7 @@ impl RecordedSets {
         settings: &TrainSettings,
         robot: &'static Robot,
         seed: u64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let (training, validation) = (&arguments.recordings, &arguments.validation);
         let paths = [training.as_slice(), validation, &arguments.test];
         let mut recorded = Self::whole(paths, &arguments.reading, settings, robot)?;
@@ -52,7 +45,7 @@ impl RecordedSets {
         reading: &ReadingArguments,
         settings: &TrainSettings,
         robot: &'static Robot,
-    ) -> Result<Self, Error> {
+    ) -> Result<Self> {
         let clocks = match settings.paper {
             true => Clocks::Recorded,
             false => Clocks::Repaired,
@@ -181,7 +174,7 @@ impl RecordedSets {
     }
 }
 
-fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<DividedJump>, Error> {
+fn jumps_of(paths: &[PathBuf], reader: &Reader) -> Result<Vec<DividedJump>> {
     let mut jumps = Vec::new();
     for path in paths {
         let recording = reader.read(path)?.recording;

@@ -10,7 +10,7 @@ use crate::robot::Actuators;
 use crate::robot_file::read_actuators;
 use crate::train::{Origin, Refined, refine_from};
 
-pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer> {
     let settings = own_settings(arguments, from)?;
     Inputs::reading(&arguments.reading)
         .and([from])
@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer, Err
 }
 
 /// Settings of the recordings; the others are those of the model.
-fn own_settings(arguments: &TrainArguments, from: &Path) -> Result<TrainSettings, Error> {
+fn own_settings(arguments: &TrainArguments, from: &Path) -> Result<TrainSettings> {
     let given = &arguments.settings;
     let own = TrainSettings {
         robot: given.robot.clone(),
@@ -121,12 +121,8 @@ fn answer(arguments: &TrainArguments, from: &Path, refined: &Refined) -> Answer 
         .table();
     let output = arguments.output.display().to_string();
     let mut text = format!("{output}: {} refined\n\n{table}\n", from.display());
-    for of in &refined.multiplied {
-        let _ = writeln!(text, "multiplied as a whole: {of}");
-    }
-    for of in &refined.unchanged {
-        let _ = writeln!(text, "unchanged: {of}");
-    }
+    text += &lines("multiplied as a whole: ", &refined.multiplied);
+    text += &lines("unchanged: ", &refined.unchanged);
     let json = json!({
         "from": from.display().to_string(),
         "output": output,

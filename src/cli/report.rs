@@ -2,17 +2,10 @@
 
 use super::mpc::{judged, run_with_both_lifts};
 use super::*;
-use crate::evaluate::{Assessment, LAMBDA, verdict};
 use crate::recording::ControllerLog;
-use crate::report::{
-    Content, Introduction, LogFacts, PageOptions, all_figures, figure_files, introduction,
-    log_figures, log_page, page, verdict_lines, without_statistics,
-};
-use crate::simplify::Tolerance;
-use crate::study::{Store, Summary};
-use crate::train::sha256;
+use crate::report::{LogFacts, log_figures, log_page};
 
-pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &ReportArguments) -> Result<Answer> {
     match (&arguments.log, &arguments.model) {
         (Some(log), _) => of_log(arguments, log),
         (None, model) => {
@@ -22,7 +15,7 @@ pub(super) fn run(arguments: &ReportArguments) -> Result<Answer, Error> {
     }
 }
 
-fn of_log(arguments: &ReportArguments, path: &Path) -> Result<Answer, Error> {
+fn of_log(arguments: &ReportArguments, path: &Path) -> Result<Answer> {
     let output = &arguments.output;
     let inputs = Inputs::default()
         .and([path])
@@ -44,7 +37,7 @@ fn of_log(arguments: &ReportArguments, path: &Path) -> Result<Answer, Error> {
     Ok(answer)
 }
 
-fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer, Error> {
+fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([model_path])
         .and(&arguments.recordings)
@@ -123,7 +116,7 @@ fn answer(
     Answer::new(text, json).failed_if(verdict.fit_for.is_empty())
 }
 
-fn summary(folder: &Path) -> Result<Summary, Error> {
+fn summary(folder: &Path) -> Result<Summary> {
     let summary = Summary::of(&Store::open(folder)?.cells()?, LAMBDA);
     if summary.dimensions.is_empty() {
         let folder = folder.display();
@@ -145,7 +138,7 @@ pub(super) fn page_of(
     content: &Content<'_>,
     tolerance: Tolerance,
     commands: Vec<String>,
-) -> Result<Made, Error> {
+) -> Result<Made> {
     let figures = all_figures(content)?;
     let [ladder, equations, changes] =
         simplification::ladder(content.model, content.assessment, tolerance)?;

@@ -1,11 +1,9 @@
 //! `--robot` of every command, and `romc robot`: what a robot's file says.
 
 use super::*;
-use crate::robot::{JOINT_NAMES, Leg, Robot};
-use crate::robot_file::{self, RobotEntry, RobotOptions};
 
 /// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
-pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot, Error> {
+pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot> {
     let read = robot_file::open(name_or_file, &RobotOptions::default())?;
     let robot = read.robot;
     if robot_file::by_name(name_or_file).is_err() {
@@ -23,7 +21,7 @@ fn note_all(file: &str, notes: &[String]) {
     notes.for_each(|text| note(&format!("{file}: {text}")));
 }
 
-pub(super) fn run(arguments: &RobotArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &RobotArguments) -> Result<Answer> {
     Inputs::default()
         .and_robot(Some(&arguments.robot))
         .check_output(arguments.output.as_deref(), Format::TOML, arguments.force)?;

@@ -1,24 +1,11 @@
 //! What every command reads, where it may write, its words and progress.
 
-use std::borrow::Cow;
-use std::collections::BTreeMap;
-use std::fmt::Display;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::de::DeserializeOwned;
-use serde_json::Value;
 
 use super::*;
-use crate::Error;
-use crate::files::size::read_toml;
-use crate::files::{Emitted, Overwrite, is_invisible, write_files_since, write_whole};
-use crate::model::ReducedModel;
-use crate::recording::{Clocks, ColumnMap, Reader, ReadingNotes, Recording, Segment, mismatch};
-use crate::report::{Figure, figure_files};
-use crate::robot::Robot;
-use crate::train::sha256;
 
 pub(crate) use crate::files::{shell_path as quoted, shell_word as quoted_text};
 
@@ -50,7 +37,7 @@ impl<'a> Inputs<'a> {
         self
     }
 
-    pub(super) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self, Error> {
+    pub(super) fn into_folder(mut self, folder: Option<&Path>) -> Result<Self> {
         self.1 = folder.map(Emitted::of).transpose()?;
         Ok(self)
     }
@@ -61,7 +48,7 @@ impl<'a> Inputs<'a> {
     }
 
     /// Refuses to write a file that is read, or that is in a folder that is.
-    fn check(&self, output: &Path) -> Result<(), Error> {
+    fn check(&self, output: &Path) -> Result<()> {
         let Ok(place) = output.canonicalize() else {
             return Ok(()); // what is not there is not read
         };
@@ -83,7 +70,7 @@ impl<'a> Inputs<'a> {
         Err(Error::Output { path, message })
     }
 
-    pub(super) fn check_name(&self, path: &Path, format: Format) -> Result<(), Error> {
+    pub(super) fn check_name(&self, path: &Path, format: Format) -> Result<()> {
         let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
             let message = "is a folder; expected the name of a file";
             return Err(Error::refused(path, message));
@@ -112,7 +99,7 @@ impl<'a> Inputs<'a> {
         path: Option<&Path>,
         format: Format,
         overwrite: Overwrite,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let Some(path) = path else { return Ok(()) };
         self.check_name(path, format)?;
         if !overwrite.allows(path) {
@@ -133,7 +120,7 @@ impl<'a> Inputs<'a> {
         folder: &Path,
         files: &[EmittedFile],
         overwrite: Overwrite,
-    ) -> Result<Vec<PathBuf>, Error> {
+    ) -> Result<Vec<PathBuf>> {
         for file in files {
             self.check(&folder.join(&file.path))?;
         }
@@ -145,10 +132,10 @@ impl<'a> Inputs<'a> {
     pub(super) fn write_figures(
         &self,
         folder: Option<&Path>,
-        figures: impl FnOnce() -> Result<Vec<Figure>, Error>,
+        figures: impl FnOnce() -> Result<Vec<Figure>>,
         overwrite: Overwrite,
         answer: &mut Answer,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let Some(folder) = folder else { return Ok(()) };
         let figures = figures()?;
         let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
@@ -159,7 +146,7 @@ impl<'a> Inputs<'a> {
     }
 }
 
-pub(super) fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<(), Error> {
+pub(super) fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> Result<()> {
     let written = write_whole(path, overwrite, |out| out.write_all(contents));
     let path = path.to_owned();
     written.map_err(|source| match source.kind() {
@@ -168,7 +155,7 @@ pub(super) fn write_file(path: &Path, contents: &[u8], overwrite: Overwrite) -> 
     })
 }
 
-pub(super) fn read_text(path: &Path) -> Result<String, Error> {
+pub(super) fn read_text(path: &Path) -> Result<String> {
     read_toml(path).map_err(|source| Error::Read {
         path: path.to_owned(),
         source,
@@ -178,7 +165,7 @@ pub(super) fn read_text(path: &Path) -> Result<String, Error> {
 pub(super) fn read_settings<T: DeserializeOwned>(
     path: &Path,
     check: impl Fn(&T) -> Result<(), String>,
-) -> Result<T, Error> {
+) -> Result<T> {
     let settings = toml::from_str(&read_text(path)?)
         .map_err(|error| Error::refused(path, error.to_string().trim_end()))?;
     check(&settings).map_err(|message| Error::refused(path, message))?;
@@ -189,7 +176,7 @@ pub(super) fn reader(
     arguments: &ReadingArguments,
     clocks: Clocks,
     robot: Option<&'static Robot>,
-) -> Result<Reader, Error> {
+) -> Result<Reader> {
     let map = arguments.columns.as_deref().map(ColumnMap::read);
     let reader = Reader::new(map.transpose()?, arguments.clock.unwrap_or(clocks));
     Ok(match robot {
@@ -202,7 +189,7 @@ pub(super) fn read_for(
     model: &ReducedModel,
     paths: &[PathBuf],
     arguments: &ReadingArguments,
-) -> Result<Vec<Recording>, Error> {
+) -> Result<Vec<Recording>> {
     read_recordings(paths, arguments, model.robot().ok())
 }
 
@@ -210,7 +197,7 @@ pub(super) fn read_jump(
     model: &ReducedModel,
     path: &PathBuf,
     arguments: &ReadingArguments,
-) -> Result<Segment, Error> {
+) -> Result<Segment> {
     let mut recording = read_for(model, std::slice::from_ref(path), arguments)?.swap_remove(0);
     note_mismatches(&recording, model.robot()?);
     if let found @ 2.. = recording.segments.len() {
@@ -224,12 +211,12 @@ pub(super) fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,
     robot: Option<&'static Robot>,
-) -> Result<Vec<Recording>, Error> {
+) -> Result<Vec<Recording>> {
     note_repeated(&[("recordings", paths.iter().map(PathBuf::as_path).collect())]);
     read_with(&reader(arguments, Clocks::Repaired, robot)?, paths)
 }
 
-pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>, Error> {
+pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>> {
     let progress = spinner("reading recordings");
     let mut notes = ReadingNotes::default();
     let read = (paths.iter())
@@ -362,7 +349,6 @@ pub(super) fn quoted_all(paths: &[PathBuf]) -> String {
     words.join(" ")
 }
 
-/// Replaces an option's value if one is given.
 pub(super) fn set<T>(option: &mut T, given: Option<impl Into<T>>) {
     if let Some(value) = given {
         *option = value.into();

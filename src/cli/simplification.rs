@@ -1,16 +1,7 @@
 //! Simplification for the commands that offer it: the domain from files, the effect on rollouts.
 
 use super::*;
-use crate::equations::Equations;
-use crate::evaluate::Assessment;
-use crate::report::body_rms;
 use crate::sim::LatentSegment;
-use crate::simplify::{
-    Certificate, Domain, MARGIN, RolloutBasis, RolloutEffect, Samples, SimplifyError, Tolerance,
-    bound_words, certificate_json, change_table, equation_table, lost_words, markdown, printed,
-    rollout_table, rollouts_json, simplify,
-};
-use crate::typeset::Rounding;
 
 pub(super) const RESTART_S: f64 = 0.1;
 
@@ -30,7 +21,7 @@ pub(super) struct Outcome {
 pub(super) fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
-) -> Result<Option<Outcome>, Error> {
+) -> Result<Option<Outcome>> {
     let (original, files) = (&*equations.model, &arguments.domain);
     if files.is_empty() {
         return Ok(None);
@@ -85,7 +76,7 @@ pub(super) fn run(
     Ok(Some(outcome))
 }
 
-fn ranges(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option<Domain>, Error> {
+fn ranges(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option<Domain>> {
     let is_table = |path: &&PathBuf| path.extension().is_some_and(|end| end == "toml");
     let Some(path) = arguments.domain.iter().find(is_table) else {
         return Ok(None);
@@ -102,7 +93,7 @@ fn ranges(model: &ReducedModel, arguments: &SimplifyArguments) -> Result<Option<
 }
 
 impl Outcome {
-    fn record_domain(&mut self) -> Result<(), Error> {
+    fn record_domain(&mut self) -> Result<()> {
         let mut provenance = self.model.provenance().clone();
         if let Some(Value::Object(entry)) = provenance.get_mut("simplification")
             && self.certificate.n_changes() > 0
@@ -129,7 +120,7 @@ impl Outcome {
         files: &mut Vec<EmittedFile>,
         equations: &Equations<'_>,
         rounding: Rounding,
-    ) -> Result<(String, Value), Error> {
+    ) -> Result<(String, Value)> {
         let printed = match rounding {
             Rounding::Exact => Vec::new(),
             _ => printed(equations, &self.domain, self.samples.as_ref(), rounding)?,
@@ -212,7 +203,7 @@ pub(super) fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
     chosen: Tolerance,
-) -> Result<[Table; 3], Error> {
+) -> Result<[Table; 3]> {
     let latent: Vec<&LatentSegment> = assessment.runs.iter().map(|run| &run.latent).collect();
     let samples = Samples::of(model, &latent);
     let domain = Domain::around(model, &samples, MARGIN)?;

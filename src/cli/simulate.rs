@@ -1,15 +1,8 @@
 //! `romc simulate`: rollouts over recordings, in full and restarted.
 
-use nalgebra::DVector;
-
 use super::*;
-use crate::evaluate::{Assessment, Horizon, verdict_by_default};
-use crate::report::{
-    assessment_json, baseline_table, coordinate_table, dynamics_table, horizon_json, horizon_table,
-    phase_table, verdict_lines,
-};
 
-pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer> {
     Inputs::reading(&arguments.reading)
         .and([&arguments.model])
         .and(&arguments.recordings)
@@ -107,7 +100,7 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>, horizons: &[H
 
 /// `segment, time, phase`, then recorded, full and restarted of each latent coordinate, of its velocity, the latent
 /// input, and the three of every robot coordinate in SI units; empty after a divergence.
-fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Table, Error> {
+fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Table> {
     let thrice = |name: String| ["", "_full", "_restarted"].map(|kind| format!("{name}{kind}"));
     let latent = |name: &'static str| numbered(name, model.latent_dim());
     let first = ["segment", "time", "phase"].map(str::to_owned).into_iter();

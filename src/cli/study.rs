@@ -1,15 +1,11 @@
 //! `romc study`: trainings over latent dimensions and seeds, joined and summarised.
 
-use super::prepared_recordings::RecordedSets;
 use super::*;
-use crate::files::check_folder;
-use crate::report::{figure_files, study_figures};
-use crate::study::{self, CellId, FOLDS, Outcome, Plan, Shard, Spread, Store, Summary, cell_table};
-use crate::train::{Method, Origin};
+use crate::study::{self, Outcome, Plan};
 
 const TABLES: [&str; 2] = ["cells.csv", "summary.csv"];
 
-pub(super) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &StudyArguments) -> Result<Answer> {
     check_folder(&arguments.out_dir, &TABLES, arguments.force)?;
     let store = match arguments.merge.is_empty() {
         true => trained(arguments)?,
@@ -32,7 +28,7 @@ pub(super) fn run(arguments: &StudyArguments) -> Result<Answer, Error> {
     Ok(answer(&arguments.out_dir, &store, &cells, &summary))
 }
 
-fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
+fn merged(arguments: &StudyArguments) -> Result<Store> {
     let parts = arguments.merge.iter().map(|folder| Store::open(folder));
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
     let first = parts.first().expect("clap asks for at least one");
@@ -43,7 +39,7 @@ fn merged(arguments: &StudyArguments) -> Result<Store, Error> {
     Ok(store)
 }
 
-fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
+fn trained(arguments: &StudyArguments) -> Result<Store> {
     let mut settings = settings(arguments)?;
     let robot = settings.robot()?;
     let sets = [&arguments.recordings, &arguments.validation, &[][..]];
@@ -77,7 +73,7 @@ fn trained(arguments: &StudyArguments) -> Result<Store, Error> {
     Ok(store)
 }
 
-fn settings(arguments: &StudyArguments) -> Result<TrainSettings, Error> {
+fn settings(arguments: &StudyArguments) -> Result<TrainSettings> {
     let mut settings = TrainSettings::default();
     if let Some(path) = &arguments.config {
         settings = TrainSettings::read(path)?;

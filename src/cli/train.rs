@@ -2,17 +2,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::args::{TrainArguments, TrainSettings};
-use super::prepared_recordings::RecordedSets;
 use super::*;
-use crate::recording::RecordingSet;
-use crate::robot::{BODY_X, BODY_Z};
-use crate::train::{
-    Method, Monitor, Origin, Progress, Recordings, SetMetrics, TrainOptions, TrainReport, Trained,
-    assess,
-};
 
-pub(super) fn run(arguments: &TrainArguments) -> Result<Answer, Error> {
+pub(super) fn run(arguments: &TrainArguments) -> Result<Answer> {
     let settings = TrainSettings::effective(arguments)?;
     Inputs::reading(&arguments.reading)
         .and(&arguments.recordings)

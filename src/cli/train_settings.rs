@@ -1,18 +1,9 @@
 //! The settings of `romc train`: from flags and a file to options, and back to flags for the provenance.
 
-use super::args::{PhaseSet, TrainArguments, TrainSettings, Widths};
-use super::prepared_recordings::RecordedSets;
 use super::robot::chosen;
 use super::*;
 use crate::identify::{IdentifyError, identify};
 use crate::limits::table::{LAYER_WIDTH, of_training};
-use crate::model::{Activation, LibraryChoice, StandardLibrary};
-use crate::recording::{ConditionOptions, ImplausibleSamples, PhaseRule};
-use crate::robot::Robot;
-use crate::robot_file::read_actuators;
-use crate::train::{
-    Coordinates, MIN_SAMPLES, MapOptions, Method, ScaleOptions, TrainError, TrainOptions,
-};
 
 /// The word for actuators that stands for no file.
 const NONE: &str = "none";
@@ -23,11 +14,11 @@ const IDENTIFIED_FROM: usize = 20;
 const WINDOW: &str = "bptt-window bptt-stride bptt-decay bptt-integrator";
 
 impl TrainSettings {
-    pub(super) fn read(path: &Path) -> Result<Self, Error> {
+    pub(super) fn read(path: &Path) -> Result<Self> {
         read_settings(path, Self::check)
     }
 
-    pub(super) fn effective(arguments: &TrainArguments) -> Result<Self, Error> {
+    pub(super) fn effective(arguments: &TrainArguments) -> Result<Self> {
         let mut settings = arguments.settings.clone();
         if let Some(path) = &arguments.config {
             let mut merged = Self::read(path)?.given();
@@ -48,7 +39,7 @@ impl TrainSettings {
         latent_dim: usize,
         name: String,
         robot: &Robot,
-    ) -> Result<TrainOptions, Error> {
+    ) -> Result<TrainOptions> {
         let mut options = match self.paper {
             true => TrainOptions::paper(name, latent_dim),
             false => TrainOptions::new(name, latent_dim),
@@ -110,7 +101,7 @@ impl TrainSettings {
         options: &mut TrainOptions,
         recorded: &RecordedSets,
         robot: &Robot,
-    ) -> Result<(), Error> {
+    ) -> Result<()> {
         let found = match identify(&recorded.first(IDENTIFIED_FROM)?, robot) {
             Err(refused @ IdentifyError::Contradiction { .. }) => return Err(refused.into()),
             _ if self.actuators() != IDENTIFIED => return Ok(()),
@@ -128,7 +119,7 @@ impl TrainSettings {
         Ok(())
     }
 
-    pub(super) fn robot(&self) -> Result<&'static Robot, Error> {
+    pub(super) fn robot(&self) -> Result<&'static Robot> {
         chosen(self.robot.as_deref().unwrap_or("go1"))
     }
 
@@ -232,7 +223,7 @@ impl TrainSettings {
     }
 
     /// Refuses settings that have no use beside the others.
-    pub(super) fn check_pairs(&self) -> Result<(), Error> {
+    pub(super) fn check_pairs(&self) -> Result<()> {
         let (method, is_linear) = (self.method(), self.maps().is_linear());
         let given = |names, when: bool| self.first(names).filter(|_| when);
         let has_weight = (self.bptt_weight).is_some_and(|weight| f64::from(weight) != 0.0);

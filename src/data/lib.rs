@@ -1,4 +1,5 @@
 //! Recordings of legged robots, and what is identified from them. `romc` re-exports every module; depend on that.
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
 
 use romc_model::{files, robot_file};
 use romc_robot as robot;

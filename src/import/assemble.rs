@@ -6,7 +6,6 @@ use super::assign::{Assigned, Assignment, assign};
 use super::run::{Layout, UnusedTensor, UsedTensor};
 use super::tensors::shape_text;
 use super::*;
-use crate::model::{InputStatistics, ModelError, StateMap};
 use crate::robot::STATE_DIM;
 
 #[derive(Debug)]

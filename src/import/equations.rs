@@ -11,12 +11,9 @@
 
 use super::library::tokens;
 use super::*;
-use crate::model::MAX_LATENT_DIM;
-use crate::symbolic::ParseErrorKind;
 
 pub(super) const MAX_TEXT_BYTES: u64 = 4 << 20;
 
-/// The equations of one phase.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Section {
     /// The phase, if the file names it.
@@ -56,7 +53,6 @@ pub(super) type Position = (usize, usize);
 /// The equations of a text or LaTeX file in sections, every one with the same left sides.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sections {
-    /// Number of latent coordinates.
     pub latent_dim: usize,
     /// In the file's order.
     pub sections: Vec<Section>,

@@ -2,12 +2,10 @@
 //! inside a product with a number are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums stay one term
 //! (`z1*(1 + dz1)`).
 
-use std::collections::HashMap;
-
 use super::equations::{Equation, Section};
 use super::run::ReadEquation;
 use super::*;
-use crate::symbolic::{Node, Number};
+use crate::symbolic::Number;
 
 /// Makes the parts of a model; without a library in the options, it is the union of the terms found.
 pub(super) fn parts(

@@ -1,7 +1,5 @@
 //! The candidate terms of imported coefficients, as PySINDy and its relatives name them: `z1 z2`, `x0 u0`, `z1**2`.
 
-use std::collections::BTreeSet;
-
 use super::equations::plain_name;
 use super::run::{check_size, read_file};
 use super::*;

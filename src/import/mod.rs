@@ -30,32 +30,36 @@ mod tensors;
 #[path = "../../tests/import/units.rs"]
 mod units;
 
-pub use latex::variables::{NameError, SymbolNames};
+pub(crate) use latex::variables::{NameError, SymbolNames};
 pub(crate) use library::read_terms;
 pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
-pub use role::Mapping;
+pub(crate) use role::Mapping;
 pub(crate) use run::{Chosen, import, read_equations};
 pub use run::{ImportReport, Imported, import_from_bytes, import_tensors};
 pub use tensors::Tensor;
 
+use std::collections::{BTreeSet, HashMap};
 use std::fmt;
+use std::io::{self, Cursor, Read as _};
 use std::path::Path;
 use std::str::FromStr;
 
-use nalgebra::{DMatrix, DVector};
-use serde_json::Value;
-use sha2::Sha256;
-
-use crate::files::{Place, magic};
-use crate::model::{
-    LatentVariable, Library, LibraryChoice, LibraryOrder, Phase, Scaling, StandardLibrary,
-};
-use crate::symbolic::{ExprId, ExprPool, Function};
 use assemble::Parts;
 use equations::Sections;
+use nalgebra::{DMatrix, DVector};
 use options::standard_text;
 use role::{ONLY_PHASE, Part, Role, is_of_optimiser};
+use serde_json::{Map, Value, json};
+use sha2::{Digest as _, Sha256};
 use tensors::{TensorFile, TensorInfo};
+
+use crate::files::{Place, hex, magic};
+use crate::model::{
+    Activation, CoordinateNames, CoordinateOrder, FeetRule, InputStatistics, LatentVariable,
+    Library, LibraryChoice, LibraryOrder, MAX_LATENT_DIM, ModelError, Phase, ReducedModel,
+    ScaleFactors, Scaling, StandardLibrary, StateMap,
+};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, ParseErrorKind};
 
 /// A fault and its place: the file, a tensor with its use, a character of a text, or an option.
 pub type ImportError = crate::files::Located<crate::files::Fault<crate::model::ModelError>>;

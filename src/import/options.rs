@@ -5,7 +5,6 @@ use clap::ValueEnum;
 
 use super::*;
 use crate::files::magic::OtherFormat;
-use crate::model::{Activation, CoordinateOrder, FeetRule, ScaleFactors};
 use crate::robot::{Actuators, ContactFlags, Robot, WrenchFrame};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

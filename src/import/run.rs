@@ -2,16 +2,11 @@
 #![allow(missing_docs, reason = "the names say it")]
 
 use std::fs::File;
-use std::io::Read as _;
 
 use serde::Serialize;
-use serde_json::{Map, json};
-use sha2::Digest as _;
 
 use super::options::refusal;
 use super::*;
-use crate::files::hex;
-use crate::model::{CoordinateNames, ReducedModel};
 
 const MAX_FILE_BYTES: u64 = 256 << 20;
 
@@ -282,7 +277,6 @@ pub(crate) struct UnusedTensor {
     pub shape: Vec<usize>,
 }
 
-/// An equation that became a column of Xi.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct ReadEquation {
     pub phase: String,

@@ -5,10 +5,8 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
-use std::io::{self, Cursor, Read as _};
 
 use safetensors::{Dtype, SafeTensors};
-use sha2::Digest as _;
 use sha2::digest::Output;
 use zip::ZipArchive;
 

@@ -1,9 +1,6 @@
 //! The figures of a report: from an assessment, from the controller's runs, from a study.
 
-use super::figures::{Drawing, HeatMap, subscript};
-use super::jump::{Jump, JumpName};
 use super::*;
-use crate::evaluate::{Run, StepRow};
 use crate::mpc::{Lift, MpcSettings};
 use crate::study::{DimensionSummary, Spread, Summary};
 

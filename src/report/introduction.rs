@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use super::jump::{Jump, modelled};
 use super::tables::template_rms;
 use super::*;
 

@@ -2,12 +2,8 @@
 
 use nalgebra::DVector;
 
-use super::figures::{film, subscript};
 use super::tables::file_name;
 use super::*;
-use crate::evaluate::FitSums;
-use crate::recording::stretches;
-use crate::robot::STATE_DIM;
 use crate::sim::Rollout;
 
 const FRAMES: usize = 10;

@@ -33,14 +33,27 @@ pub use tables::{assessment_json, plan_json};
 
 use std::path::{Path, PathBuf};
 
+use contents::{AllFigures, JumpFigures};
+use figures::{
+    Drawing, Film, HeatMap, Motion, Panel, Role, Series, film, film_strip, floor_m, panel_svg,
+    subscript,
+};
+use jump::{Jump, JumpName, modelled};
 use serde_json::{Map, Value, json};
 
-use crate::evaluate::{Assessment, CoordinateSums, Fit, SegmentRun, Verdict};
-use crate::model::{ModelError, ReducedModel};
-use crate::recording::Segment;
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot};
-use crate::typeset::words::counted;
-use crate::typeset::{Cell, Table, rounded, significant};
-use figures::{Film, Motion, Panel, Role, Series, film_strip, floor_m};
+use crate::evaluate::{
+    AFTER_A_PUSH, AslipSums, Assessment, Baseline, ByContact, ControlMetrics, CoordinateSums, Fit,
+    FitSums, Horizon, Invariance, LinearisedPhase, PredictionError, Run, SegmentRun, StepRow,
+    TORQUES_IN_CONTACT, Verdict,
+};
+use crate::model::{JumpPrior, ModelError, ReducedModel};
+use crate::plan::{GoalMap, Plan};
+use crate::recording::{Segment, stretches};
+use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot, STATE_DIM};
+use crate::typeset::mathml::{HTML, HtmlProse, HtmlText, system};
+use crate::typeset::words::{counted, feet, rendered, rounding};
+use crate::typeset::{
+    Cell, EquationSystem, Rounding, SymbolTable, Table, Typeset, TypesetError, rounded, significant,
+};
 
 type Result<T, E = ModelError> = std::result::Result<T, E>;

@@ -2,17 +2,11 @@
 
 use askama::Template;
 
-use super::contents::{AllFigures, JumpFigures};
-use super::figures::panel_svg;
 use super::sections::{Section, sections, tiles};
 use super::*;
 use crate::artifact;
 use crate::equations::{Equations, PhaseEquations};
 use crate::typeset::latex::tex_cases;
-use crate::typeset::mathml::{HTML, HtmlProse, HtmlText, system};
-use crate::typeset::words::rendered;
-use crate::typeset::words::{feet, rounding};
-use crate::typeset::{EquationSystem, Rounding, SymbolTable, Typeset, TypesetError};
 
 const WIDTH_EM: f64 = 44.0;
 const WIDE: f64 = 500.0; // width of a panel that is drawn across the page

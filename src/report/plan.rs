@@ -1,8 +1,6 @@
 //! Figures of a planned jump, and of all the jumps that can be planned.
 
 use super::*;
-use crate::model::JumpPrior;
-use crate::plan::{GoalMap, Plan};
 
 const FRAMES: usize = 8;
 const CROSS_M: f64 = 0.004;

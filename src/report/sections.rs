@@ -1,9 +1,7 @@
 //! Sections below the equations: words, tables and figures about one thing each, and the tiles at the top.
 
-use super::contents::AllFigures;
 use super::tables::{verdict_table, with_phases};
 use super::*;
-use crate::evaluate::{AFTER_A_PUSH, Invariance, TORQUES_IN_CONTACT};
 
 pub(super) struct Section<'a> {
     pub id: &'static str,

@@ -1,13 +1,8 @@
 //! Tables of an assessment and of the controller's runs, for pages and terminals alike.
 
 use super::introduction::headline;
-use super::jump::modelled;
 use super::*;
-use crate::evaluate::{
-    AslipSums, Baseline, ByContact, ControlMetrics, FitSums, Horizon, Invariance, LinearisedPhase,
-    PredictionError, Run,
-};
-use crate::plan::{self, Plan};
+use crate::plan;
 
 pub(crate) type NamedRun = (PathBuf, Run);
 

@@ -66,29 +66,22 @@ struct LegMomentsEntry {
     calf_kg_m2: f64,
 }
 
-impl Serialize for LegMoments {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        LegMomentsEntry::serialize(self, serializer)
-    }
-}
+macro_rules! as_entries {
+    ($($value:ident: $entry:ident),*) => {$(
+        impl Serialize for $value {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                $entry::serialize(self, serializer)
+            }
+        }
 
-impl<'de> Deserialize<'de> for LegMoments {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        LegMomentsEntry::deserialize(deserializer)
-    }
+        impl<'de> Deserialize<'de> for $value {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                $entry::deserialize(deserializer)
+            }
+        }
+    )*};
 }
-
-impl Serialize for Actuators {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        ActuatorsEntry::serialize(self, serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for Actuators {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        ActuatorsEntry::deserialize(deserializer)
-    }
-}
+as_entries!(LegMoments: LegMomentsEntry, Actuators: ActuatorsEntry);
 
 impl Serialize for WrenchFrame {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

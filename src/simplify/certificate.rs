@@ -3,12 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::Serializer;
-
 use super::measure::Measured;
 use super::*;
 
-/// A count before and after simplification.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub(crate) struct BeforeAfter {
     pub before: usize,
@@ -121,7 +118,6 @@ pub(crate) struct PhaseCertificate {
 /// numbers. Floating-point rounding, about 1e-16 of the largest summand, comes on top for both models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
-    /// The requested tolerance.
     pub(crate) tolerance: Tolerance,
     /// What exact simplification did before: equal as real functions, without any error.
     pub(crate) exact: Vec<ExactStep>,
@@ -140,7 +136,6 @@ impl Certificate {
         self.equations().map(|(_, equation)| count(equation)).sum()
     }
 
-    /// Number of changes.
     pub fn n_changes(&self) -> usize {
         self.equations().map(|(_, e)| e.changes.len()).sum()
     }
@@ -178,7 +173,6 @@ impl Certificate {
     }
 }
 
-/// The whole certificate.
 pub fn certificate_json(certificate: &Certificate) -> Value {
     json!({
         "tolerance": certificate.tolerance.to_string(),
@@ -234,7 +228,6 @@ pub struct ToleranceError {
 }
 
 impl Tolerance {
-    /// The tolerance with its unit, in words.
     pub(crate) fn words(self) -> String {
         let unit = match self {
             Self::ShareOfRms(_) => "of the root mean square of each ddz over the recordings",

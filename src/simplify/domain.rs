@@ -8,9 +8,7 @@ use crate::lower::LowerError;
 /// How far a domain reaches beyond the samples unless given, as a share of each variable's range.
 pub const MARGIN: f64 = 0.1;
 
-/// Errors of simplification.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 #[non_exhaustive]
 pub enum SimplifyError {
     #[error("the domain {0}")]
@@ -84,10 +82,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::Domain`] for another number of boxes or ranges, and for a range that is empty or infinite.
-    pub(crate) fn new(
-        model: &ReducedModel,
-        boxes: Vec<Option<Vec<Interval>>>,
-    ) -> Result<Self, SimplifyError> {
+    pub(crate) fn new(model: &ReducedModel, boxes: Vec<Option<Vec<Interval>>>) -> Result<Self> {
         check_count(boxes.len(), model.phases().len())?;
         let refused = |message| Err(SimplifyError::Domain(message));
         let variables: Vec<_> = LatentVariable::all(model.latent_dim()).collect();
@@ -112,11 +107,7 @@ impl Domain {
     }
 
     /// The smallest boxes that hold all samples, each side moved out by `margin` times the width.
-    pub fn around(
-        model: &ReducedModel,
-        samples: &Samples,
-        margin: f64,
-    ) -> Result<Self, SimplifyError> {
+    pub fn around(model: &ReducedModel, samples: &Samples, margin: f64) -> Result<Self> {
         let boxes = samples.phases.iter().map(|samples| {
             let ranges = samples.row_iter().map(|row| {
                 let points = row.iter().copied().map(Interval::point);
@@ -133,7 +124,7 @@ impl Domain {
     ///
     /// # Errors
     /// [`SimplifyError::DomainFile`] for an unknown phase or variable, one without a range, and as `Domain::new`.
-    pub fn from_toml(model: &ReducedModel, path: &Path, text: &str) -> Result<Self, SimplifyError> {
+    pub fn from_toml(model: &ReducedModel, path: &Path, text: &str) -> Result<Self> {
         let refused = |message: String| SimplifyError::DomainFile {
             path: path.to_owned(),
             message,
@@ -211,7 +202,7 @@ impl Domain {
     }
 }
 
-pub(super) fn check_count(found: usize, expected: usize) -> Result<(), SimplifyError> {
+pub(super) fn check_count(found: usize, expected: usize) -> Result<()> {
     match found == expected {
         true => Ok(()),
         false => Err(SimplifyError::Domain(format!(

@@ -1,14 +1,10 @@
 //! Differences of equations, also as printed with rounded coefficients: bounds over a box, size at samples, and the
 //! effect on rollouts over recordings.
 
-use serde_json::Map;
-
 use super::*;
 use crate::evaluate::{CoordinateSums, EvaluateError};
 use crate::lower::CompiledModel;
 use crate::recording::Segment;
-use crate::sim::{Restart, Rollout, Window, rollout};
-use crate::typeset::{Decimal, Rounding};
 
 /// How large an error is at recorded samples (scaled units per second squared).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -63,7 +59,6 @@ impl Differences {
 /// How far a printed equation can be from the model's.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PrintedEquation {
-    /// The phase's name.
     pub phase: String,
     /// Index of the latent coordinate.
     pub output: usize,
@@ -79,7 +74,7 @@ pub(crate) fn printed(
     domain: &Domain,
     samples: Option<&Samples>,
     rounding: Rounding,
-) -> Result<Vec<PrintedEquation>, SimplifyError> {
+) -> Result<Vec<PrintedEquation>> {
     let workspace = Workspace::new(equations)?;
     let mut all = Vec::new();
     for (index, phase) in equations.phases.iter().enumerate() {
@@ -121,9 +116,7 @@ pub(crate) struct RolloutErrors {
 /// Rollouts of a model and of its simplification beside the recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RolloutEffect {
-    /// Names of the robot's body coordinates.
     pub names: Vec<String>,
-    /// Their units.
     pub units: Vec<String>,
     /// Time between restarts, s.
     pub restart_every_s: f64,

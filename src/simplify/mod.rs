@@ -3,6 +3,7 @@
 //! leaves with a [`Certificate`] that lists every change with the interval in which its error lies over the whole box,
 //! and with its error at the recorded samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then
 //! `equation.rs` (the changes made to one equation) and `ranges.rs` (the intervals).
+#![allow(missing_docs, reason = "names say it all where there is no comment")]
 
 mod certificate;
 #[cfg(test)]
@@ -26,15 +27,17 @@ pub(crate) use tables::{
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use certificate::{Change, ChangeKind, PhaseCertificate};
 use nalgebra::DMatrix;
-use serde::Serialize;
-use serde_json::{Value, json};
+use ranges::{Ranges, Workspace};
+use serde::{Serialize, Serializer};
+use serde_json::{Map, Value, json};
 
-use crate::artifact;
 use crate::equations::{Equations, ExactStep};
 use crate::model::{LatentVariable, Library, ModelError, ReducedModel};
-use crate::sim::LatentSegment;
-use crate::symbolic::{Interval, SymbolId};
-use crate::typeset::rounded;
-use certificate::{Change, ChangeKind, PhaseCertificate};
-use ranges::{Ranges, Workspace};
+use crate::sim::{LatentSegment, Restart, Rollout, Window, rollout};
+use crate::symbolic::{ExprId, ExprPool, Interval, Node, SymbolId};
+use crate::typeset::{Cell, Decimal, Rounding, Table, rounded, rounded_up, significant};
+use crate::{artifact, lower};
+
+type Result<T, E = SimplifyError> = std::result::Result<T, E>;

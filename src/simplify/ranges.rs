@@ -2,7 +2,6 @@
 
 use super::equation::Rewrite;
 use super::*;
-use crate::symbolic::{ExprId, ExprPool, Node};
 
 /// Relative error of the algebra's constants, with room to spare: a merged or halved float has an error of 2^-53.
 const CONSTANT_ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
@@ -66,11 +65,7 @@ impl Workspace {
     }
 
     /// A model of these coefficients, one matrix per phase; appended terms that no phase uses are left out.
-    pub(crate) fn finish(
-        &self,
-        model: ReducedModel,
-        xi: &[DMatrix<f64>],
-    ) -> Result<ReducedModel, SimplifyError> {
+    pub(crate) fn finish(&self, model: ReducedModel, xi: &[DMatrix<f64>]) -> Result<ReducedModel> {
         let used = |row: &usize| xi.iter().any(|xi| xi.row(*row).iter().any(|&c| c != 0.0));
         let rows: Vec<usize> = (0..self.original)
             .chain((self.original..self.library.terms().len()).filter(used))

@@ -6,7 +6,7 @@ use super::equation::{Equation, is_same_decimal};
 use super::measure::Differences;
 use super::*;
 use crate::ir::{Program, Statement};
-use crate::lower::{self, Form};
+use crate::lower::Form;
 use crate::robot::{BODY_Z, GRAVITY_M_S2};
 
 /// What the search may use is lowered to this share of itself until the final evaluation confirms the tolerance.
@@ -35,7 +35,7 @@ pub fn simplify(
     domain: &Domain,
     samples: Option<&Samples>,
     tolerance: Tolerance,
-) -> Result<Simplified, SimplifyError> {
+) -> Result<Simplified> {
     if samples.is_none() && matches!(tolerance, Tolerance::ShareOfRms(share) if share != 0.0) {
         return Err(SimplifyError::NoSamples);
     }
@@ -124,7 +124,7 @@ impl<'a> PhaseProblem<'a> {
         domain: &'a Domain,
         samples: Option<&Samples>,
         phase: usize,
-    ) -> Result<Self, SimplifyError> {
+    ) -> Result<Self> {
         let theta = domain.theta(phase, samples, &workspace.library)?;
         let factors = equations.model.state_factors();
         let recorded = samples.map_or(0, |samples| samples.phases[phase].ncols());
@@ -148,10 +148,7 @@ impl<'a> PhaseProblem<'a> {
         Equation::new(self.coefficients(output), known)
     }
 
-    fn solve(
-        &self,
-        tolerance: Tolerance,
-    ) -> Result<(DMatrix<f64>, PhaseCertificate), SimplifyError> {
+    fn solve(&self, tolerance: Tolerance) -> Result<(DMatrix<f64>, PhaseCertificate)> {
         let mut xi = self.xi.clone();
         let mut terms = (self.domain).map(|d| Ranges::new(self.workspace, d));
         let mut equations = Vec::new();
@@ -217,7 +214,7 @@ impl<'a> PhaseProblem<'a> {
         bound: Interval,
         allowed: f64,
         rms: Option<f64>,
-    ) -> Result<EquationCertificate, SimplifyError> {
+    ) -> Result<EquationCertificate> {
         let before = self.coefficients(output);
         let differences = Differences::between(&before, &equation.xi);
         let measured = differences.measured(&self.theta);
@@ -269,7 +266,7 @@ fn digits(xi: &[f64]) -> usize {
     active.map(of).sum()
 }
 
-fn operations(system: &Equations<'_>, phase: usize) -> Result<usize, SimplifyError> {
+fn operations(system: &Equations<'_>, phase: usize) -> Result<usize> {
     let program: Program = lower::dynamics(system, phase, Form::StraightLine)?;
     let counted = program.statements.iter().enumerate();
     Ok(counted

@@ -4,7 +4,6 @@ use askama::Template;
 
 use super::measure::PrintedEquation;
 use super::*;
-use crate::typeset::{Cell, Table, rounded_up, significant};
 
 pub(crate) fn equation_table(certificate: &Certificate) -> Table {
     Table::of(certificate.equations())

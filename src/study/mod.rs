@@ -12,6 +12,9 @@ pub(crate) use store::Store;
 pub(crate) use summary::{Cell, DimensionSummary, Spread, cell_table};
 pub(crate) use summary::{Outcome, Summary};
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use serde::{Deserialize, Serialize};
+
+type Result<T, E = StudyError> = std::result::Result<T, E>;

@@ -1,6 +1,5 @@
 //! The trainings of a study, and their run on all cores.
 
-use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use super::summary::Metrics;
@@ -20,7 +19,7 @@ pub(crate) fn run(
     robot: &'static Robot,
     options: &TrainOptions,
     finished: &(dyn Fn(CellId) + Sync),
-) -> Result<(), StudyError> {
+) -> Result<()> {
     let missing = store.missing();
     let mut todo = shard.of(&store.plan.cells());
     todo.retain(|id| missing.contains(id));
@@ -118,7 +117,7 @@ pub(crate) struct CellId {
 }
 
 impl Plan {
-    pub(crate) fn check(&self) -> Result<(), StudyError> {
+    pub(crate) fn check(&self) -> Result<()> {
         let refuse =
             |found: String, expected: &'static str| Err(StudyError::Range { found, expected });
         if self.latent_dims.is_empty() || self.seeds == 0 {

@@ -1,8 +1,6 @@
 //! The folder of a study: its plan, and one file a finished training.
 
-use std::fs;
-use std::io::{self, ErrorKind};
-use std::path::Path;
+use std::io::ErrorKind;
 
 use serde::de::DeserializeOwned;
 
@@ -18,7 +16,7 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    pub(crate) fn create(folder: &Path, plan: Plan) -> Result<Self, StudyError> {
+    pub(crate) fn create(folder: &Path, plan: Plan) -> Result<Self> {
         plan.check()?;
         fs::create_dir_all(folder).map_err(refused(folder, "make the folder"))?;
         let path = folder.join(PLAN);
@@ -35,14 +33,14 @@ impl Store {
         Ok(Self { folder, plan })
     }
 
-    pub(crate) fn open(folder: &Path) -> Result<Self, StudyError> {
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
         let plan: Plan = read_json(&folder.join(PLAN))?;
         plan.check()?;
         let folder = folder.to_owned();
         Ok(Self { folder, plan })
     }
 
-    pub(crate) fn get(&self, id: CellId) -> Result<Option<Cell>, StudyError> {
+    pub(crate) fn get(&self, id: CellId) -> Result<Option<Cell>> {
         let path = self.path(id);
         if !path.exists() {
             return Ok(None);
@@ -58,11 +56,11 @@ impl Store {
         Ok(Some(cell))
     }
 
-    pub(crate) fn put(&self, cell: &Cell) -> Result<(), StudyError> {
+    pub(crate) fn put(&self, cell: &Cell) -> Result<()> {
         write_json(&self.path(cell.id), cell, Overwrite::Replace)
     }
 
-    pub(crate) fn cells(&self) -> Result<Vec<Cell>, StudyError> {
+    pub(crate) fn cells(&self) -> Result<Vec<Cell>> {
         let ids = self.plan.cells().into_iter();
         ids.filter_map(|id| self.get(id).transpose()).collect()
     }
@@ -72,7 +70,7 @@ impl Store {
         cells.filter(|id| !self.path(*id).exists()).collect()
     }
 
-    pub(crate) fn merge(&self, part: &Store) -> Result<(), StudyError> {
+    pub(crate) fn merge(&self, part: &Store) -> Result<()> {
         if let Some(difference) = difference(&part.plan, &self.plan) {
             let path = part.folder.join(PLAN);
             return Err(StudyError::OtherStudy { path, difference });
@@ -112,7 +110,7 @@ fn difference(found: &Plan, expected: &Plan) -> Option<&'static str> {
     first.map(|(name, _)| name)
 }
 
-fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudyError> {
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let text = read_text_capped(path, Format::Model).map_err(refused(path, "read"))?;
     serde_json::from_str(&text).map_err(|error| StudyError::Broken {
         path: path.to_owned(),
@@ -120,7 +118,7 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudyError> {
     })
 }
 
-fn write_json(path: &Path, value: &impl Serialize, overwrite: Overwrite) -> Result<(), StudyError> {
+fn write_json(path: &Path, value: &impl Serialize, overwrite: Overwrite) -> Result<()> {
     let text = serde_json::to_string_pretty(value).map_err(io::Error::from);
     let written = text.and_then(|text| write_whole(path, overwrite, |out| writeln!(out, "{text}")));
     written.map_err(refused(path, "write"))

@@ -39,9 +39,6 @@
 /* Largest weight of a step, in first steps. */
 #define ONLINE_LARGEST_WEIGHT (real)2.0
 
-/* Share of the distances from the reference that a measurement may be off what the last one predicts. */
-#define ONLINE_LEAP_SHARE (real)0.5
-
 /* Smallest and largest estimate. */
 #define ONLINE_LEAST (real)0.7
 
@@ -53,15 +50,18 @@
 /* Error of pitch beyond which legs turn no further, rad. */
 #define ONLINE_MOST_TURN_RAD (real)0.3
 
+/* Share of the distances from the reference that the first measurement may be off, and others off what the last predicts. */
+#define ONLINE_NEAR (real)0.5
+
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
 
 /* How long measurements are refused before they are a fault, s. */
 #define ONLINE_PATIENCE_S 0.019
 
-/* Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the stage's end is
- * ahead of the motion and adds to the thrust; that of the middle takes from it. */
-#define ONLINE_POSTURE_SHARE 0.9
+/* How far ahead of the middle of the time that it is held for a posture is commanded, in stages. A joint PD that holds the
+ * posture of the end of a stage is ahead of the motion and adds to the thrust; that of the middle takes from it. */
+#define ONLINE_POSTURE_LEAD 0.4
 
 /* Weight of the one from before the motion, in first steps. */
 #define ONLINE_PRIOR_WEIGHT (real)10.0
@@ -95,6 +95,9 @@
 
 /* Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down. */
 #define ONLINE_UPSIDE_DOWN (real)0.5
+
+/* Share of a stage from which on a command counts as held for all of it. */
+#define ONLINE_WHOLE_STAGE 0.75
 
 /* What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
  * supervisor says what each is compared with. */
@@ -1189,10 +1192,10 @@ static inline MAYBE_UNUSED bool online_plan_time_is_jump(online_plan_time *self,
     return largest > most;
 }
 
-/* The instant whose posture is commanded for a stage, s. */
-static inline MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, int stage)
+/* The instant whose posture is commanded at a time for held_s, s. */
+static inline MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, double now_s, double held_s)
 {
-    return self->start_s + ((double)stage + ONLINE_POSTURE_SHARE) * self->step_s;
+    return now_s + (ONLINE_POSTURE_LEAD * self->step_s + 0.5 * held_s);
 }
 
 /* Whether a time is in a stage or beyond the last. Up to half a stage before the first, as where a clock jitters, it
@@ -1210,6 +1213,12 @@ static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self,
     const double passed = online_plan_time_passed(self, time_s) + 1e-6;
     return !online_plan_time_reaches(self, time_s)
             || passed >= (double)otherwise ? otherwise : passed > 0.0 ? (int)passed : 0;
+}
+
+/* Beginning of a stage, s. */
+static inline MAYBE_UNUSED double online_plan_time_stage_s(online_plan_time *self, int stage)
+{
+    return self->start_s + (double)stage * self->step_s;
 }
 
 static inline MAYBE_UNUSED online_share online_share_unknown(void)
@@ -1295,20 +1304,21 @@ static inline MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self
     self->has_good = false;
     self->is_doubted = false;
     self->is_aloft = false;
-    self->contacts = 0;
-    self->poor = 0;
+    self->is_contradicted = false;
+    self->poor_s = 0.0;
     for (int i = 0; i < 3; ++i) {
         self->unexplained[i] = 0;
     }
 }
 
-/* Counts steps without a good plan; what is wrong. */
+/* Adds up steps without a good plan, passed_s after the last one; what is wrong. */
 static inline MAYBE_UNUSED online_fault online_supervisor_judge(online_supervisor *restrict self,
-        const online_bounds *bounds, bool is_poor)
+        const online_bounds *bounds, bool is_poor, double passed_s)
 {
-    self->poor = is_poor ? self->poor + 1 : 0;
-    const bool is_counted = bounds->poor_steps > 0 && self->fault == ONLINE_NONE;
-    if (is_counted && self->poor >= bounds->poor_steps) {
+    self->poor_s = is_poor ? self->poor_s + passed_s : 0.0;
+    const double most = (double)bounds->poor_steps;
+    const bool is_counted = most > 0.0 && self->fault == ONLINE_NONE;
+    if (is_counted && self->poor_s / self->step_s > most - 0.5) {
         self->fault = ONLINE_POOR_STEPS;
     }
     return self->fault;
@@ -1403,9 +1413,9 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
         const real *lower, const real *upper, const real *speed)
 {
     if (bounds->tilt_rad < ONLINE_HALF_TURN) {
-        const real off = online_common_height(x + 15, nominal + 15);
+        const real along = online_common_height(x + 15, nominal + 15);
         const real upright = COS(x[16]) * COS(x[15]);
-        if (off < COS(bounds->tilt_rad) || upright < -ONLINE_UPSIDE_DOWN) {
+        if (along < COS(bounds->tilt_rad) || upright < -ONLINE_UPSIDE_DOWN) {
             return ONLINE_TILT;
         }
     }
@@ -1413,7 +1423,7 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
     for (int i = 0; i < 12; ++i) {
         const real margin = bounds->joint_margin_rad;
         if (x[i] > upper[i] + margin || x[i] < lower[i] - margin) {
-            return ONLINE_JOINT_RANGE;
+            return ONLINE_JOINT_BEYOND;
         }
         if (solver_magnitude(dx[i]) > bounds->joint_velocity * speed[i]) {
             return ONLINE_JOINT_SPEED;
@@ -1421,11 +1431,16 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
         joints = online_greater(solver_magnitude(x[i] - nominal[i]), joints);
     }
     real by_reference[3] = {nominal[12], nominal[13], nominal[14]};
-    if (online_distance(x + 12, by_reference) > bounds->distance_m) {
+    const real off = online_distance(x + 12, by_reference);
+    if (off > bounds->distance_m) {
         return ONLINE_BODY_FAR;
     }
     if (joints > bounds->posture_rad) {
         return ONLINE_JOINTS_FAR;
+    }
+    const bool is_near = off <= ONLINE_NEAR * bounds->distance_m && joints <= ONLINE_NEAR * bounds->posture_rad;
+    if (!self->has_good && !is_near) {
+        return ONLINE_NOT_AT_START;
     }
     const double passed_s = time_s - self->good_s;
     if (!self->has_good || passed_s > bounds->clock_gap_s) {
@@ -1436,12 +1451,12 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
     for (int i = 0; i < 3; ++i) {
         body[i] = self->good_x[12 + i] + passed * self->good_dx[12 + i];
     }
-    if (online_distance(x + 12, body) > ONLINE_LEAP_SHARE * bounds->distance_m) {
+    if (online_distance(x + 12, body) > ONLINE_NEAR * bounds->distance_m) {
         return ONLINE_BODY_LEAP;
     }
     for (int i = 0; i < 12; ++i) {
         const real predicted = self->good_x[i] + passed * self->good_dx[i];
-        if (solver_magnitude(x[i] - predicted) > ONLINE_LEAP_SHARE * bounds->posture_rad) {
+        if (solver_magnitude(x[i] - predicted) > ONLINE_NEAR * bounds->posture_rad) {
             return ONLINE_JOINTS_LEAP;
         }
     }
@@ -1492,8 +1507,13 @@ static inline MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor 
     if (is_aloft && passed_s > ONLINE_FALL_S && !falls) {
         is_wrong = true;
     }
-    self->contacts = is_wrong ? self->contacts + 1 : 0;
-    return bounds->contact_mismatch_steps > 0 && self->contacts >= bounds->contact_mismatch_steps;
+    if (is_wrong && !self->is_contradicted) {
+        self->contradicted_s = time_s;
+    }
+    self->is_contradicted = is_wrong;
+    const double steps = 1.0 + (time_s - self->contradicted_s) / self->step_s;
+    const double most = (double)bounds->contact_mismatch_steps;
+    return is_wrong && most > 0.0 && steps > most - 0.5;
 }
 
 /* Takes a finite measurement of state and velocity, 18 each, with the reference's state and the heights of the feet,
@@ -1641,6 +1661,23 @@ static inline MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *
     }
     for (int i = 0; i < d; ++i) {
         mean[i] /= (real)duration_s;
+    }
+}
+
+/* Moves an input of the stage from a time on to the part of it for which a command is held, as the trajectory's own
+ * input moves. Does nothing for commands that are held for whole stages. */
+static inline MAYBE_UNUSED void online_trajectory_move_input(online_trajectory *self, double stage_s, double step_s,
+        double now_s, double held_s, real *restrict input)
+{
+    if (held_s > ONLINE_WHOLE_STAGE * step_s) {
+        return;
+    }
+    real held[D] = {0};
+    real whole[D] = {0};
+    online_trajectory_mean_input(self, now_s, held_s, held);
+    online_trajectory_mean_input(self, stage_s, step_s, whole);
+    for (int i = 0; i < online_trajectory_latent_dim(self); ++i) {
+        input[i] += held[i] - whole[i];
     }
 }
 

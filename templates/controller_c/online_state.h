@@ -42,7 +42,7 @@ typedef struct {
 } online_plan_time;
 
 /* What is wrong. Each has a status. */
-typedef enum { ONLINE_NONE, ONLINE_TILT, ONLINE_JOINT_RANGE, ONLINE_JOINT_SPEED, ONLINE_BODY_FAR, ONLINE_JOINTS_FAR, ONLINE_BODY_LEAP, ONLINE_JOINTS_LEAP, ONLINE_NOT_AT_START, ONLINE_CLOCK_STANDS, ONLINE_CLOCK_BACK, ONLINE_CLOCK_LEAPS, ONLINE_FROZEN, ONLINE_VELOCITY_MISMATCH, ONLINE_CONTACT_MISMATCH, ONLINE_POOR_STEPS } online_fault;
+typedef enum { ONLINE_NONE, ONLINE_TILT, ONLINE_JOINT_BEYOND, ONLINE_JOINT_SPEED, ONLINE_BODY_FAR, ONLINE_JOINTS_FAR, ONLINE_BODY_LEAP, ONLINE_JOINTS_LEAP, ONLINE_NOT_AT_START, ONLINE_CLOCK_STANDS, ONLINE_CLOCK_BACK, ONLINE_CLOCK_LEAPS, ONLINE_FROZEN, ONLINE_VELOCITY_MISMATCH, ONLINE_CONTACT_MISMATCH, ONLINE_POOR_STEPS } online_fault;
 
 /* What the supervisor remembers. */
 typedef struct {
@@ -76,8 +76,11 @@ typedef struct {
     bool is_aloft;
     double aloft_s;
     real aloft_m_s;
-    /* Measurements in a row whose contacts cannot be; steps in a row without a good plan. */
-    int contacts;
-    int poor;
+    /* Since when contacts cannot be, s. */
+    bool is_contradicted;
+    double contradicted_s;
+    /* Time without a good plan, s, and that of a step. */
+    double poor_s;
+    double step_s;
 } online_supervisor;
 

@@ -76,8 +76,8 @@ fn changes_of_the_steps_in_rust_change_the_commands_of_the_c() {
     for (number, (file, from, changed)) in [
         (
             "plan.rs",
-            "POSTURE_SHARE: f64 = 0.9",
-            "POSTURE_SHARE: f64 = 0.8",
+            "POSTURE_LEAD: f64 = 0.4",
+            "POSTURE_LEAD: f64 = 0.3",
         ),
         (
             "command.rs",

@@ -196,7 +196,7 @@ fn weak_and_strong_motors_are_made_up_for() {
     for stiffness_nm_rad in [0.0, 5.0] {
         let damping_nm_s_rad = 0.04 * stiffness_nm_rad;
         let estimating = MpcSettings {
-            effectiveness_time_s: Some(1.0),
+            effectiveness: Some(1.0),
             drives: Drives {
                 stiffness_nm_rad,
                 damping_nm_s_rad,

@@ -11,7 +11,7 @@ use romc::recording::{PhaseRule, Recording};
 use romc::robot::{InputRule, JOINT_DIM, Robot, STATE_DIM, WrenchFrame};
 use romc::robot_file;
 use romc::train::{
-    self, BodyEquations, MirrorImages, Monitor, Origin, Progress, Recordings, TrainError,
+    BodyEquations, Method, MirrorImages, Monitor, Origin, Progress, Recordings, TrainError,
     TrainOptions,
 };
 
@@ -259,7 +259,7 @@ fn mass_and_rotation_do_not_come_from_the_file_of_the_robot() {
         let (cancel, mut listener) = (AtomicBool::new(false), |_: Progress| ());
         let monitor = &mut Monitor::new(&mut listener, &cancel);
         let recordings = Recordings::new(&training, &validation);
-        let trained = train::closed_form(recordings, robot, &options, &origin, monitor);
+        let trained = Method::ClosedForm.learn(recordings, robot, &options, &origin, monitor);
         let model = trained.expect("trains").model;
         let invariance = Invariance::of(&model).expect("finite").expect("complete");
         (

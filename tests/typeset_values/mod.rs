@@ -18,7 +18,8 @@ use crate::equations::Equations;
 use crate::model::{LatentVariable, Library, ReducedModel};
 use crate::symbolic::Function;
 use crate::typeset::{
-    Equation, Math, RobotTypeset, Rounding, Signed, Symbol, SymbolTable, Typeset, expression,
+    Equation, Math, RobotTypeset, Rounding, Signed, Symbol, SymbolTable, Typeset,
+    expression::expression,
 };
 
 type Values = BTreeMap<Symbol, f64>;

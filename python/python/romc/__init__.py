@@ -11,7 +11,7 @@ quantities are `(n, d)` in the model's scaled units.
 """
 
 from romc._romc import __version__
-from romc.controller import Command, ControlRun, Controller
+from romc.controller import STATUSES, Command, ControlRun, Controller
 from romc.equations import Equations
 from romc.errors import ModelError, RecordingError, RomcError, RomcWarning
 from romc.library import Library
@@ -33,6 +33,7 @@ __all__ = [
     "RecordingError",
     "RomcError",
     "RomcWarning",
+    "STATUSES",
     "Segment",
     "Simplified",
     "SimulatedSegment",

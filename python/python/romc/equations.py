@@ -7,12 +7,15 @@ from typing import Dict, List, Tuple
 from romc import _romc
 
 Summands = List[Tuple[float, str]]
+# The same with the digits of the coefficient in print.
+_Printed = List[Tuple[float, str, str]]
 
 
 class Equations:
     """The latent accelerations of each phase, in their shortest equal form.
 
-    In a notebook they show as formulas; `str` gives them as text that `romc import` reads, with all digits.
+    In a notebook they show as formulas; `str` gives them as text that `romc import` reads, with all
+    digits unless `digits` or `significant` is given.
     """
 
     def __init__(self, model: "_romc.Model", arguments: Dict[str, object]) -> None:
@@ -35,8 +38,8 @@ class Equations:
         """Coefficient and candidate term of each summand, one list per acceleration ddz1, ddz2, ..."""
         for known in self._phases:
             if known["name"] == phase:
-                terms: List[Summands] = known["terms"]
-                return terms
+                terms: List[_Printed] = known["terms"]
+                return [[(coefficient, term) for coefficient, _, term in summands] for summands in terms]
         raise KeyError(f"{phase!r}, expected one of {', '.join(self.phases)}")
 
     def latex(self) -> str:
@@ -67,12 +70,13 @@ class Equations:
         return f"$$\\begin{{array}}{{l}}\n{body}\n\\end{{array}}$$"
 
 
-def _sum_text(summands: Summands) -> str:
-    """`0.36 - 0.91*dz2 + u1`, with all digits of the coefficients."""
+def _sum_text(summands: _Printed) -> str:
+    """`0.36 - 0.91*dz2 + 1*u1`; coefficients that print as zero are left out."""
     text = ""
-    for coefficient, term in summands:
-        sign = "-" if coefficient < 0 else "+"
-        size = repr(abs(coefficient))
+    for _, digits, term in summands:
+        if float(digits) == 0.0:
+            continue
+        sign, size = ("-", digits[1:]) if digits.startswith("-") else ("+", digits)
         product = size if term == "1" else f"{size}*{term}" if _is_product(term) else f"{size}*({term})"
         text += f" {sign} {product}" if text else f"-{product}" if sign == "-" else product
     return text or "0"

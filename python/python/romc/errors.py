@@ -31,6 +31,7 @@ def _in_python(message: str) -> str:
 
     message = re.sub(r"(a tensor|tensors) mean\.state and std\.state", "mean= and std=", message)
     message = message.replace("--unchecked writes", "unchecked=True takes")
+    message = message.replace("--library FILE with the list of terms", "library=[...], the list of terms")
     message = re.sub(r"a tensor (mean|std)\.state", r"\1=", message)
     # Indented lines are to be typed as they are.
     lines = message.splitlines()

@@ -1,11 +1,6 @@
 //! From expressions to normal forms.
 
-use std::collections::{HashMap, HashSet};
-
-use num_traits::ToPrimitive;
-
-use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, nearest, ratio};
-use crate::{ExprId, ExprPool, Function, Node, Number};
+use super::*;
 
 /// Most fractions of two arguments that are compared by multiplying out, and most such comparisons.
 const MAX_FRACTIONS: usize = 4;

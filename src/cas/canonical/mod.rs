@@ -14,3 +14,12 @@ pub(crate) mod forms;
 pub(crate) mod polynomial;
 mod products;
 mod roots;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use forms::{CanonicalForms, MAX_ROOT, exponentials};
+use num_bigint::{BigInt, BigUint};
+use num_traits::{One, Signed, ToPrimitive, Zero};
+use polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, nearest, ratio};
+
+use crate::{ExprId, ExprPool, Function, Node, Number, SymbolId};

@@ -1,14 +1,10 @@
 //! Sums of complex rational coefficients, known to a radius, times products of atoms and one exponential.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Add, Mul, Sub};
 
-use num_bigint::BigInt;
-use num_traits::{One, Signed, ToPrimitive, Zero};
+use super::*;
 
 pub(super) use num_rational::BigRational as Rational;
-
-use crate::{ExprId, Function, Number, SymbolId};
 
 const MAX_TERMS: usize = 2_000;
 
@@ -138,7 +134,6 @@ impl CanonicalForm {
         self.terms.values().all(Coefficient::may_be_zero)
     }
 
-    /// The coefficients.
     pub fn coefficients(&self) -> impl Iterator<Item = &Coefficient> {
         self.terms.values()
     }
@@ -309,7 +304,6 @@ impl Coefficient {
         self.re.is_zero() && self.im.is_zero()
     }
 
-    /// The magnitude of the value.
     pub fn magnitude(&self) -> f64 {
         nearest(&self.re).hypot(nearest(&self.im))
     }
@@ -324,7 +318,6 @@ impl Coefficient {
         f64::from_bits(self.radius)
     }
 
-    /// Whether zero is among the numbers that it may stand for.
     pub fn may_be_zero(&self) -> bool {
         let is_within = || self.magnitude() <= self.radius() * (1.0 + 1e-9);
         self.is_zero() || (self.radius > 0 && is_within())
@@ -338,7 +331,6 @@ impl Coefficient {
         self.im.is_zero().then_some(&self.re)
     }
 
-    /// Whether the value is an integer.
     pub fn is_integer(&self) -> bool {
         self.as_real().is_some_and(Rational::is_integer)
     }

@@ -1,12 +1,6 @@
 //! Products, powers, quotients and square roots of normal forms, with the powers of atoms in their ranges.
 
-use std::collections::BTreeMap;
-
-use num_traits::Signed;
-
-use super::forms::CanonicalForms;
-use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, nearest, ratio};
-use crate::Function;
+use super::*;
 use crate::number::power;
 
 /// Largest power of a sum that is multiplied out, and of a single term.

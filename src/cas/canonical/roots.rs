@@ -1,11 +1,6 @@
 //! Roots, logarithms, exponentials and magnitudes of normal forms.
 
-use num_bigint::{BigInt, BigUint};
-use num_traits::{ToPrimitive, Zero};
-
-use super::forms::{CanonicalForms, MAX_ROOT, exponentials};
-use super::polynomial::{Atom, CanonicalForm, Coefficient, Monomial, Rational, ratio};
-use crate::Function;
+use super::*;
 
 impl CanonicalForms<'_> {
     /// A form that is positive where it is used, as `scale * prod base^power * exp(E)` with positive scale and bases.

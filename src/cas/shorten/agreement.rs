@@ -3,12 +3,10 @@
 //! would hit it, code of the form has to hit it too, and its derivatives are numbers where those of the sum are
 //! accurate. Sums and products of variables and bounded functions need no test: equal ones have the same degrees.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use super::Summands;
+use super::*;
 use crate::interval::power_by;
-use crate::{ExprId, ExprPool, Function, Interval, Node, SymbolId};
 
 /// Ranges from which the variables of the points near the origin are taken.
 const NEAR: [(f64, f64); 6] = [

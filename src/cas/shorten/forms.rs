@@ -1,9 +1,6 @@
 //! The shortest form of a group of summands.
 
-use super::agreement::Agreement;
-use super::search::Shortener;
-use super::{Scaled, Summands};
-use crate::{ExprId, ExprPool, Function, IdMap, Node, Number};
+use super::*;
 
 const MAX_GROUP: usize = 64;
 const MAX_CHOSEN: usize = 16;

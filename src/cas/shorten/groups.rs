@@ -1,12 +1,7 @@
 //! Which summands can interact.
 
-use std::collections::{BTreeMap, HashMap};
-
-use super::Summands;
-use super::search::{Block, Distance, Shortener};
+use super::*;
 use crate::polynomial::MAX_POWER;
-use crate::simplify::MAX_WORK;
-use crate::{ExprId, ExprPool, Function, IdMap, Node, Number};
 
 const MAX_PARTS: usize = 64;
 const ROUNDING: f64 = 1e-13;

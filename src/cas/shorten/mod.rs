@@ -14,7 +14,13 @@ mod forms;
 mod groups;
 pub(crate) mod search;
 
-use crate::{ExprId, Number};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use agreement::Agreement;
+use search::{Block, Distance, Shortener};
+
+use super::*;
+use crate::simplify::MAX_WORK;
 
 /// Summands `coefficient * expr`.
 type Summands = Vec<(f64, ExprId)>;

@@ -1,14 +1,9 @@
 //! The replacements of a sum, group by group.
 
-use std::collections::HashMap;
-
-use super::agreement::Agreement;
 use super::forms::{NestedSums, collected};
 use super::groups::Link;
-use super::{Scaled, Summands};
+use super::*;
 use crate::cost::Costs;
-use crate::simplify::MAX_WORK;
-use crate::{Exponent, ExprId, ExprPool, Function, IdMap, IdSet, Node, Number, SymbolId};
 
 const MAX_ROUNDS: usize = 4;
 
@@ -24,7 +19,7 @@ pub struct Shortened {
 /// Shortens sums over one pool, and remembers what it found about their terms.
 #[derive(Debug)]
 pub struct Shortener<'a> {
-    pub(super) pool: &'a mut ExprPool,
+    pub pool: &'a mut ExprPool,
     pub(super) costs: Costs,
     singles: IdMap<ExprId>,
     pub(super) plain: IdMap<bool>,
@@ -75,7 +70,6 @@ fn merge(blocks: &mut [Block], places: &[usize], summands: Summands) {
 }
 
 impl<'a> Shortener<'a> {
-    /// A shortener of sums over `pool`.
     pub fn new(pool: &'a mut ExprPool) -> Self {
         Self {
             pool,
@@ -84,11 +78,6 @@ impl<'a> Shortener<'a> {
             plain: IdMap::default(),
             links: HashMap::new(),
         }
-    }
-
-    /// The pool, with the expressions that were made.
-    pub fn pool(&self) -> &ExprPool {
-        self.pool
     }
 
     /// The replacements that make `sum coefficient * expr` shortest, ordered by first position; none if it is short.

@@ -1,18 +1,11 @@
 //! The program, its commands and their options; those of `compile`, `import` and `train` have files of their own.
 
-use std::path::PathBuf;
-
-use clap::{ArgAction, Args, Parser, Subcommand};
-
 use super::compile::CompileArguments;
 use super::import::ImportArguments;
 use super::train::{StudyArguments, TrainArguments};
-use super::value::{ReadingArguments, RobotParser, choice, count, overwrite, real};
+use super::*;
 use crate::evaluate::ReferenceInput;
-use crate::files::Overwrite;
 use crate::limits::table::{APEX, DISTANCE, HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
-use crate::mpc::{LIFTS, Lift, SOLVERS, Solver};
-use crate::simplify::Tolerance;
 
 /// The reduced-order model compiler: from recorded jumps to equations, code and torques.
 #[derive(Debug, Parser)]

@@ -1,15 +1,7 @@
 //! `romc compile`: equations and code, and how far they may be simplified.
 
-use std::path::PathBuf;
-
-use clap::{ArgAction, Args, ValueEnum};
-
-use super::value::{ReadingArguments, count, overwrite, real};
-use crate::codegen::{Precision, SineCosine, Units};
-use crate::deploy::Target;
-use crate::files::Overwrite;
+use super::*;
 use crate::limits::table::{DIGITS, MARGIN, SIGNIFICANT, WIDTH};
-use crate::simplify::Tolerance;
 use crate::typeset::Form;
 
 #[derive(Debug, Args)]

@@ -1,14 +1,8 @@
 //! Flags that a command would ignore beside its other arguments, refused as wrong usage.
 
-use std::path::Path;
-
 use super::*;
 use crate::Error;
 use crate::artifact::is_standard_input;
-use crate::codegen::{Precision, SineCosine};
-use crate::deploy::Target;
-use crate::import::Format;
-use crate::mpc::Lift;
 
 impl Arguments {
     /// Refuses a flag that has no effect beside the others.

@@ -1,17 +1,7 @@
 //! `romc import`: models trained elsewhere.
 
-use std::path::PathBuf;
-
-use clap::{ArgAction, Args};
-
-use super::value::{ReadingArguments, RobotParser, count, overwrite, real, wrench_frame};
-use crate::files::Overwrite;
-use crate::import::{
-    Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
-};
+use super::*;
 use crate::limits::table::{IMPORTED_LATENT_DIM, INPUT_SCALING, SAMPLE_TIME, SCALING};
-use crate::model::{Activation, CoordinateOrder, LibraryOrder, StandardLibrary};
-use crate::robot::WrenchFrame;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum LibraryArgument {

@@ -12,3 +12,19 @@ pub(crate) use compile::*;
 pub(crate) use import::*;
 pub(crate) use train::*;
 pub(crate) use value::ReadingArguments;
+
+use std::path::{Path, PathBuf};
+
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use value::{RobotParser, choice, count, finite, overwrite, real, wrench_frame};
+
+use crate::codegen::{Precision, SineCosine, Units};
+use crate::deploy::Target;
+use crate::files::Overwrite;
+use crate::import::{
+    Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
+};
+use crate::model::{Activation, CoordinateOrder, LibraryOrder, StandardLibrary};
+use crate::mpc::{LIFTS, Lift, SOLVERS, Solver};
+use crate::robot::{STATE_DIM, WrenchFrame};
+use crate::simplify::Tolerance;

@@ -1,18 +1,13 @@
 //! Arguments of `romc train` and `romc study`.
 
-use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{ArgAction, Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 
-use super::value::{ReadingArguments, RobotParser, count, finite, overwrite, real, wrench_frame};
-use crate::files::Overwrite;
+use super::*;
 use crate::limits::table;
-use crate::model::Activation;
 use crate::recording::preprocess::SavitzkyGolay;
 use crate::recording::{Accelerations, SmoothedRows};
-use crate::robot::{STATE_DIM, WrenchFrame};
 use crate::study::Shard;
 use crate::train::{
     BodyEquations, BodyRows, Coordinates, Integrator, Method, MirrorImages, RecipePart, Split,

@@ -1,18 +1,15 @@
 //! Parsers of numbers by their ranges, and of names; how recordings are read.
 
-use std::path::PathBuf;
-
+use clap::ValueEnum as _;
 use clap::builder::{
     BoolValueParser, PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser,
 };
-use clap::{Args, ValueEnum as _};
 
 use super::train::Finite;
+use super::*;
 use crate::cli::shared::quoted;
-use crate::files::Overwrite;
 use crate::limits::Range;
 use crate::recording::Clocks;
-use crate::robot::WrenchFrame;
 
 pub(super) fn count(range: &'static Range) -> impl Fn(&str) -> Result<usize, String> + Clone {
     |text| range.parse(text)
@@ -38,7 +35,7 @@ pub(super) fn choice<T: Copy + Send + Sync>(
 }
 
 pub(super) fn overwrite() -> impl TypedValueParser<Value = Overwrite> {
-    BoolValueParser::new().map(Overwrite::when_forced)
+    BoolValueParser::new().map(Overwrite::from)
 }
 
 /// Takes any text and offers the names of romc's own robots to shells.

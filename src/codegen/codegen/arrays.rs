@@ -2,7 +2,6 @@
 
 use super::translate::Translator;
 use super::*;
-use crate::ir::{LANES, Vector, alternating};
 
 /// Where the rows of a matrix of values live: `stride` apart in an array, from the home's first element on.
 struct MatrixStorage {

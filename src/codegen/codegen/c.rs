@@ -44,7 +44,7 @@ pub fn emit(
     provenance: &str,
     precision: Precision,
     sines: SineCosine,
-) -> Result<Vec<EmittedFile>, CodegenError> {
+) -> Result<Vec<EmittedFile>> {
     let name = entries.identifier.as_str();
     let d = &Dialect::new(&C, name, precision);
     let m = &ModelText::new(entries, d, Some(sines));

@@ -1,10 +1,7 @@
 //! Words of the generated documentation: equations, arrays and units of each function.
 
 use super::*;
-use crate::equations::{Unit, summand_words};
-use crate::model::CoordinateNames;
-use crate::robot::WrenchFrame;
-use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
+use crate::robot::{LEAST_HEIGHT, LEAST_SPAN, WrenchFrame};
 
 const MOST_TERMS: usize = 40;
 

@@ -3,7 +3,6 @@
 use std::fmt;
 
 use super::*;
-use crate::ir::FUNCTIONS;
 
 /// A name that is an identifier of the target and unique in its scope; minted by [`Namer`].
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

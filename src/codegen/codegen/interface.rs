@@ -2,9 +2,7 @@
 
 use super::documentation::{equations, of_coordinates, of_inputs, of_maps};
 use super::*;
-use crate::equations::LatentUnits;
-use crate::lower::{self, Form, Map};
-use crate::model::ModelError;
+use crate::lower;
 
 #[derive(Clone, Debug)]
 pub(crate) struct FunctionSpec {

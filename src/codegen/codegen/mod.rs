@@ -25,18 +25,23 @@ mod translate;
 pub use dialect::{tidy, wrapped};
 pub use options::{CodegenError, Precision, SineCosine, Units};
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use askama::Template;
-
-use crate::equations::{Equations, LatentUnits};
-use crate::files::EmittedFile;
-use crate::ir::{Binary, Program, Slot, Statement, Table, Unary, ValueId};
-use crate::lower::{JacobianPattern, LowerError};
-use crate::model::ReducedModel;
 use dialect::{Dialect, Function, Index, Parameter, Role, Span, comment_lines};
 use ident::{Ident, Namer, Tables};
 use interface::{FunctionSpec, ModelInterface, computes_angles};
 use model_text::{KernelText, ModelText};
 use printer::Text;
 use test_vectors::{FunctionVectors, N_BATCH, N_POINTS, ParameterVectors};
+
+use crate::equations::{Equations, LatentUnits, Unit, summand_words};
+use crate::files::EmittedFile;
+use crate::ir::{
+    Binary, FUNCTIONS, Interpreter, LANES, Program, Slot, Statement, Table, Unary, ValueId, Vector,
+    alternating,
+};
+use crate::lower::{Form, JacobianPattern, LowerError, Map};
+use crate::model::{CoordinateNames, ModelError, ReducedModel, Scaling};
+
+type Result<T, E = CodegenError> = std::result::Result<T, E>;

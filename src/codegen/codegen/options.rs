@@ -1,7 +1,6 @@
 //! What a user chooses of generated code: its numbers, sines and units; and why there is none.
 
 use super::*;
-use crate::model::Scaling;
 
 /// Floating-point numbers of generated code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -58,7 +57,7 @@ impl Precision {
     }
 
     /// Whether every constant of the functions is finite in this precision.
-    pub fn check(self, entries: &ModelInterface) -> Result<(), CodegenError> {
+    pub fn check(self, entries: &ModelInterface) -> Result<()> {
         let beyond =
             |entry: &FunctionSpec| Some((entry.name.clone(), beyond_single(&entry.program)?));
         match entries.all().find_map(beyond).filter(|_| self.is_single()) {
@@ -81,7 +80,6 @@ fn beyond_single(program: &Program) -> Option<f64> {
         .or(inner)
 }
 
-/// Where sines and cosines come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum SineCosine {
     // Within about one unit of the last place, without branches, so that loops over it vectorise.
@@ -124,7 +122,6 @@ impl Units {
 /// Why no code could be generated from a model.
 #[derive(Debug, thiserror::Error)]
 pub enum CodegenError {
-    /// The model cannot be lowered.
     #[error(transparent)]
     Lower(#[from] LowerError),
     /// A constant is beyond the largest single-precision number.
@@ -134,10 +131,8 @@ pub enum CodegenError {
     BeyondSingle {
         /// The function, without the model's name.
         function: String,
-        /// The constant.
         value: f64,
     },
-    /// A template failed to render.
     #[error("a template failed")]
     Template(#[from] askama::Error),
 }

@@ -34,7 +34,7 @@ pub fn emit(
     provenance: &str,
     precision: Precision,
     sines: SineCosine,
-) -> Result<Vec<EmittedFile>, CodegenError> {
+) -> Result<Vec<EmittedFile>> {
     let name = entries.identifier.as_str();
     let d = &Dialect::new(&RUST, name, precision);
     let banner = &format!("// {provenance}");

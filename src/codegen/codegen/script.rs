@@ -47,11 +47,7 @@ enum File<'a> {
 
 impl Script {
     /// The file of a model; `provenance` is the text of the first line.
-    pub fn emit(
-        self,
-        entries: &ModelInterface,
-        provenance: &str,
-    ) -> Result<Vec<EmittedFile>, CodegenError> {
+    pub fn emit(self, entries: &ModelInterface, provenance: &str) -> Result<Vec<EmittedFile>> {
         let (spelling, modules, comment, ending) = match self {
             Self::NumPy => (&NUMPY, MODULES, "#", ".py"),
             Self::Casadi => (&CASADI, MODULES, "#", "_casadi.py"),

@@ -1,9 +1,7 @@
 //! Input and output vectors for self-tests of generated code, from the interpreter, at finite results where possible.
 
 use super::*;
-use crate::ir::Interpreter;
-use crate::robot::JOINT_DIM;
-use crate::robot::LEG_JOINT_DIM;
+use crate::robot::{JOINT_DIM, LEG_JOINT_DIM};
 use crate::typeset::rounded_up;
 
 pub(crate) const N_POINTS: usize = 6;

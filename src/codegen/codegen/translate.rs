@@ -1,7 +1,5 @@
 //! Programs to the text of a function's body: names and nested expressions; the tree of operations stays.
 
-use std::collections::HashSet;
-
 use super::printer::Printer;
 use super::*;
 

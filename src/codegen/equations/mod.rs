@@ -33,3 +33,15 @@ mod system;
 pub use physical::{LatentUnits, PhysicalError, Unit};
 pub(crate) use system::summand_words;
 pub use system::{Equations, ExactStep, PhaseEquations};
+
+use std::borrow::Cow;
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector};
+use system::Summand;
+
+use crate::model::{
+    AffineMap, CandidateTerm, CoordinateNames, FeetRule, LatentVariable, LatentWords, Library,
+    MAX_TERM_LEN, ModelError, Phase, ReducedModel, ScaleFactors, Scaling,
+};
+use crate::symbolic::{ExprId, ExprPool, Node, Shortened, Shortener, SymbolId};

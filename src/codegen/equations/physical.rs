@@ -9,24 +9,14 @@
 //! `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike. Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z,
 //! sigma dZ, upsilon U)`, numeric factors taken out of every term and into its coefficient.
 
-use std::borrow::Cow;
-use std::fmt;
 use std::ops::{Div, Mul};
 
-use nalgebra::{DMatrix, DVector};
-
-use super::system::{Equations, PhaseEquations, Summand};
-use crate::model::{
-    AffineMap, CandidateTerm, CoordinateNames, LatentVariable, LatentWords, ModelError,
-    ReducedModel, ScaleFactors, Scaling,
-};
-use crate::symbolic::{ExprId, ExprPool, Node, SymbolId};
+use super::*;
 
 const RULES: f64 = 0.5; // share of a row's sum of squares from which its unit rules it
 
 /// Why equations cannot be in physical units.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum PhysicalError {
     #[error(
         "physical units need an affine encoder and decoder, scale factors, and names and units of state and input"
@@ -134,7 +124,7 @@ impl Equations<'_> {
     }
 
     /// Quantity and unit of each latent coordinate of these equations; empty where the model does not determine them.
-    pub fn latent_words(&self) -> Vec<LatentWords> {
+    pub(crate) fn latent_words(&self) -> Vec<LatentWords> {
         let scaled = self.in_scaled_units().model.latent_words();
         let Some(units) = self.latent_units() else {
             return scaled;

@@ -1,18 +1,11 @@
 //! The accelerations of all phases as sums of coefficients times expressions, and their shortest form, equal as real
 //! functions: the algebra finds it ([`Shortener`]); a new term stands where the first that it replaces stood.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
-use std::fmt;
 
-use nalgebra::DMatrix;
 use serde::{Serialize, Serializer};
 
-use super::physical::LatentUnits;
-use crate::model::{
-    CandidateTerm, FeetRule, LatentVariable, Library, MAX_TERM_LEN, ModelError, Phase, ReducedModel,
-};
-use crate::symbolic::{ExprId, ExprPool, Shortened, Shortener, SymbolId};
+use super::*;
 
 /// One summand of an equation: `coefficient * terms[term]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,10 +14,8 @@ pub struct Summand {
     pub term: usize,
 }
 
-/// The accelerations of one phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseEquations {
-    /// Name, such as `contact`.
     pub name: String,
     /// Foot patterns that select the phase.
     pub feet: FeetRule,
@@ -39,7 +30,6 @@ pub struct Equations<'a> {
     pub model: Cow<'a, ReducedModel>,
     /// The pool of the terms. Clone it to build on them: ids stay valid in the clone.
     pub pool: ExprPool,
-    /// The terms of all phases.
     pub terms: Vec<CandidateTerm>,
     /// In the model's order.
     pub phases: Vec<PhaseEquations>,
@@ -137,12 +127,10 @@ impl<'a> Equations<'a> {
         self.physical.as_ref().map(|(units, _)| units)
     }
 
-    /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
         self.model.latent_dim()
     }
 
-    /// The phase with this index.
     pub fn phase(&self, phase: usize) -> Result<&PhaseEquations, ModelError> {
         self.phases.get(phase).ok_or(ModelError::PhaseIndex {
             found: phase,
@@ -188,7 +176,6 @@ impl PhaseEquations {
 /// Terms of one equation that a shorter form took the place of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExactStep {
-    /// The phase's name.
     pub phase: String,
     /// Index of the latent coordinate.
     pub output: usize,
@@ -267,7 +254,7 @@ impl Equations<'_> {
                 let mut all: Vec<Summand> = Vec::new();
                 for Shortened { replaced, by } in shortener.shorten(&summands) {
                     let first = equation[replaced[0]].term;
-                    let after = new.placed(shortener.pool(), &mut self.terms, first, &by);
+                    let after = new.placed(shortener.pool, &mut self.terms, first, &by);
                     let Some((placed, texts)) = after else {
                         continue;
                     };

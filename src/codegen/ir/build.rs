@@ -31,7 +31,6 @@ pub(crate) struct ProgramBuilder {
 }
 
 impl ProgramBuilder {
-    /// An empty program.
     pub(crate) fn new(name: &str) -> Self {
         Self {
             program: Program {
@@ -60,12 +59,10 @@ impl ProgramBuilder {
             .collect()
     }
 
-    /// A constant.
     pub(crate) fn constant(&mut self, value: f64) -> ValueId {
         self.numbered(Key::Constant(value.to_bits()), Statement::Constant(value))
     }
 
-    /// A scalar operation on one value.
     pub(crate) fn unary(&mut self, op: Unary, a: ValueId) -> ValueId {
         self.numbered(Key::Unary(op, a), Statement::Unary(op, a))
     }
@@ -96,7 +93,6 @@ impl ProgramBuilder {
         self.numbered(Key::Select(operands), Statement::Select(operands))
     }
 
-    /// Sines and cosines of all arguments.
     pub(crate) fn sin_cos(&mut self, arguments: &[ValueId]) -> (Vec<ValueId>, Vec<ValueId>) {
         let n = arguments.len();
         let statement = Statement::SinCos {
@@ -177,7 +173,6 @@ impl ProgramBuilder {
             .extend(entries.map(|(index, &value)| ResultEntry { slot, index, value }));
     }
 
-    /// The finished program.
     pub(crate) fn finish(self) -> Result<Program, IrError> {
         let of_table = |table: &usize| {
             let mut entries = self.program.tables[*table].entries.iter().copied();

@@ -39,7 +39,6 @@ enum Step {
 }
 
 impl<T: Real> Interpreter<T> {
-    /// Prepares a program for runs.
     pub fn new(program: &Program) -> Self {
         let mut values = vec![T::constant(0.0); program.n_values()];
         let (mut loads, mut steps) = (Vec::new(), Vec::new());

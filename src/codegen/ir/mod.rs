@@ -29,7 +29,7 @@ mod program;
 #[path = "../../../tests/differential/sines.rs"]
 mod sines;
 
-pub use build::IrError;
+pub(crate) use build::IrError;
 pub(crate) use build::ProgramBuilder;
 pub use interpret::{
     Interpreter,

@@ -5,22 +5,17 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::interpret::{double, single};
 
-/// Operations on one scalar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Unary {
-    /// `-a`
     Neg,
     /// Square root, correctly rounded.
     Sqrt,
-    /// Absolute value.
     Abs,
     /// `1`, `-1` or `0` as `a` is positive, negative or zero; NaN of NaN.
     Sign,
     /// Tangent; this and those below by the target's library.
     Tan,
-    /// Hyperbolic tangent.
     Tanh,
-    /// Exponential.
     Exp,
     /// Natural logarithm.
     Log,
@@ -53,13 +48,9 @@ impl Unary {
 /// Operations on two scalars, each rounded once except powers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Binary {
-    /// `a + b`
     Add,
-    /// `a - b`
     Sub,
-    /// `a * b`
     Mul,
-    /// `a / b`
     Div,
     /// `a ^ b` of the target's library, for exponents that are no integers.
     Pow,

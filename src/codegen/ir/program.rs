@@ -55,16 +55,12 @@ impl<T> Table<T> {
 /// One step of the schedule; defines one or several values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Statement {
-    /// A finite constant.
     Constant(f64),
     /// Element `index` of input `slot`; every element has one such statement, in their order.
     Input {
-        /// Which input.
         slot: usize,
-        /// Which element of it.
         index: usize,
     },
-    /// A scalar operation on one value.
     Unary(Unary, ValueId),
     /// A scalar operation on two values.
     Binary(Binary, ValueId, ValueId),
@@ -141,17 +137,13 @@ pub(crate) struct ResultEntry {
 /// A validated, scheduled computation of named output arrays from named input arrays; see `ProgramBuilder`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
-    /// Name of the computation.
     pub name: String,
-    /// Arrays that enter.
     pub inputs: Vec<Slot>,
-    /// Arrays that leave.
     pub outputs: Vec<Slot>,
     /// All statements, in order of evaluation.
     pub statements: Vec<Statement>,
     pub(super) first: Vec<u32>, // value of each statement, and the number of values at the end
     pub(crate) tables: Vec<Table>,
-    /// Programs that this one evaluates.
     pub callees: Vec<Program>,
     /// What is stored where: each output element once, ordered by slot and index.
     pub(crate) results: Vec<ResultEntry>,
@@ -187,7 +179,6 @@ impl Program {
         live
     }
 
-    /// Values that statement `statement` defines.
     pub fn values_of(&self, statement: usize) -> Range<usize> {
         self.first[statement] as usize..self.first[statement + 1] as usize
     }

@@ -2,10 +2,8 @@
 //! are added here: terms that are known early in up to four partial sums side by side, terms that wait for a sine or an
 //! exponential last, so that they delay as little as possible.
 
-use std::collections::HashMap;
-
-use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
-use crate::symbolic::{ExprId, ExprPool, Number, SymbolId, sum_of_floats};
+use super::*;
+use crate::symbolic::Number;
 
 /// `constant + sum_i coefficient_i expr_i`; the expressions are distinct, not sums and without numeric factor.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,12 +1,7 @@
 //! A model's programs, ready to run: what integration and control evaluate.
 
-use nalgebra::DMatrix;
-
-use super::{Form, JacobianPattern, LowerError};
-use crate::equations::Equations;
-use crate::ir::Interpreter;
+use super::*;
 use crate::lower;
-use crate::model::ReducedModel;
 
 /// The accelerations, Jacobians and Runge-Kutta steps of all phases of a model, run by the interpreter with the
 /// arithmetic of the generated code. Evaluation allocates nothing; clone it for another thread. All vectors have
@@ -28,8 +23,7 @@ struct CompiledPhase {
 }
 
 impl CompiledModel {
-    /// Lowers all phases of a model.
-    pub fn new(model: &ReducedModel) -> Result<Self, LowerError> {
+    pub fn new(model: &ReducedModel) -> Result<Self> {
         let system = &Equations::of(model);
         let form = Form::default();
         let phases = (0..model.phases().len())
@@ -44,19 +38,17 @@ impl CompiledModel {
                     next: vec![0.0; 2 * model.latent_dim()],
                 })
             })
-            .collect::<Result<_, LowerError>>()?;
+            .collect::<Result<_>>()?;
         Ok(Self {
             latent_dim: model.latent_dim(),
             phases,
         })
     }
 
-    /// Number of latent coordinates.
     pub fn latent_dim(&self) -> usize {
         self.latent_dim
     }
 
-    /// Number of phases, in the order of the model's.
     pub fn n_phases(&self) -> usize {
         self.phases.len()
     }
@@ -83,13 +75,12 @@ impl CompiledModel {
         let CompiledPhase {
             jacobian, pattern, ..
         } = &mut self.phases[phase];
-        if pattern.is_empty() {
-            jacobian.run(&[z, dz, u_lat], &mut [ddz]);
-        } else {
-            let outputs = &mut [ddz, &mut entries[..pattern.len()]];
-            jacobian.run(&[z, dz, u_lat], outputs);
+        let count = pattern.len();
+        match count {
+            0 => jacobian.run(&[z, dz, u_lat], &mut [ddz]),
+            _ => jacobian.run(&[z, dz, u_lat], &mut [ddz, &mut entries[..count]]),
         }
-        pattern.len()
+        count
     }
 
     /// Rows and columns of the entries of a phase's Jacobian.

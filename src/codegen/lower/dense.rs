@@ -2,12 +2,7 @@
 //! terms. The columns of their Jacobian are constants for variables that occur only linearly; in the others,
 //! derivatives of sines and cosines of variables are tables whose columns are scaled, the rest a matrix-vector product.
 
-use std::collections::{BTreeSet, HashMap};
-
-use super::combination::Combination;
-use super::expression::ExpressionLowering;
-use crate::ir::{Table, ValueId};
-use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
+use super::*;
 
 pub(super) fn distinct(equations: &[Combination]) -> Vec<ExprId> {
     let mut seen = BTreeSet::new();

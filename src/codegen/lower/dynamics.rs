@@ -1,15 +1,9 @@
 //! The accelerations `ddz = Xi^T Theta(z, dz, u_lat)` of a phase, their Jacobian, and a Runge-Kutta step.
 
-use super::combination::Combination;
 use super::dense::{DenseJacobian, Form, distinct, matrix_vector};
-use super::expression::ExpressionLowering;
-use super::nested::{Demand, Nested};
-use super::number::{Number, Sheet, ids, numbers};
+use super::number::Number;
 use super::polynomial::Polynomials;
-use crate::equations::{Equations, PhaseEquations};
-use crate::ir::{IrError, Program, ProgramBuilder, ValueId};
-use crate::model::{LatentVariable, ModelError};
-use crate::symbolic::{ExprId, ExprPool, SymbolId};
+use super::*;
 
 /// Why a program could not be made from a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -20,7 +14,6 @@ pub enum LowerError {
     /// A coefficient is too large once folded with the numbers of its term.
     #[error("phase `{phase}`, output {output}: a folded coefficient is {value}")]
     NonFinite {
-        /// Name of the phase.
         phase: String,
         /// Row of the equations, from 1.
         output: usize,
@@ -46,7 +39,6 @@ impl JacobianPattern {
         self.rows.iter().copied().zip(self.cols.iter().copied())
     }
 
-    /// Number of entries.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
@@ -61,7 +53,7 @@ impl JacobianPattern {
 ///
 /// # Errors
 /// [`LowerError::Model`] if there is no such phase, [`LowerError::NonFinite`] if a coefficient overflows when folded.
-pub fn dynamics(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program, LowerError> {
+pub fn dynamics(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program> {
     let (program, _) = with_derivatives(system, phase, form, "dynamics", &[])?;
     Ok(program)
 }
@@ -72,7 +64,7 @@ pub fn dynamics_jacobian(
     system: &Equations<'_>,
     phase: usize,
     form: Form,
-) -> Result<(Program, JacobianPattern), LowerError> {
+) -> Result<(Program, JacobianPattern)> {
     let variables = LatentVariable::all(system.latent_dim());
     let columns: Vec<SymbolId> = variables.map(|variable| system.symbol(variable)).collect();
     with_derivatives(system, phase, form, "dynamics_jacobian", &columns)
@@ -84,7 +76,7 @@ fn with_derivatives(
     form: Form,
     name: &str,
     columns: &[SymbolId],
-) -> Result<(Program, JacobianPattern), LowerError> {
+) -> Result<(Program, JacobianPattern)> {
     let equations = accelerations(system, phase)?;
     let mut pool = system.pool.clone();
     let mut entries = Vec::new();
@@ -160,7 +152,7 @@ fn nested(
 }
 
 /// The right-hand sides with folded coefficients, one per latent coordinate.
-fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination>, LowerError> {
+fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination>> {
     let phase = system.phase(phase)?;
     let equation = |row| {
         let summands = phase.summands(system, row);
@@ -170,7 +162,7 @@ fn accelerations(system: &Equations<'_>, phase: usize) -> Result<Vec<Combination
     (0..system.latent_dim()).map(equation).collect()
 }
 
-fn finite(phase: &PhaseEquations, row: usize, sum: Combination) -> Result<Combination, LowerError> {
+fn finite(phase: &PhaseEquations, row: usize, sum: Combination) -> Result<Combination> {
     let coefficients = sum.items.iter().map(|&(coefficient, _)| coefficient);
     let mut numbers = std::iter::once(sum.constant).chain(coefficients);
     match numbers.find(|value| !value.is_finite()) {
@@ -208,7 +200,7 @@ fn values(lowering: &mut ExpressionLowering, sums: &[Nested]) -> Vec<ValueId> {
 
 /// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over `h` seconds with constant
 /// `u_lat`, in four calls of the accelerations: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz` after it.
-pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program, LowerError> {
+pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program> {
     let accelerations = dynamics(system, phase, form)?;
     let d = system.latent_dim();
     let mut builder = ProgramBuilder::new("step");

@@ -1,11 +1,6 @@
 //! Expressions to values: what is shared, how powers and functions are computed.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
-
-use super::combination::{Combination, Term, linear_combination, scaled};
-use super::nested::Nested;
-use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
-use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
+use super::*;
 
 /// Turns expressions of one pool into values of one program; an expression that occurs again is the same value.
 pub(super) struct ExpressionLowering<'a> {

@@ -5,15 +5,8 @@
 //! through a table, [`crate::ir::Statement::Accumulate`]; activations and slopes are without branches. Velocities run
 //! forwards through the layers, lifted inputs backwards; the projection solves with the rows of the Jacobian.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::combination::{Term, linear_combination};
-use super::dynamics::LowerError;
-use super::number::{Number, Sheet, ids, numbers};
-use crate::ir::{Program, ProgramBuilder, Table, Unary};
-use crate::model::{
-    Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, ReducedModel, StateMap, TAIL,
-};
+use super::number::Number;
+use super::*;
 
 /// A map between robot coordinates (SI units) and latent ones; velocities take no bias.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +52,7 @@ impl Map {
     ///
     /// # Errors
     /// [`LowerError::Model`] if the model has no scaling, encoder or, for the maps that decode, decoder.
-    pub fn lower(self, model: &ReducedModel) -> Result<Program, LowerError> {
+    pub fn lower(self, model: &ReducedModel) -> Result<Program> {
         let map = match self {
             Self::Encode | Self::EncodeVelocity | Self::ProjectInput | Self::LiftInput => {
                 model.encoder_map()?
@@ -86,17 +79,13 @@ impl Map {
     }
 
     /// The same for `output = weights input`, for input maps in other units than the model's.
-    pub(crate) fn of_weights(self, weights: &DMatrix<f64>) -> Result<Program, LowerError> {
+    pub(crate) fn of_weights(self, weights: &DMatrix<f64>) -> Result<Program> {
         affine(self, weights, None)
     }
 }
 
 /// `output = weights input + bias`.
-fn affine(
-    map: Map,
-    weights: &DMatrix<f64>,
-    bias: Option<&DVector<f64>>,
-) -> Result<Program, LowerError> {
+fn affine(map: Map, weights: &DMatrix<f64>, bias: Option<&DVector<f64>>) -> Result<Program> {
     let (name, (from, to)) = map.words();
     let mut builder = ProgramBuilder::new(name);
     let input = builder.input(from, weights.ncols());
@@ -117,7 +106,7 @@ fn affine(
     Ok(builder.finish()?)
 }
 
-pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program, LowerError> {
+pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program> {
     let (name, (from, to)) = map.words();
     let (at, factors, layers) = match map {
         Map::Decode | Map::DecodeVelocity => {

@@ -23,3 +23,23 @@ pub use dense::Form;
 pub use dynamics::{JacobianPattern, LowerError, dynamics, dynamics_jacobian, rk4_step};
 pub use maps::Map;
 pub use wrench::{actuator_torque, generalised_input, leg_torque};
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use combination::{Combination, Term, linear_combination, scaled};
+use expression::ExpressionLowering;
+use nalgebra::{DMatrix, DVector};
+use nested::{Demand, Nested};
+use number::{Sheet, ids, numbers};
+
+use crate::equations::{Equations, PhaseEquations};
+use crate::ir::{
+    Binary, Interpreter, IrError, LANES, Program, ProgramBuilder, Table, Unary, ValueId, Vector,
+};
+use crate::model::{
+    Activation, DENSITY_AT_ZERO, GELU_CUBIC, GELU_RATE, LatentVariable, ModelError, ReducedModel,
+    StateMap, TAIL,
+};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId, sum_of_floats};
+
+type Result<T, E = LowerError> = std::result::Result<T, E>;

@@ -4,10 +4,8 @@
 //! group. A product of many sums is computed once for all and stays. What a factor was taken out of is often needed
 //! again, as the derivative of the sum by that factor.
 
-use std::collections::{BTreeMap, HashMap};
-
-use super::combination::Combination;
-use crate::symbolic::{ExprId, ExprPool, Node, Number};
+use super::*;
+use crate::symbolic::Number;
 
 /// `flat + shared + sum_g factor_g (single_g + repeated_g)`.
 pub(super) struct Nested {

@@ -3,7 +3,9 @@
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::ir::{Binary, ProgramBuilder, Unary, ValueId};
+use Scalar::{Known, Value};
+
+use super::*;
 
 /// The program, while formulas add to it.
 pub(super) type Sheet<'b> = RefCell<&'b mut ProgramBuilder>;
@@ -21,7 +23,6 @@ enum Scalar {
     Known(f64),
     Value(ValueId),
 }
-use Scalar::{Known, Value};
 
 impl<'b> Number<'b> {
     pub(crate) fn new(sheet: &'b Sheet<'b>, id: ValueId) -> Self {

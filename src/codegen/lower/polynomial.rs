@@ -4,12 +4,7 @@
 //! times the sum of the longer path: `s_ij = a_ij + sum_k x_k a_ijk`, `s_i = a_i + sum_j x_j s_ij`. That of the empty path
 //! is the value, and `s_k + sum_i x_i s_ik + sum_ij x_i x_j a_ijk` its derivative: two products per coefficient.
 
-use std::collections::{BTreeMap, HashMap};
-
-use super::combination::Combination;
-use super::expression::ExpressionLowering;
-use crate::ir::{LANES, ProgramBuilder, ValueId, Vector};
-use crate::symbolic::{ExprId, ExprPool, Function, Node, SymbolId};
+use super::*;
 
 /// Fewest coefficients of products of three factors for which vectors are worth their zeros.
 const FEWEST_CUBIC: usize = 120;

@@ -1,10 +1,8 @@
 //! Generalised inputs from a robot's measured state, joint torques and contacts; and motor torques from those at the
 //! links. Forces and moments as of [`InputRule::wrench`](crate::robot::InputRule::wrench), in closed form.
 
-use super::dynamics::LowerError;
-use super::number::{Number, Sheet};
-use crate::ir::{Program, ProgramBuilder, Unary, ValueId};
-use crate::model::ReducedModel;
+use super::number::Number;
+use super::*;
 use crate::robot::{
     BODY_DIM, DRY_SPEED_RAD_S, FOOT_DIM, GRAVITY_M_S2, InputRule, JOINT_DIM, LEG_JOINT_DIM, Leg,
     LegShape, MovingLeg, Posture, STATE_DIM, TrunkMotion, WrenchFrame,
@@ -17,21 +15,21 @@ use crate::robot::{
 ///
 /// `net` is `tau` less viscous and dry friction, without the inertia of motors and legs: accelerations are not measured. A
 /// foot's force and moment are multiplied with its element of `feet`; at 0 they are zero in every posture.
-pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
+pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>> {
     rule_of(model).map(|rule| input_of(&rule)).transpose()
 }
 
 /// Torques of the motors behind torques at the links, `tau = net + b dq + c tanh(dq / v) + I ddq`: inputs `dx` and
 /// `ddx` (velocities and accelerations of the 18 robot coordinates, of which the joints count), `net` (12, N m); output
 /// `tau` (12, N m). `None` as for [`generalised_input`], of which it is the inverse at the joints for `ddx = 0`.
-pub fn actuator_torque(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
+pub fn actuator_torque(model: &ReducedModel) -> Result<Option<Program>> {
     rule_of(model).map(|rule| torque_of(&rule)).transpose()
 }
 
 /// Torques that carry and move the links of the legs on the ground ([`InputRule::leg_torques`]): inputs `x`, `dx`, `ddx`
 /// (18 robot coordinates, their velocities and accelerations) and `feet` (4, as of [`generalised_input`]); output `own`
 /// (12, N m). `None` as for [`generalised_input`], and for a model whose rule does not subtract them.
-pub fn leg_torque(model: &ReducedModel) -> Result<Option<Program>, LowerError> {
+pub fn leg_torque(model: &ReducedModel) -> Result<Option<Program>> {
     let rule = rule_of(model).filter(|rule| rule.legs().is_some());
     rule.map(|rule| leg_torque_of(&rule)).transpose()
 }
@@ -41,7 +39,7 @@ fn rule_of(model: &ReducedModel) -> Option<InputRule> {
     (model.state_dim() == Some(STATE_DIM)).then_some(rule)
 }
 
-fn torque_of(rule: &InputRule) -> Result<Program, LowerError> {
+fn torque_of(rule: &InputRule) -> Result<Program> {
     let mut builder = ProgramBuilder::new("actuator_torque");
     let dx = builder.input("dx", STATE_DIM);
     let ddx = builder.input("ddx", STATE_DIM);
@@ -57,7 +55,7 @@ fn torque_of(rule: &InputRule) -> Result<Program, LowerError> {
     Ok(builder.finish()?)
 }
 
-fn leg_torque_of(rule: &InputRule) -> Result<Program, LowerError> {
+fn leg_torque_of(rule: &InputRule) -> Result<Program> {
     let robot = rule.robot();
     let moments = rule.legs().expect("invariant: the caller has looked");
     let mut builder = ProgramBuilder::new("leg_torque");
@@ -106,7 +104,7 @@ fn leg_angles<'b>(rule: &InputRule, sheet: &'b Sheet<'b>, x: &[ValueId]) -> Vec<
     angles
 }
 
-fn input_of(rule: &InputRule) -> Result<Program, LowerError> {
+fn input_of(rule: &InputRule) -> Result<Program> {
     let robot = rule.robot();
     let mut builder = ProgramBuilder::new("generalised_input");
     let x = builder.input("x", STATE_DIM);

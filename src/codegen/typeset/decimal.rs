@@ -162,7 +162,7 @@ impl fmt::Display for Decimal {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Occurrence {
+pub(crate) struct Occurrence {
     pub phase: String,
     pub output: String,
     pub term: String,
@@ -174,11 +174,11 @@ pub struct Occurrence {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RoundingReport {
     /// Largest |printed - coefficient|, where it is not zero, and where it occurs.
-    pub largest: Option<(f64, Occurrence)>,
+    pub(crate) largest: Option<(f64, Occurrence)>,
     /// Largest |printed - coefficient| / |coefficient| of the terms that are printed.
     pub largest_relative: f64,
     /// Active terms whose coefficient prints as zero, so that they are left out.
-    pub dropped: Vec<Occurrence>,
+    pub(crate) dropped: Vec<Occurrence>,
     pub active: usize,
 }
 

@@ -1,5 +1,4 @@
 //! A model's latent dynamics as equations to print, and what rounding did to them.
-#![allow(missing_docs, reason = "the names say it")]
 
 use super::*;
 
@@ -12,8 +11,8 @@ pub struct EquationSystem {
 /// `left = terms`, in library order; no terms is zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Equation {
-    pub left: Symbol,
-    pub terms: Vec<Signed>,
+    pub(crate) left: Symbol,
+    pub(crate) terms: Vec<Signed>,
     /// Whether small terms were left out, so that the sides are nearly equal.
     pub is_approximate: bool,
 }

@@ -1,14 +1,12 @@
 //! From canonical expressions to the typeset tree, with factors and terms in the order that readers expect.
 
 use super::*;
-use crate::model::MAX_LATENT_DIM;
-use crate::symbolic::{ExprId, ExprPool, Node, Number, SymbolId};
 
 /// Lays out an expression over the variables of a latent model.
 ///
 /// # Panics
 /// If it has a symbol that is no such variable; libraries of models refuse these.
-pub fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signed {
+pub(crate) fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signed {
     Layout { pool, symbols }.signed(expr)
 }
 

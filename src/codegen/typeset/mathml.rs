@@ -164,8 +164,7 @@ const THIN_SPACE: &str = r#"<mspace width="0.167em"/>"#;
 const APPLY: &str = "<mo>\u{2061}</mo>";
 const MINUS: &str = "\u{2212}";
 
-/// A typeset tree.
-pub fn mathml(math: &Math) -> String {
+pub(crate) fn mathml(math: &Math) -> String {
     match math {
         Math::Number(number) => mathml_number(number),
         Math::Symbol(symbol) => mathml_symbol(symbol),

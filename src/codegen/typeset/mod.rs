@@ -1,12 +1,12 @@
 //! Equations laid out for print, before they have a spelling.
 //!
-//! A model enters; a [`Typeset`] leaves: one [`EquationSystem`] a phase, of [`Math`] trees with all parentheses, signs
+//! A model enters; a [`Typeset`] leaves: one [`EquationSystem`] a phase, of `Math` trees with all parentheses, signs
 //! and rounded coefficients in place, which [`latex`], [`markdown`] and [`mathml`] spell. Read `tree` first, then
 //! `expression` and `equations`.
 
 mod decimal;
 mod equations;
-mod expression;
+pub(crate) mod expression;
 pub mod latex;
 pub mod markdown;
 pub mod mathml;
@@ -19,25 +19,23 @@ pub mod words;
 pub use decimal::{Decimal, Rounding};
 pub(crate) use equations::{CoefficientRow, CoefficientTable};
 pub use equations::{Equation, EquationSystem, Typeset};
-pub use expression::expression;
 pub(crate) use robot::RobotTypeset;
 pub(crate) use symbols::Emitted;
 pub use symbols::{Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError};
 pub use table::{Cell, Table, rounded, rounded_up, significant};
-pub(crate) use tree::{EQUALS, Glyph, break_lines, symbol_width, width};
-pub use tree::{Math, Signed, Symbol};
+pub(crate) use tree::{EQUALS, Glyph, Math, Signed, Symbol, break_lines, symbol_width, width};
 
 use std::fmt;
 
 use askama::Template;
-use nalgebra::DMatrix;
-
-use crate::equations::{Equations, Unit};
-use crate::files::{EmittedFile, is_invisible};
-use crate::model::LatentVariable;
-use crate::symbolic::Function;
 use decimal::{Rounder, RoundingReport};
 use expression::terms;
 use latex::tex_cases;
+use nalgebra::{DMatrix, DVector};
 use tree::greek_letter;
 use words::{Page, Spelling, code_point, rendered};
+
+use crate::equations::{Equations, Unit};
+use crate::files::{EmittedFile, is_invisible};
+use crate::model::{AffineMap, FeetRule, LatentVariable, MAX_LATENT_DIM};
+use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};

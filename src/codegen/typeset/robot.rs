@@ -2,12 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::DVector;
-
 use super::equations::coefficients;
 use super::symbols::glyph;
 use super::*;
-use crate::model::AffineMap;
 
 /// Weights below this share of their row's largest are left out of the printed encoder.
 const NEGLIGIBLE: f64 = 0.02;

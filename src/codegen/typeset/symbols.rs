@@ -1,5 +1,4 @@
 //! How the model's variables are written, and what else a user can choose about printed equations.
-#![allow(missing_docs, reason = "the names say it")]
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,4 @@
 //! Tables of results: one set of cells, rendered as text, Markdown, HTML or CSV.
-#![allow(missing_docs, reason = "the names say it")]
 
 use super::decimal::finite_digits;
 use super::mathml::HtmlProse;

@@ -1,12 +1,11 @@
 //! The typeset tree: mathematics as it is laid out, before it has a spelling, with its estimated width in em (metrics
 //! of Computer Modern, good to a few percent) and where a long equation is broken.
-#![allow(missing_docs, reason = "the names say it")]
 
 use super::*;
 
 /// One piece of laid-out mathematics: parentheses, dots and signs are in place, a printer chooses spelling alone.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Math {
+pub(crate) enum Math {
     /// A number without sign.
     Number(Decimal),
     Symbol(Symbol),
@@ -29,7 +28,7 @@ pub enum Math {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Signed {
+pub(crate) struct Signed {
     pub negative: bool,
     pub math: Math,
 }
@@ -54,7 +53,7 @@ impl Signed {
 
 /// A variable: a glyph, up to two dots above it for time derivatives, and a subscript, its parts joined by commas.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Symbol {
+pub(crate) struct Symbol {
     pub(crate) glyph: Glyph,
     pub dots: u8,
     pub(crate) subscript: Vec<Glyph>,

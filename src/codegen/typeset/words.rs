@@ -2,8 +2,6 @@
 
 use super::decimal::{LEAST_DECIMALS, Occurrence, RELATIVE_ERROR};
 use super::*;
-use crate::equations::Equations;
-use crate::model::{FeetRule, LatentVariable};
 use crate::robot::{ContactFlags, Leg};
 
 /// How a sentence spells words from outside and mathematics.
@@ -12,7 +10,7 @@ pub struct Spelling {
     /// Text, so that it shows as it is.
     pub text: fn(&str) -> String,
     /// Mathematics within a line or cell, which the text spells in the library's syntax.
-    pub math: fn(&Math, &str) -> String,
+    pub(crate) math: fn(&Math, &str) -> String,
 }
 
 impl Spelling {

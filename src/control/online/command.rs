@@ -60,7 +60,7 @@ statuses! {
     LiftFailed = 15, "lift_failed", "lift failed: no torques for the latent input; fallback";
     Ended = 16, "ended", "ended: the reference is over, as settings say torques fade";
     Tilt = 20, "tilt", "tilt: roll or pitch far from the reference's, or near upside down; damping until reset";
-    JointRange = 21, "joint_range", "joint range: a joint outside its limits; damping until reset";
+    JointBeyond = 21, "joint_beyond", "joint beyond: a joint beyond its limits; damping until reset";
     JointSpeed = 22, "joint_speed", "joint speed: a joint faster than it can be; damping until reset";
     BodyFar = 23, "body_far", "body far: the body is far from the reference; damping until reset";
     JointsFar = 24, "joints_far", "joints far: a joint is far from the reference; damping until reset";
@@ -92,9 +92,10 @@ impl Status {
         (Self::Solved.code()..Self::Inaccurate.code()).contains(&self.code())
     }
 
-    /// Whether the step fell short of what the reference allows: nothing was planned, or for unknown contacts.
+    /// Whether nothing was planned, or for unknown contacts. Jumps of measurements have a patience of their own.
     fn is_poor(self) -> bool {
-        !self.has_plan() || self == Self::ContactUnknown
+        let is_poor = !self.has_plan() || self == Self::ContactUnknown;
+        is_poor && self != Self::MeasurementJump && self != Self::Ended
     }
 
     /// The status of a fault.
@@ -265,7 +266,7 @@ impl Memory {
     }
 
     /// Time since the last command, at most one stage, and one stage where it is not known or the clock stands still.
-    fn since_command(&self, time_s: f64, step_s: f64) -> f64 {
+    pub(super) fn since_command(&self, time_s: f64, step_s: f64) -> f64 {
         let passed_s = time_s - self.command_s;
         let is_known = self.has_command && passed_s > 0.0 && passed_s <= step_s;
         if is_known { passed_s } else { step_s }
@@ -301,7 +302,7 @@ impl Controller {
         let now_s = self.memory.now_s(time_s, step_s);
         let stages = (self.settings.fallback.plan_stages).min(self.settings.horizon);
         let stage = self.plan.time.stage_at(now_s, stages);
-        if stage < stages && self.write_plan(stage, command) {
+        if stage < stages && self.write_plan(stage, now_s, command) {
             command.source = Source::ShiftedPlan;
             return;
         }
@@ -328,9 +329,10 @@ impl Controller {
     }
 
     /// Counts poor steps; the status that stays.
-    pub(super) fn judged(&mut self, status: Status) -> Status {
-        let is_poor = self.reference.is_some() && status.is_poor();
-        let fault = self.supervisor.judge(&self.settings.bounds, is_poor);
+    pub(super) fn judged(&mut self, status: Status, time_s: f64) -> Status {
+        let (settings, is_poor) = (&self.settings, self.reference.is_some() && status.is_poor());
+        let passed_s = self.memory.since_command(time_s, settings.step_s);
+        let fault = self.supervisor.judge(&settings.bounds, is_poor, passed_s);
         Status::of(fault).unwrap_or(status)
     }
 

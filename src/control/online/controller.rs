@@ -96,7 +96,7 @@ impl Controller {
             last_input: vec![0.0; d],
             stance: None,
             effectiveness: Effectiveness::full(d),
-            supervisor: Supervisor::default(),
+            supervisor: Supervisor::of_step(settings.step_s),
             reference: None,
             near_rows: rows.clone(),
             rows,
@@ -283,14 +283,14 @@ impl Controller {
             Ok(()) => self.plan_step(&measurement, command),
             Err(status) => status,
         };
-        let status = self.judged(status);
+        let status = self.judged(status, measurement.time_s);
         command.status = status;
         if status == Status::Ended || self.supervisor.fault != Fault::None {
             self.damp(measurement.time_s, measurement.x, command);
         } else if !status.has_plan() {
             self.fall_back(measurement.time_s, command);
         }
-        if self.settings.effectiveness_time_s.is_some() {
+        if self.settings.effectiveness.is_some() {
             let (held, drives) = (
                 [command.joint_position_rad, command.joint_velocity_rad_s],
                 &self.settings.drives,

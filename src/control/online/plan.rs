@@ -2,9 +2,9 @@
 
 use super::dense::{Real, greater};
 
-/// Share of a stage whose posture is commanded for all of it. A joint PD that holds the posture of the stage's end is
-/// ahead of the motion and adds to the thrust; that of the middle takes from it.
-const POSTURE_SHARE: f64 = 0.9;
+/// How far ahead of the middle of the time that it is held for a posture is commanded, in stages. A joint PD that holds the
+/// posture of the end of a stage is ahead of the motion and adds to the thrust; that of the middle takes from it.
+const POSTURE_LEAD: f64 = 0.4;
 
 /// Times of the stages of a plan.
 #[derive(Debug, Clone, Copy, Default)]
@@ -47,9 +47,14 @@ impl PlanTime {
         }
     }
 
-    /// The instant whose posture is commanded for a stage, s.
-    pub(super) fn posture_s(&self, stage: usize) -> f64 {
-        self.start_s + (stage as f64 + POSTURE_SHARE) * self.step_s
+    /// The instant whose posture is commanded at a time for `held_s`, s.
+    pub(super) fn posture_s(&self, now_s: f64, held_s: f64) -> f64 {
+        now_s + (POSTURE_LEAD * self.step_s + 0.5 * held_s)
+    }
+
+    /// Beginning of a stage, s.
+    pub(super) fn stage_s(&self, stage: usize) -> f64 {
+        self.start_s + stage as f64 * self.step_s
     }
 
     /// Whether a measured state differs from the planned one, interpolated to its time, by more than `most` standard

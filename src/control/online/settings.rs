@@ -173,7 +173,7 @@ impl Bounds {
         posture_rad: 0.8,
         clock_gap_s: 0.1,
         frozen_steps: 8,
-        velocity_mismatch: 0.5,
+        velocity_mismatch: 0.3,
         contact_mismatch_steps: 5,
         poor_steps: 10,
         fade_s: 0.1,
@@ -465,7 +465,7 @@ settings! {
             in_c "largest change of a torque of LIFT_TRANSPOSE, N m/s; 0 leaves it free, as it must if UPPER_TORQUE_RATES is 0",
             in_ros "largest change of a torque of the plain lift, N m/s, where the controller is compiled with \
                     `UPPER_TORQUE_RATES=1`; 0 leaves it free";
-        effectiveness_time_s: Option<f64> = None => effectiveness_time_s: Real, Accepts::Optional,
+        effectiveness: Option<f64> = None => effectiveness_time_s: Real, Accepts::Optional,
             "time constant of the estimate of how much of the input arrives, s; 0 for none",
             in_ros "time constant of the estimate of the share of the input that arrives; 0 for none";
         drives: Drives = Drives::GO1 => drive_stiffness_nm_rad: Real, Accepts::NotNegative,
@@ -489,10 +489,10 @@ settings! {
             | joint_velocity: Real, Accepts::Bound, "most joint velocity, in largest speeds of the joint",
             in_ros "most joint velocity, in largest speeds of the joint; .inf is off"
             | distance_m: Real, Accepts::Bound,
-            "most distance of the body from the reference, and twice that from where its last measurement leads",
+            "most distance of the body from the reference; half of it at the start and from where the last measurement leads",
             in_ros "most distance of the body from the reference, m; .inf is off"
             | posture_rad: Real, Accepts::Bound,
-            "most distance of a joint from the reference, and twice that from where its last measurement leads",
+            "most distance of a joint from the reference; half of it at the start and from where the last measurement leads",
             in_ros "most distance of a joint from the reference, rad; .inf is off"
             | clock_gap_s: f64, Accepts::Bound, "most time between steps, s; infinite: clocks may stand and go back, too",
             in_ros "most time between steps, s; .inf is off"

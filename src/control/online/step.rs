@@ -9,7 +9,7 @@ use super::lift::StanceState;
 use super::settings::AfterEnd;
 use super::stage::unscale;
 use super::supervisor::Fault;
-use super::trajectory::NO_PHASE;
+use super::trajectory::{NO_PHASE, Trajectory};
 use crate::robot::{JOINT_DIM, Leg, STATE_DIM};
 use crate::solver::Outcome;
 
@@ -73,7 +73,7 @@ impl Controller {
         if self.memory.refuses(is_jump, fallback.jump_patience) {
             return Err(Status::MeasurementJump);
         }
-        if let Some(time_constant_s) = self.settings.effectiveness_time_s {
+        if let Some(time_constant_s) = self.settings.effectiveness {
             let parts = (&self.plant, plan);
             let settings = (time_constant_s, &self.settings.drives);
             (self.effectiveness).update(parts, settings, measurement, measured, deviation);
@@ -125,7 +125,7 @@ impl Controller {
         let first = &self.horizon.stages[0].model;
         self.effectiveness.begin(first, is_grounded);
         self.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
-        if !self.write_plan(0, command) {
+        if !self.write_plan(0, measurement.time_s, command) {
             return Status::LiftFailed;
         }
         command.source = Source::Plan;
@@ -135,15 +135,21 @@ impl Controller {
         }
     }
 
-    /// Writes a stage of the plan into the command; false if its input cannot be lifted.
-    pub(super) fn write_plan(&mut self, stage: usize, command: &mut Command) -> bool {
+    /// Writes a stage of the plan at a time into the command; false if its input cannot be lifted.
+    pub(super) fn write_plan(&mut self, stage: usize, now_s: f64, command: &mut Command) -> bool {
         let (Some(reference), Some(stance)) = (&self.reference, &mut self.stance) else {
             return false;
         };
-        let (plan, time_s) = (&self.plan, self.plan.time.posture_s(stage));
+        let (plan, step_s) = (&self.plan, self.settings.step_s);
+        let held_s = self.memory.since_command(now_s, step_s);
+        let time_s = plan.time.posture_s(now_s, held_s);
         reference.state_at(time_s, &mut self.posture);
         let (z, dz) = self.posture.split_at(self.plant.latent_dim());
         command.u_lat.copy_from_slice(plan.input(stage));
+        if reference.input.is_some() && self.near_rows.link.is_empty() {
+            let stage_s = plan.time.stage_s(stage);
+            reference.move_input(stage_s, step_s, now_s, held_s, &mut command.u_lat);
+        }
         for input in &mut command.u_lat {
             *input /= self.effectiveness.share.estimate;
         }
@@ -158,7 +164,6 @@ impl Controller {
         let [lower, upper] = self.plant.joint_limits();
         command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
         let (ends, phase) = ([plan.start(stage), plan.end(stage)], plan.time.phase);
-        let step_s = self.settings.step_s;
         stance.losses_nm = self
             .plant
             .planned_losses((phase, stance.feet), ends, step_s);

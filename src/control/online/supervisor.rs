@@ -17,8 +17,8 @@ const PATIENCE_S: f64 = 0.019;
 const HALF_TURN: Real = 3.1;
 /// Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down.
 const UPSIDE_DOWN: Real = 0.5;
-/// Share of the distances from the reference that a measurement may be off what the last one predicts.
-const LEAP_SHARE: Real = 0.5;
+/// Share of the distances from the reference that the first measurement may be off, and others off what the last predicts.
+const NEAR: Real = 0.5;
 /// How far a clock may go back, s: measurements may be exchanged.
 const CLOCK_JITTER_S: f64 = 0.005;
 /// Time over which velocities are compared with positions, s.
@@ -37,7 +37,7 @@ pub(super) enum Fault {
     #[default]
     None,
     Tilt,
-    JointRange,
+    JointBeyond,
     JointSpeed,
     BodyFar,
     JointsFar,
@@ -86,12 +86,23 @@ pub(super) struct Supervisor {
     is_aloft: bool,
     aloft_s: f64,
     aloft_m_s: Real,
-    /// Measurements in a row whose contacts cannot be; steps in a row without a good plan.
-    contacts: usize,
-    poor: usize,
+    /// Since when contacts cannot be, s.
+    is_contradicted: bool,
+    contradicted_s: f64,
+    /// Time without a good plan, s, and that of a step.
+    poor_s: f64,
+    pub step_s: f64,
 }
 
 impl Supervisor {
+    /// One without memories.
+    pub(super) fn of_step(step_s: f64) -> Self {
+        Self {
+            step_s,
+            ..Self::default()
+        }
+    }
+
     /// Forgets measurements, but neither a fault nor the floor.
     pub(super) fn forget(&mut self) {
         if self.fault == Fault::None {
@@ -103,8 +114,8 @@ impl Supervisor {
         self.has_good = false;
         self.is_doubted = false;
         self.is_aloft = false;
-        self.contacts = 0;
-        self.poor = 0;
+        self.is_contradicted = false;
+        self.poor_s = 0.0;
         for i in 0..3 {
             self.unexplained[i] = 0.0;
         }
@@ -240,9 +251,9 @@ impl Supervisor {
         speed: &[Real],
     ) -> Fault {
         if bounds.tilt_rad < HALF_TURN {
-            let off = common_height(&x[15..], &nominal[15..]);
+            let along = common_height(&x[15..], &nominal[15..]);
             let upright = x[16].cos() * x[15].cos();
-            if off < bounds.tilt_rad.cos() || upright < -UPSIDE_DOWN {
+            if along < bounds.tilt_rad.cos() || upright < -UPSIDE_DOWN {
                 return Fault::Tilt;
             }
         }
@@ -250,7 +261,7 @@ impl Supervisor {
         for i in 0..12 {
             let margin = bounds.joint_margin_rad;
             if x[i] > upper[i] + margin || x[i] < lower[i] - margin {
-                return Fault::JointRange;
+                return Fault::JointBeyond;
             }
             if dx[i].abs() > bounds.joint_velocity * speed[i] {
                 return Fault::JointSpeed;
@@ -258,11 +269,16 @@ impl Supervisor {
             joints = greater((x[i] - nominal[i]).abs(), joints);
         }
         let by_reference: [Real; 3] = [nominal[12], nominal[13], nominal[14]];
-        if distance(&x[12..], &by_reference) > bounds.distance_m {
+        let off = distance(&x[12..], &by_reference);
+        if off > bounds.distance_m {
             return Fault::BodyFar;
         }
         if joints > bounds.posture_rad {
             return Fault::JointsFar;
+        }
+        let is_near = off <= NEAR * bounds.distance_m && joints <= NEAR * bounds.posture_rad;
+        if !self.has_good && !is_near {
+            return Fault::NotAtStart;
         }
         let passed_s = time_s - self.good_s;
         if !self.has_good || passed_s > bounds.clock_gap_s {
@@ -273,12 +289,12 @@ impl Supervisor {
         for i in 0..3 {
             body[i] = self.good_x[12 + i] + passed * self.good_dx[12 + i];
         }
-        if distance(&x[12..], &body) > LEAP_SHARE * bounds.distance_m {
+        if distance(&x[12..], &body) > NEAR * bounds.distance_m {
             return Fault::BodyLeap;
         }
         for i in 0..12 {
             let predicted = self.good_x[i] + passed * self.good_dx[i];
-            if (x[i] - predicted).abs() > LEAP_SHARE * bounds.posture_rad {
+            if (x[i] - predicted).abs() > NEAR * bounds.posture_rad {
                 return Fault::JointsLeap;
             }
         }
@@ -332,15 +348,21 @@ impl Supervisor {
         if is_aloft && passed_s > FALL_S && !falls {
             is_wrong = true;
         }
-        self.contacts = if is_wrong { self.contacts + 1 } else { 0 };
-        bounds.contact_mismatch_steps > 0 && self.contacts >= bounds.contact_mismatch_steps
+        if is_wrong && !self.is_contradicted {
+            self.contradicted_s = time_s;
+        }
+        self.is_contradicted = is_wrong;
+        let steps = 1.0 + (time_s - self.contradicted_s) / self.step_s;
+        let most = bounds.contact_mismatch_steps as f64;
+        is_wrong && most > 0.0 && steps > most - 0.5
     }
 
-    /// Counts steps without a good plan; what is wrong.
-    pub(super) fn judge(&mut self, bounds: &Bounds, is_poor: bool) -> Fault {
-        self.poor = if is_poor { self.poor + 1 } else { 0 };
-        let is_counted = bounds.poor_steps > 0 && self.fault == Fault::None;
-        if is_counted && self.poor >= bounds.poor_steps {
+    /// Adds up steps without a good plan, `passed_s` after the last one; what is wrong.
+    pub(super) fn judge(&mut self, bounds: &Bounds, is_poor: bool, passed_s: f64) -> Fault {
+        self.poor_s = if is_poor { self.poor_s + passed_s } else { 0.0 };
+        let most = bounds.poor_steps as f64;
+        let is_counted = most > 0.0 && self.fault == Fault::None;
+        if is_counted && self.poor_s / self.step_s > most - 0.5 {
             self.fault = Fault::PoorSteps;
         }
         self.fault

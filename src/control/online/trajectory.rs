@@ -17,6 +17,8 @@ const STILL_SHARE: Real = 0.02;
 const STILL_TIME_S: Real = 0.1;
 /// Distance from the reference, in its standard deviations, within which joint limits matter.
 const STATE_REACH: Real = 4.0;
+/// Share of a stage from which on a command counts as held for all of it.
+const WHOLE_STAGE: f64 = 0.75;
 /// Phase of feet that select none.
 pub const NO_PHASE: usize = 255;
 
@@ -156,6 +158,21 @@ pub(super) trait Trajectory {
         }
         for i in 0..d {
             mean[i] /= duration_s as Real;
+        }
+    }
+
+    /// Moves an input of the stage from a time on to the part of it for which a command is held, as the trajectory's own
+    /// input moves. Does nothing for commands that are held for whole stages.
+    fn move_input(&self, stage_s: f64, step_s: f64, now_s: f64, held_s: f64, input: &mut [Real]) {
+        if held_s > WHOLE_STAGE * step_s {
+            return;
+        }
+        let mut held: [Real; MOST_LATENT] = [0.0; MOST_LATENT];
+        let mut whole: [Real; MOST_LATENT] = [0.0; MOST_LATENT];
+        self.mean_input(now_s, held_s, &mut held);
+        self.mean_input(stage_s, step_s, &mut whole);
+        for i in 0..self.latent_dim() {
+            input[i] += held[i] - whole[i];
         }
     }
 

@@ -10,14 +10,9 @@
 //! rolls with resistance `rho`. A leg in the air obeys `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter
 //! linearly; torques are taken a delay later, and a column of their rates tells by how much that delay is wrong.
 
-use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
-
 use super::parameters::{CALF_FRONT, FOOT_RADIUS, ROLLING, THIGH_FRONT, TRUNK_FORWARD, TRUNK_UP};
 use super::*;
-use crate::recording::between;
 use crate::recording::preprocess::differences;
-use crate::robot::DRY_SPEED_RAD_S;
-use crate::robot::LegLinks;
 
 pub(crate) const LEAST_MANIPULABILITY: f64 = 0.04;
 const ROLLING_SPEED_RAD_S: f64 = 0.05;
@@ -33,7 +28,6 @@ pub(crate) fn joint_unknowns(kind: usize) -> [usize; JOINT_ROWS - 1] {
     unknowns
 }
 
-/// The equations of a segment; one column a sample.
 #[derive(Debug, Clone)]
 pub(crate) struct SampleEquations {
     pub body: DMatrix<f64>, // axes x, y, z one below the other, [`BODY_ROWS`] each: the trunk's acceleration, m/s^2

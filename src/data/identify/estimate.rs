@@ -15,7 +15,6 @@ use crate::recording::check::check;
 use crate::recording::clock::{Timed, timed};
 use crate::recording::mismatch::{Balance, contradiction};
 use crate::recording::preprocess::median;
-use crate::recording::{Recording, RecordingError};
 
 const LEAST_CONTACT_SAMPLES: usize = 100; // fewest samples with feet on the ground
 const LEAST_WINDOWS: usize = 30; // fewest windows with moving legs; there are 23 unknowns

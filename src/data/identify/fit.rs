@@ -2,8 +2,6 @@
 //! with the unknowns; residuals beyond three deviations count less (Huber). Standard errors come from leaving out
 //! blocks of 0.1 s in turn and, where there are enough, whole jumps (jackknife).
 
-use nalgebra::{Cholesky, DVector, SMatrix, SVector};
-
 use super::parameters::{Prior, not_negative};
 use super::windows::OVERLAP;
 use super::*;

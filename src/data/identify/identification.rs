@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::*;
-use crate::files::{Place, size::read_toml};
-use crate::robot::JOINT_NAMES;
+use crate::files::size::read_toml;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -16,8 +16,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod equations;
 mod estimate;
 mod fit;
@@ -34,15 +32,17 @@ pub use identification::{Fit, Identification, PerKind, StandardError};
 use std::ops::Range;
 use std::path::Path;
 
-use nalgebra::DMatrix;
-
-use crate::files::{Fault, Located};
-use crate::recording::Segment;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{Actuators, GRAVITY_M_S2, JOINT_DIM, Leg, LegMoments, Robot};
 use equations::SampleEquations;
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Rotation3, SMatrix, SVector, Unit, Vector3};
 use parameters::{
     ARMATURE, CALF, CALF_SECOND, DELAY, DRY, GRAVITY, INVERSE_MASS, LEG_SIDE, PARAMETER_DIM, THIGH,
     THIGH_SECOND, VISCOUS,
 };
 use windows::{Group, Row};
+
+use crate::files::{Fault, Located, Place};
+use crate::recording::{Recording, RecordingError, Segment, between, stretches};
+use crate::robot::{
+    Actuators, DRY_SPEED_RAD_S, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, LEG_JOINT_DIM, Leg,
+    LegGeometry, LegLinks, LegMoments, Robot,
+};

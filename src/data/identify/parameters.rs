@@ -1,6 +1,6 @@
 //! Columns of the regression. All but gravity stand in the equations divided by the robot's mass.
 
-use crate::robot::LegGeometry;
+use super::*;
 
 pub(crate) const PARAMETER_DIM: usize = 23;
 

@@ -3,7 +3,6 @@
 use super::equations::{BODY_ROWS, JOINT_ROWS, joint_unknowns};
 use super::*;
 use crate::recording::preprocess::SavitzkyGolay;
-use crate::recording::stretches;
 
 const WINDOW_S: f64 = 0.03; // length of a window, s
 const MARGIN_S: f64 = 0.02; // distance of windows from a change of the feet on the ground, s

@@ -2,8 +2,6 @@
 //! [`without`], when asked. Numbers that are not finite never get here: reading refuses them.
 
 use super::*;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{LEAST_HEIGHT, LEAST_SPAN};
 
 const TORQUE_FACTOR: f64 = 1.1; // torque and speed over a joint's limit that are still accepted
 const SPEED_FACTOR: f64 = 1.1;
@@ -21,7 +19,6 @@ const STEP_SHARE: f64 = 0.5; // departure of a time step from the median, as a s
 
 /// What is wrong with a run of samples; a finding's `bound` is what its `value` breaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[allow(missing_docs, reason = "`description` has the words")]
 pub enum Implausible {
     Torque,
     JointAngle,
@@ -43,7 +40,6 @@ impl Implausible {
         !matches!(self, Self::NearSingular)
     }
 
-    /// The finding in words.
     pub const fn description(self) -> &'static str {
         match self {
             Self::Torque => "torque above the joint's limit",
@@ -61,7 +57,6 @@ impl Implausible {
 
 /// A run of implausible samples in one column, with its first row in the file and that of its worst value.
 #[derive(Debug, Clone, PartialEq)]
-#[allow(missing_docs, reason = "the names say it")]
 pub struct Finding {
     pub kind: Implausible,
     pub segment: usize,

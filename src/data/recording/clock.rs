@@ -21,13 +21,11 @@ const EVEN: f64 = 0.01; // unevenness of time steps, relative, from which a segm
 pub(crate) struct Timed {
     /// At even steps.
     pub segment: Segment,
-    /// What was mended.
     pub mended: Mended,
     /// Samples that stand in for lost ones: straight lines across more than five steps.
     pub lost: Vec<bool>,
 }
 
-/// What was mended in a segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mended {
     /// Where times were rebuilt, time that passed by the motion over time that passed by the stamps.
@@ -42,7 +40,7 @@ pub struct Mended {
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`](crate::recording::RecordingFault::Unexpected) if fewer than two samples remain.
-pub(crate) fn timed(segment: &Segment) -> Result<Timed, RecordingError> {
+pub(crate) fn timed(segment: &Segment) -> Outcome<Timed> {
     let (elapsed, elapsed_ratio) = elapsed(segment);
     let rebuilt = (elapsed_ratio - 1.0).abs() > LEAST_DISAGREEMENT
         && elapsed_ratio > 0.0

@@ -68,7 +68,6 @@ pub(super) fn faulty_rates(segment: &Segment) -> Vec<(&'static str, RateFault)> 
     GROUPS.into_iter().filter_map(of_group).collect()
 }
 
-/// Replaces groups of rates by slopes of the angles.
 pub(super) fn replace_rates(segment: &mut Segment, groups: &[&'static str]) {
     if groups.is_empty() {
         return;

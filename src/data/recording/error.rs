@@ -5,7 +5,6 @@ use thiserror::Error;
 use super::*;
 use crate::files::magic::OtherFormat;
 use crate::files::{Located, Place};
-use crate::robot::RobotError;
 
 /// A fault and its place: the file, a row (1 is the header) or a cell.
 pub type RecordingError = Located<RecordingFault>;
@@ -15,7 +14,6 @@ pub(super) type Checked<T> = Result<T, RecordingFault>;
 
 /// What is wrong at a place.
 #[derive(Debug, Error)]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum RecordingFault {
     #[error("found {found}, expected {expected}")]
     Unexpected { found: String, expected: String },

@@ -9,7 +9,6 @@ use super::*;
 const HALF_SMOOTHING_S: f64 = 0.015; // half the window over which rows of late samples are smoothed, in s
 const SMOOTHING_ORDER: usize = 3; // degree of the polynomials that smooth them
 
-/// A file, or some of its segments.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingFile {
     /// Where it is.
@@ -20,7 +19,6 @@ pub struct RecordingFile {
 
 /// The recordings of several files, checked and conditioned, in their order, and notes on them.
 #[derive(Clone, Debug, Default)]
-#[allow(missing_docs, reason = "the types say it")]
 pub struct RecordingSet {
     pub recordings: Vec<Recording>,
     pub findings: Vec<(PathBuf, Finding)>,
@@ -41,7 +39,7 @@ impl RecordingSet {
         robot: &'static Robot,
         options: &ConditionOptions,
         reader: &Reader,
-    ) -> Result<(), RecordingError> {
+    ) -> Outcome<()> {
         let reader = reader.clone().for_robot(robot);
         let read = |file| read_file(file, robot, options, &reader);
         let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(2));
@@ -78,7 +76,7 @@ pub fn as_recorded(
     files: &[RecordingFile],
     robot: &'static Robot,
     reader: &Reader,
-) -> Result<Vec<Recording>, RecordingError> {
+) -> Outcome<Vec<Recording>> {
     let mut reader = reader.clone().for_robot(robot);
     reader.clocks = Clocks::Recorded;
     let mut recordings = Vec::new();
@@ -149,7 +147,6 @@ fn chosen(file: &RecordingFile, mut recording: Recording) -> Vec<Recording> {
 /// What becomes of samples that a robot cannot have done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ImplausibleSamples {
-    /// They stay.
     #[default]
     Keep,
     /// They go, and the segment is divided there.
@@ -181,11 +178,9 @@ pub enum SmoothedRows {
 /// The steps of [`condition`]; by default the recording stays as it is.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ConditionOptions {
-    /// What becomes of implausible samples.
     pub implausible: ImplausibleSamples,
     /// Shortest piece between samples left out that is kept; shorter ones go too.
     pub least_samples: usize,
-    /// Where accelerations come from.
     pub accelerations: Accelerations,
     /// Filter over whole segments.
     pub smoothing: Option<(SavitzkyGolay, SmoothedRows)>,
@@ -200,7 +195,7 @@ pub fn condition(
     recording: Recording,
     findings: &[Finding],
     options: &ConditionOptions,
-) -> Result<(Recording, usize), RecordingError> {
+) -> Outcome<(Recording, usize)> {
     let n_samples = recording.sample_count();
     let mut kept = match options.implausible {
         ImplausibleSamples::LeaveOut if !findings.is_empty() => {

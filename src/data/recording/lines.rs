@@ -1,6 +1,6 @@
 //! Lines of a file in bounded memory, their cells, and cells as numbers with a decimal point or a decimal comma.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 
 use flate2::bufread::MultiGzDecoder;

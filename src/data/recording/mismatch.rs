@@ -34,7 +34,6 @@ const ORIGIN: (f64, f64) = (1.0, 0.5); // m from the origin and rad about the ve
 
 /// Something about a whole recording that cannot be true of the robot, its figure and the bound that it breaks.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "the names say it")]
 pub struct Mismatch {
     #[serde(rename = "what")]
     pub kind: &'static str,

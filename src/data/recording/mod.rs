@@ -63,16 +63,19 @@ pub use phases::{CHATTER_SAMPLES, PhasePattern, PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Column, Reader, Reading, ReadingNotes, read, read_from_bytes};
 pub use segment::{Recording, Segment, between, stretches};
 
-use std::fmt;
-use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::{fmt, fs, io};
 
+use check::check;
 use clap::ValueEnum;
+use error::{Outcome, io_fault, listed, text, unexpected};
 use nalgebra::DMatrix;
+use preprocess::{differences, median};
+use segment::{DERIVED_DDX, Rows, divided};
 use serde::{Deserialize, Serialize};
 
-use crate::robot::{BODY_DIM, ContactFlags, GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
-use check::check;
-use error::{Outcome, io_fault, listed, text, unexpected};
-use preprocess::{differences, median};
+use crate::robot::{
+    BODY_DIM, ContactFlags, FOOT_DIM, FeetRule, GRAVITY_M_S2, InputRule, JOINT_DIM, JOINT_NAMES,
+    LEAST_HEIGHT, LEAST_SPAN, LEG_JOINT_DIM, Leg, Robot, RobotError, STATE_DIM, rotation,
+};

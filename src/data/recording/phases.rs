@@ -3,14 +3,12 @@
 //! join the launch or the landing they border (section IV-C4). Three phases describe an asynchronous jump.
 
 use super::*;
-use crate::robot::FeetRule;
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
 pub const CHATTER_SAMPLES: usize = 5;
 
 /// A phase by its name, and the feet that select it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the types say it")]
 pub struct PhasePattern {
     pub name: String,
     pub feet: FeetRule,
@@ -39,7 +37,6 @@ pub enum Stance {
 
 /// Consecutive samples of a segment of one phase, by its index in [`PhaseRule::patterns`].
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the types say it")]
 pub struct PhaseSpan {
     pub phase: usize,
     pub kind: Stance,
@@ -86,7 +83,6 @@ impl PhaseRule {
         self
     }
 
-    /// Names of the phases.
     pub fn names(&self) -> Vec<String> {
         self.patterns.iter().map(|p| p.name.clone()).collect()
     }
@@ -101,7 +97,7 @@ impl PhaseRule {
     ///
     /// # Errors
     /// [`RecordingError`] if no sample matches any pattern.
-    pub fn spans(&self, segment: &Segment) -> Result<Vec<PhaseSpan>, RecordingError> {
+    pub fn spans(&self, segment: &Segment) -> Outcome<Vec<PhaseSpan>> {
         let feet = &segment.feet;
         let mut phases: Vec<Option<usize>> = feet.iter().map(|f| self.phase_of(*f)).collect();
         if phases.iter().all(Option::is_none) {

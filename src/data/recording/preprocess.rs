@@ -6,7 +6,6 @@
 
 use std::str::FromStr;
 
-use super::segment::Rows;
 use super::*;
 
 /// Samples of a batch: every phase of a jump is resampled to a multiple (section IV-C4).
@@ -94,7 +93,7 @@ pub(super) fn differences_within(ranges: &[Range<usize>], time_s: &[f64], rows: 
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`] if it has one sample or `rows` is below 2.
-pub fn resampled(segment: &Segment, rows: usize) -> Result<Segment, RecordingError> {
+pub fn resampled(segment: &Segment, rows: usize) -> Outcome<Segment> {
     let n = segment.len();
     if n < 2 || rows < 2 {
         return Err(RecordingFault::too_short(n.min(rows), 2).at(&segment.path, segment.row(0)));
@@ -147,7 +146,7 @@ impl SavitzkyGolay {
     ///
     /// # Errors
     /// [`RecordingError`] for an even window or one not above the order.
-    pub fn new(window: usize, order: usize) -> Result<Self, RecordingError> {
+    pub fn new(window: usize, order: usize) -> Outcome<Self> {
         const LARGEST: (usize, usize) = (1001, 12);
         if window.is_multiple_of(2) || window <= order || window > LARGEST.0 || order > LARGEST.1 {
             let words = format!(

@@ -10,9 +10,7 @@ use super::delays::{BODY_RATES, RateFault, faulty_rates, mend_place, replace_rat
 use super::foreign::guess::guess_of;
 use super::foreign::{TextFormat, assemble, is_mcap, read_lines, read_mcap, read_texts};
 use super::lines::Lines;
-use super::segment::{DERIVED_DDX, divided};
 use super::*;
-use crate::robot::{FOOT_DIM, JOINT_NAMES};
 
 /// What becomes of clocks that disagree with the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
@@ -62,7 +60,7 @@ impl Reader {
     }
 
     /// Reads a file, or with a map a folder of files that are one recording; errors name row and column or map's key.
-    pub fn read(&self, path: &Path) -> Result<Reading, RecordingError> {
+    pub fn read(&self, path: &Path) -> Outcome<Reading> {
         let mut reading = match &self.map {
             Some(map) if is_mcap(path) => assemble(path, &read_mcap(path)?, map)?,
             Some(map) => assemble(path, &read_texts(path, map)?, map)?,
@@ -137,12 +135,12 @@ fn rate_notes(faults: &[(&'static str, RateFault)]) -> Vec<String> {
 }
 
 /// Reads a recording, plain or gzip; errors name file, row and column.
-pub fn read(path: &Path) -> Result<Recording, RecordingError> {
+pub fn read(path: &Path) -> Outcome<Recording> {
     read_noted(path, Lines::open(path)?).map(|reading| reading.recording)
 }
 
 /// [`read`] from memory; `name` stands for the file in messages. No bytes make it panic.
-pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Result<Recording, RecordingError> {
+pub fn read_from_bytes(name: &str, bytes: &[u8]) -> Outcome<Recording> {
     let path = Path::new(name);
     read_noted(path, Lines::of(path, bytes, u64::MAX)?).map(|reading| reading.recording)
 }
@@ -277,7 +275,6 @@ pub struct ReadingNotes {
 }
 
 impl ReadingNotes {
-    /// Counts one recording.
     pub fn add(&mut self, reading: &Reading) {
         self.recordings += 1;
         for (count, (is_made, _)) in self.repaired.iter_mut().zip(REPAIRS) {
@@ -317,7 +314,6 @@ impl ReadingNotes {
 
 /// The quantity in a column, in SI units; indices follow the state, the wrench and the feet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "`name` has the words")]
 pub enum Column {
     Time,
     Position(usize),

@@ -2,13 +2,11 @@
 
 use super::preprocess::moving_average;
 use super::*;
-use crate::robot::InputRule;
 
 const ACCELERATION_WINDOW_S: f64 = 0.02; // joint accelerations are averaged over it before motor inertia counts
 
 pub(crate) type Rows = DMatrix<f64>; // quantities by row, one column a sample
 
-/// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The file, or the name that its bytes were given.
@@ -28,7 +26,6 @@ impl Recording {
         }
     }
 
-    /// Number of samples in all segments.
     pub fn sample_count(&self) -> usize {
         self.segments.iter().map(Segment::len).sum()
     }
@@ -63,7 +60,6 @@ pub struct Segment {
     pub ddx: DMatrix<f64>,
     /// Joint torques, 12 x n, in N m.
     pub torque_nm: DMatrix<f64>,
-    /// Contact of each foot.
     pub feet: Vec<ContactFlags>,
     /// `[F_lin; F_ang]`, 6 x n (N, N m), when the file carries it.
     pub body_wrench: Option<DMatrix<f64>>,
@@ -166,12 +162,10 @@ impl Segment {
         }
     }
 
-    /// Number of samples.
     pub fn len(&self) -> usize {
         self.time_s.len()
     }
 
-    /// Whether there is no sample.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
@@ -256,7 +250,7 @@ impl Segment {
     ///
     /// # Errors
     /// [`RecordingFault::Wrench`] with the row of an angle or torque that is not finite.
-    pub fn input(&self, rule: &InputRule) -> Result<DMatrix<f64>, RecordingError> {
+    pub fn input(&self, rule: &InputRule) -> Outcome<DMatrix<f64>> {
         let torque_nm = self.torque_within_limits(rule.robot());
         let mut out = DMatrix::zeros(STATE_DIM, self.len());
         let net = &torque_nm - self.losses(rule);

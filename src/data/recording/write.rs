@@ -39,7 +39,7 @@ impl Default for WriteOptions {
 }
 
 /// Writes a recording as published files are, gzip if the name ends in `.gz`; an existing file is replaced.
-pub fn write(path: &Path, recording: &Recording) -> Result<(), RecordingError> {
+pub fn write(path: &Path, recording: &Recording) -> Outcome<()> {
     let options = WriteOptions::default();
     write_as(path, recording, None, &options, Overwrite::Replace)
 }
@@ -52,7 +52,7 @@ pub fn write_as(
     inputs: Option<&[DMatrix<f64>]>,
     options: &WriteOptions,
     overwrite: Overwrite,
-) -> Result<(), RecordingError> {
+) -> Outcome<()> {
     let is_gzip = (path.extension()).is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let written = write_whole(path, overwrite, |mut file| {
         if !is_gzip {
@@ -71,7 +71,7 @@ pub fn write_mcap(
     segment: &Segment,
     inputs: Option<&DMatrix<f64>>,
     overwrite: Overwrite,
-) -> Result<(), RecordingError> {
+) -> Outcome<()> {
     let mut bytes = io::Cursor::new(Vec::new());
     foreign::write_mcap(&mut bytes, segment, inputs)
         .map_err(|error| RecordingFault::mcap(error).of(path))?;

@@ -1,16 +1,8 @@
 //! Encoder and decoder from the tensors of their layers, with scale factors, means and the order of coordinates.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::super::assign::Assigned;
-use super::super::options::WeightVectors;
-use super::super::role::{Part, Role, without_tensorflow_end};
-use super::super::run::Layout;
-use super::super::{ImportError, Read};
-use super::{Assembly, Known, Parts, text_or};
-use crate::files::Place;
-use crate::model::{Activation, AffineMap, Layer, ScaleFactors, Scaling, StateMap};
-use crate::robot::STATE_DIM;
+use super::*;
+use crate::import::role::without_tensorflow_end;
+use crate::model::{AffineMap, Layer};
 
 /// How much decoding and encoding may change latent states without a note.
 const LARGEST_CHANGE: f64 = 0.5;

@@ -2,7 +2,6 @@
 //! is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash (`2/3z_1`, `z_1/2u_1`), a number
 //! after a variable. Nesting is limited, so the machine's stack is safe.
 
-use super::super::equations::Equation;
 use super::variables::Symbol;
 use super::*;
 

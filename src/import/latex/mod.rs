@@ -20,16 +20,15 @@ pub(super) mod variables;
 
 pub(super) use sections::read;
 
-use super::*;
-
-use std::collections::HashMap;
 use std::ops::Range;
 use std::rc::Rc;
 
-use crate::import::{ImportError, Read, equations::Position};
 use expander::{Expander, Meaning, Refusal};
 use expression::LeftSide;
 use reader::{BARE, Digits, Last, Reader};
 use sections::is_one_of;
 use token::{Kind, Lexer, Token, group_length, has, is_in, spelled};
 use variables::function;
+
+use super::*;
+use crate::import::equations::{Equation, Piece, Position, Section, complete, text_of};

@@ -1,6 +1,5 @@
 //! A display being read: its tokens, groups, and the pieces made of it.
 
-use super::super::equations::Piece;
 use super::numbers::around_digits;
 use super::*;
 

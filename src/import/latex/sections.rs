@@ -1,6 +1,5 @@
 //! From a document's displays to sections of equations: one per phase.
 
-use super::super::equations::{Section, complete, text_of};
 use super::derivatives::with_dots;
 use super::numbers::without_operator_braces;
 use super::*;

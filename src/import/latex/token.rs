@@ -182,7 +182,6 @@ pub(super) struct Lexer<'t> {
     is_spaced: bool,
     /// What one character made besides the last token.
     queued: VecDeque<Token>,
-    /// Whether `@` is a letter of commands.
     pub(super) has_at_letters: bool,
 }
 
@@ -244,7 +243,6 @@ impl<'t> Lexer<'t> {
         }
     }
 
-    /// The rest of the line.
     pub(super) fn line(&self) -> &'t str {
         self.rest.lines().next().unwrap_or("")
     }

@@ -7,8 +7,7 @@ use std::time::Instant;
 use super::control_metrics::Tally;
 use super::coordinates::exceeds;
 use super::*;
-use crate::mpc::{Lift, ReferenceSamples, StanceState, foot_forces, problem::to_upright};
-use crate::robot::GRAVITY_M_S2;
+use crate::mpc::problem::to_upright;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum ReferenceInput {

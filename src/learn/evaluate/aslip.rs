@@ -1,13 +1,8 @@
 //! Template models that a learned model is compared with: the actuated spring-loaded inverted pendulum, equations (27)
 //! and (28), with the published constants and with fitted ones.
 
-use nalgebra::{Rotation3, Vector2};
-
 use super::*;
-use crate::recording::between;
-use crate::robot::{InputRule, WrenchFrame};
 use crate::sim::integrate::{IntegrationOptions, OdeSystem, integrate};
-use crate::sim::{integrate_stretches, restart_windows};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aslip {

@@ -1,9 +1,7 @@
 use super::aslip::AslipRollout;
 use super::coordinates::LiftSums;
 use super::*;
-use crate::lower::LowerError;
 use crate::recording::mismatch::notes;
-use crate::sim::rollout;
 
 #[derive(Debug, Clone)]
 pub struct SegmentRun<'a> {
@@ -35,7 +33,6 @@ pub struct Assessment<'a> {
     pub remarks: Vec<String>,
 }
 
-/// Prediction errors over one horizon.
 #[derive(Debug, Clone)]
 pub struct Horizon {
     pub name: String,

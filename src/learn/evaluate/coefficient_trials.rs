@@ -1,7 +1,6 @@
 //! Coefficients of an imported model read in other ways: terms in another order, two phases exchanged, or fitted anew.
 
 use super::*;
-use crate::model::LibraryChoice;
 
 const SAMPLES: usize = 1000;
 /// R^2 of latent accelerations at which a reading explains that those of another were worse.

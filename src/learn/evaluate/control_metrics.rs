@@ -5,8 +5,7 @@ use super::prediction::{prediction_error, recorded_stages, uninformed};
 use super::verdict::failure;
 use super::*;
 use crate::mpc::problem::has_links_or_cones;
-use crate::mpc::{Bounds, MpcSettings, Solver, Status, structured::MAX_STRUCTURED_DIM};
-use crate::robot::{InputRule, rotation};
+use crate::mpc::{Bounds, structured::MAX_STRUCTURED_DIM};
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct StepTimes {

@@ -151,7 +151,6 @@ impl CoordinateSums {
         Ok(())
     }
 
-    /// Adds the residual of one coordinate.
     pub(super) fn add_one(
         &mut self,
         segment: &Segment,
@@ -222,7 +221,7 @@ impl PointwiseSums {
 const IMPLAUSIBLE: f64 = 2.0;
 
 /// Whether recorded torques can be the robot's; samples with others count in no figure of torques.
-pub fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
+pub(crate) fn is_plausible(robot: &Robot, torque_nm: &[f64; JOINT_DIM]) -> bool {
     !exceeds(torque_nm, robot.torque_limit_nm(), IMPLAUSIBLE)
 }
 

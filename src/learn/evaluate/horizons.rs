@@ -5,10 +5,6 @@ use std::ops::Range;
 
 use super::coordinates::coasted;
 use super::*;
-use crate::model::JumpPart;
-use crate::recording::{CHATTER_SAMPLES, PhaseRule, Stance, between};
-use crate::robot::{BODY_DIM, GRAVITY_M_S2, InputRule, WrenchFrame};
-use crate::sim::{restart_windows, rollout_over};
 
 /// Times between restarts, s.
 const RESTARTS_S: [f64; 3] = [0.1, 0.2, 0.3];

@@ -1,10 +1,7 @@
 //! What a model says of known physics, from its file alone: invariance to shifts, gravity, mass, left and right. A
 //! state is the posture decoded from `z = 0`, at rest and at 1 m/s along x, y and z; the input is the phase's mean.
 
-use nalgebra::{SVector, SymmetricEigen};
-
 use super::*;
-use crate::robot::{InputRule, WrenchFrame};
 
 const SHIFT_M: f64 = 0.3;
 const OFF_RAD: f64 = 0.1;

@@ -4,8 +4,6 @@
 //! under the same inputs, stability, the losses of the lift and a [`Verdict`]. `docs/mathematics.md` defines each
 //! figure once. Start with `assessment`, then [`coordinates`](Fit).
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod along_recording;
 mod aslip;
 mod assessment;
@@ -25,9 +23,9 @@ pub use along_recording::{ReferenceInput, Run, StepRow, along_recording};
 pub use aslip::{Aslip, AslipSums, Baseline};
 pub use assessment::{Assessment, EvaluateError, Horizon, SegmentRun, remarks};
 pub use control_metrics::{ControlMetrics, Summary, control_metrics, usual_settings};
+pub(crate) use coordinates::is_plausible;
 pub use coordinates::{
     ByContact, Comparison, CoordinateSums, Fit, FitSums, LAMBDA, PointwiseSums, combined_loss,
-    is_plausible,
 };
 pub use invariance::Invariance;
 pub use prediction::{LinearisedPhase, PredictionError, eigenvalues};
@@ -35,15 +33,31 @@ pub(crate) use prediction::{linearise_phases, state_matrix};
 pub use round_trip::RoundTrip;
 pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use coordinates::Mean;
+use nalgebra::{
+    Complex, DMatrix, DVector, Rotation3, SVector, Schur, SymmetricEigen, Vector2, Vector3,
+};
 use serde::Serialize;
 
-use crate::lower::CompiledModel;
-use crate::model::{LibraryOrder, ModelError, ReducedModel};
-use crate::mpc::{Command, Controller, Measurement, MpcError, STEP_SLACK};
-use crate::recording::{Recording, RecordingError, Segment};
-use crate::robot::{BODY_X, BODY_Z, ContactFlags, JOINT_DIM, Leg, Robot, STATE_DIM};
-use crate::sim::{LatentSegment, Restart, Rollout, SimError};
-use coordinates::Mean;
+use crate::lower::{CompiledModel, LowerError};
+use crate::model::{
+    CoordinateOrder, JumpPart, Library, LibraryChoice, LibraryOrder, ModelError, Phase,
+    ReducedModel, StateMap,
+};
+use crate::mpc::{
+    Command, Controller, Lift, Measurement, MpcError, MpcSettings, ReferenceSamples, STEP_SLACK,
+    Solver, StanceState, Status, foot_forces,
+};
+use crate::recording::{
+    CHATTER_SAMPLES, PhaseRule, Recording, RecordingError, Segment, Stance, between,
+};
+use crate::robot::{
+    BODY_DIM, BODY_X, BODY_Z, ContactFlags, GRAVITY_M_S2, InputRule, JOINT_DIM, Leg, Robot,
+    STATE_DIM, WrenchFrame, rotation,
+};
+use crate::sim::{
+    LatentSegment, Restart, Rollout, SimError, integrate_stretches, restart_windows, rollout,
+    rollout_over,
+};
 
 type Result<T, E = EvaluateError> = std::result::Result<T, E>;

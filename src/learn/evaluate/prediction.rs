@@ -1,9 +1,6 @@
 //! Predictions one stage ahead, their no-dynamics baseline, and the phases' linearisations at their mean point.
 
-use nalgebra::{Complex, Schur};
-
 use super::*;
-use crate::model::{Library, Phase};
 
 /// Root mean squares of predicted minus recorded positions one stage ahead, both decoded from latent positions.
 #[derive(Debug, Clone, PartialEq, Serialize)]

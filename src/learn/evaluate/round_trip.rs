@@ -2,7 +2,6 @@
 
 use super::coefficient_trials::{CoefficientTrials, GOOD_R2, Tensors};
 use super::*;
-use crate::model::{CoordinateOrder, StateMap};
 
 const SAMPLES: usize = 240;
 const LARGEST_ERROR: f64 = 1.0; // relative; beyond it maps do not fit: that of an answer that never changes

@@ -13,4 +13,6 @@
 mod of_model;
 
 pub use crate::online::*;
-pub use of_model::{LIFTS, MpcError, SOLVERS, STEP_SLACK, control_model, controller};
+pub use of_model::{
+    LIFTS, MpcError, SOLVERS, STEP_SLACK, control_model, controller, words_of_setting,
+};

@@ -6,12 +6,9 @@ use std::sync::Arc;
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 use thiserror::Error;
 
+use super::*;
 use crate::lower::{CompiledModel, LowerError};
 use crate::model::{ModelError, ReducedModel};
-use crate::online::{
-    ControlError, ControlModel, ControlPhase, Controller, InputGivenState, LatentDynamics, Lift,
-    MpcSettings, NonlinearMaps, Solver,
-};
 use crate::recording::RecordingError;
 use crate::robot::{JOINT_DIM, STATE_DIM};
 
@@ -179,7 +176,6 @@ fn with_floor(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
     covariance
 }
 
-/// Names of [`Lift`] with their help.
 pub const LIFTS: [(&str, &str, Lift); 2] = [
     (
         "transpose",
@@ -193,7 +189,6 @@ pub const LIFTS: [(&str, &str, Lift); 2] = [
     ),
 ];
 
-/// Names of [`Solver`] with their help.
 pub const SOLVERS: [(&str, &str, Solver); 2] = [
     ("clarabel", "General interior point", Solver::Clarabel),
     (
@@ -203,10 +198,20 @@ pub const SOLVERS: [(&str, &str, Solver); 2] = [
     ),
 ];
 
+/// Words of a setting of the controller, in the order of their numbers; none for a setting that is a number.
+pub fn words_of_setting(name: &str) -> Vec<&'static str> {
+    match name {
+        "lift" => LIFTS.map(|(word, ..)| word).to_vec(),
+        "solver" => SOLVERS.map(|(word, ..)| word).to_vec(),
+        "linearisation" => vec!["reference", "last_plan"],
+        "after_end" => vec!["hold", "damp", "stop"],
+        _ => Vec::new(),
+    }
+}
+
 /// Why a controller could not be built or given a reference; commands carry a [`Status`](super::Status).
 #[derive(Debug, Error)]
 #[non_exhaustive]
-#[allow(missing_docs, reason = "each variant's message names its fields")]
 pub enum MpcError {
     #[error("the model cannot be used for control")]
     Model(#[from] ModelError),

@@ -12,8 +12,6 @@
 //! assert!(Goal::new(0.35, -0.1).is_err());
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod costs;
 mod motion;
 mod seed;
@@ -30,12 +28,15 @@ type Result<T, E = PlanError> = std::result::Result<T, E>;
 
 use std::ops::Add;
 
-use nalgebra::{DMatrix, DVector};
-
-use crate::model::{JumpPrior, ReducedModel};
-use crate::mpc::{ConeProgram, Outcome};
-use crate::recording::Segment;
-use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2, JOINT_DIM, Leg, STATE_DIM};
 use motion::Margins;
+use nalgebra::{DMatrix, DVector};
 use seed::{PITCH, Seed};
 use transcribe::{Bound, Task};
+
+use crate::model::{GOAL_DIM, JumpPart, JumpPrior, Landmark, ModelError, ReducedModel};
+use crate::mpc::{ConeProgram, ControlError, Outcome, QpSettings, QpSolver, SolverProfile};
+use crate::recording::{Recording, RecordingError, Segment};
+use crate::robot::{
+    BODY_NAMES, BODY_X, BODY_Z, GRAVITY_M_S2, InputRule, JOINT_DIM, JOINT_NAMES, Leg, Robot,
+    STATE_DIM,
+};

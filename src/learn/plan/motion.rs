@@ -4,7 +4,6 @@
 use super::costs::moved_foot;
 use super::transcribe::NodeValues;
 use super::*;
-use crate::robot::Robot;
 
 const SOURCE: &str = "plan";
 

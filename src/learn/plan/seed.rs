@@ -2,8 +2,6 @@
 
 use super::*;
 use crate::lower::CompiledModel;
-use crate::model::{JumpPart, Landmark};
-use crate::robot::{BODY_NAMES, InputRule, JOINT_NAMES};
 
 pub(crate) const PITCH: usize = 16;
 const LOST_ANGLE_RAD: f64 = 0.15;

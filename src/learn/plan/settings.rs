@@ -5,9 +5,6 @@ use thiserror::Error;
 
 use super::*;
 use crate::lower::LowerError;
-use crate::model::{GOAL_DIM, ModelError};
-use crate::mpc::ControlError;
-use crate::recording::RecordingError;
 
 const ANY: f64 = f64::INFINITY;
 

@@ -5,8 +5,6 @@ use std::time::Instant;
 use super::motion::motion;
 use super::verdict::verdict;
 use super::*;
-use crate::mpc::{QpSettings, QpSolver, SolverProfile};
-use crate::recording::Recording;
 use crate::recording::mismatch::Balance;
 
 const CONVERGED_DEFECT: f64 = 1e-4;

@@ -1,8 +1,6 @@
 //! Integration of the hybrid model: a model and recorded inputs in, rollouts out. Read `rollout` first, then
 //! `integrate`.
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 pub(crate) mod integrate;
 #[cfg(test)]
 #[path = "../../../tests/evaluate/integrate.rs"]

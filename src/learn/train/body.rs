@@ -26,7 +26,7 @@ pub struct BodyRows {
 impl BodyRows {
     /// The default: with one latent coordinate none, from two on the centre of mass forwards and upwards, from five on
     /// also the rotation about it in the plane. With fewer, torques of the legs are lost when the rotation is a row.
-    pub fn of_dim(latent_dim: usize) -> Self {
+    pub(super) fn of_dim(latent_dim: usize) -> Self {
         let count = match latent_dim {
             0 | 1 => 0,
             2..=4 => 2,

@@ -6,17 +6,14 @@ use super::subspace::find_subspace;
 use super::*;
 
 /// Learns a model: encoder by its row space (`subspace`), decoder by least squares, Xi by sparse regression, chosen
-/// among many by rollouts (`select`). A cancelled training ends with the seeds begun by then. Deterministic.
-///
-/// # Errors
-/// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
-pub fn closed_form(
+/// among many by rollouts (`select`).
+pub(super) fn closed_form(
     recordings: Recordings<'_>,
     robot: &'static Robot,
     options: &TrainOptions,
     origin: &Origin,
     monitor: &mut Monitor<'_>,
-) -> Result<Trained, TrainError> {
+) -> Result<Trained> {
     let maps = &options.joint.maps;
     if !maps.is_linear() {
         return Err(TrainError::Option {

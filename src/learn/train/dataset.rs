@@ -102,7 +102,7 @@ impl Dataset {
         phases: &PhaseRule,
         scaling: &Scaling,
         smoothing: usize,
-    ) -> Result<Self, TrainError> {
+    ) -> Result<Self> {
         let mut dataset = Self {
             jumps: Vec::new(),
             phases: phases.clone(),
@@ -117,7 +117,7 @@ impl Dataset {
     }
 
     /// Adds the mirror images of recordings, after all other jumps.
-    pub(super) fn add_mirror_images(&mut self, recordings: &[Recording]) -> Result<(), TrainError> {
+    pub(super) fn add_mirror_images(&mut self, recordings: &[Recording]) -> Result<()> {
         let robot = self.rule.robot();
         for segment in recordings.iter().flat_map(|recording| &recording.segments) {
             let image = self.jump(&segment.mirrored(robot))?;
@@ -195,7 +195,7 @@ impl Dataset {
         own.map(|(jump, (_, range))| (jump, range.clone()))
     }
 
-    pub(super) fn check_for_training(&self) -> Result<(), TrainError> {
+    pub(super) fn check_for_training(&self) -> Result<()> {
         if self.jumps.is_empty() {
             return Err(TrainError::NoRecording);
         }
@@ -217,7 +217,7 @@ impl Dataset {
         Ok(())
     }
 
-    fn jump(&self, segment: &Segment) -> Result<Jump, TrainError> {
+    fn jump(&self, segment: &Segment) -> Result<Jump> {
         let n = segment.len();
         if n < MIN_SAMPLES {
             return Err(TrainError::TooFewSamples {
@@ -328,7 +328,7 @@ impl Split {
     ///
     /// # Errors
     /// [`TrainError::Split`] if there are fewer jumps than sets.
-    pub fn of(&self, jumps: usize, seed: u64) -> Result<[Vec<usize>; 3], TrainError> {
+    pub fn of(&self, jumps: usize, seed: u64) -> Result<[Vec<usize>; 3]> {
         let counts = self.counts(jumps)?;
         let order = shuffled(jumps, seed);
         let (training, rest) = order.split_at(counts[0]);
@@ -341,7 +341,7 @@ impl Split {
     }
 
     /// Jumps a set: in proportion, the largest remainders rounded up, at least one where the share is not 0.
-    fn counts(&self, jumps: usize) -> Result<[usize; 3], TrainError> {
+    fn counts(&self, jumps: usize) -> Result<[usize; 3]> {
         let wanted = self.shares.iter().filter(|share| **share > 0).count();
         if jumps < wanted {
             return Err(TrainError::Split {

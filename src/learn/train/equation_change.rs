@@ -46,7 +46,6 @@ impl Sums {
         })
     }
 
-    /// Squared error of an equation.
     fn error(&self, k: usize, xi: &DVector<f64>) -> f64 {
         self.squares[k] - 2.0 * xi.dot(&self.product.column(k)) + xi.dot(&(&self.gram * xi))
     }

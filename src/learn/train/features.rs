@@ -83,7 +83,6 @@ impl Features {
         occurring.map(|(term, of)| (term, (0..of.len()).filter(|&v| of[v]).collect()))
     }
 
-    /// The term that is 1.
     pub(super) fn constant_term(&self) -> Option<usize> {
         self.term_of(|step| matches!(step, Step::Number(value) if *value == 1.0))
     }

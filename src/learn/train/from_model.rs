@@ -6,24 +6,16 @@
 //! predicts left-out parts better, the equation is multiplied by one number instead: recorded torques are not always what
 //! the motors gave. In flight a joint control that torques do not show is added (`joint_control`). Equations without a variable (free fall, a rotation that nothing changes) are physics and stay.
 
-use std::collections::BTreeMap;
-
-use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::dataset::{Dataset, MIN_SAMPLES, Scaling};
+use super::dataset::Scaling;
 use super::equation_change::{Change, Family, Kind, Shift, Sums};
-use super::error::TrainError;
-use super::features::Features;
 use super::joint_control::{self, Controlled};
-use super::judge::Judge;
-use super::latent::{EncodedSet, Latent};
-use super::task::Origin;
 use super::weak_form::{flight_samples, windowed_samples};
-use crate::model::{InputStatistics, Phase, ReducedModel};
-use crate::recording::{CHATTER_SAMPLES, PhasePattern, PhaseRule, Recording, Segment};
-use crate::robot::{Actuators, FeetRule, InputRule, Robot};
+use super::*;
+use crate::model::Phase;
+use crate::recording::{CHATTER_SAMPLES, PhasePattern, Segment};
+use crate::robot::Actuators;
 
 const WINDOW: usize = 25; // samples over which the dynamics in contact are integrated
 const SMOOTHING: usize = 11;
@@ -75,7 +67,7 @@ pub fn refine_from(
     robot: &'static Robot,
     actuators: Option<Actuators>,
     origin: &Origin,
-) -> Result<Refined, TrainError> {
+) -> Result<Refined> {
     let rule = InputRule::new(robot, actuators.clone(), model.wrench_frame());
     let data = Data {
         model,
@@ -168,7 +160,6 @@ impl Encoded {
         EncodedSet::new(&self.dataset, &self.latent)
     }
 
-    /// A set for each jump.
     fn each(self) -> Vec<Self> {
         let Self { dataset, latent } = self;
         let jumps = dataset.jumps.iter().zip(latent);
@@ -183,11 +174,7 @@ impl Encoded {
     }
 }
 
-fn encoded(
-    model: &ReducedModel,
-    recordings: &[Recording],
-    rule: &InputRule,
-) -> Result<Encoded, TrainError> {
+fn encoded(model: &ReducedModel, recordings: &[Recording], rule: &InputRule) -> Result<Encoded> {
     let scaling = Scaling {
         state: model.state_factors()?,
         input: model.input_factors()?,

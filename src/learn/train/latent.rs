@@ -147,7 +147,7 @@ pub(super) fn mean_jacobian(encoder: &StateMap, dataset: &Dataset) -> DMatrix<f6
     if let Some(linear) = encoder.as_affine() {
         return linear.weights().clone();
     }
-    let (rows, columns) = encoder.shape();
+    let (rows, columns) = (encoder.output_dim(), encoder.input_dim());
     let mut sum = DMatrix::zeros(rows, columns);
     let states = dataset.states(None);
     for x in states.column_iter() {
@@ -161,7 +161,7 @@ pub(super) fn least_squares_decoder(
     dataset: &Dataset,
     encoder: &StateMap,
     hidden: Option<&StateMap>,
-) -> Result<AffineMap, TrainError> {
+) -> Result<AffineMap> {
     let x = dataset.states(None);
     let z = map_samples(encoder, &x);
     let z = hidden.map_or_else(|| z.clone(), |hidden| map_samples(hidden, &z));

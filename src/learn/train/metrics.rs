@@ -30,7 +30,7 @@ pub struct SetMetrics {
 ///
 /// # Errors
 /// [`TrainError`] if the model has no encoder, decoder, scaling or robot, or the recordings do not fit it.
-pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetrics, TrainError> {
+pub fn assess(model: &ReducedModel, recordings: &[Recording]) -> Result<SetMetrics> {
     let scaling = Scaling {
         state: model.state_factors()?,
         input: model.input_factors()?,

@@ -1,10 +1,8 @@
 //! Learning: recordings in, a reduced-order model with its figures out.
 //!
 //! In: recordings of jumps, a robot, [`TrainOptions`]. Out: a [`Trained`] model, whose provenance says how to repeat
-//! it, and a [`TrainReport`]. Read [`closed_form()`] first: it walks from the dataset over the encoder's row space
+//! it, and a [`TrainReport`]. Read `closed_form.rs` first: it walks from the dataset over the encoder's row space
 //! (`subspace`) and the decoder (`latent`) to the dynamics (`weak_form`, `sparse`, `select`), judged by rollouts.
-
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
 
 mod body;
 mod closed_form;
@@ -36,14 +34,10 @@ mod task;
 mod weak_form;
 
 pub use body::BodyRows;
-pub use closed_form::closed_form;
 pub use dataset::{MIN_SAMPLES, ScaleOptions, Split};
 pub use error::TrainError;
 pub use from_model::{Refined, refine_from};
-pub use joint::{
-    run::joint,
-    unroll::{Integrator, Unroll},
-};
+pub use joint::unroll::{Integrator, Unroll};
 pub use metrics::{PartScore, PhaseTerms, SeedReport, SetMetrics, TrainReport, Trained, assess};
 pub use options::{
     BodyEquations, Coordinates, EncoderOptions, JointOptions, MapOptions, Method, MirrorImages,
@@ -86,3 +80,5 @@ use select::Choice;
 use sparse::{Regression, active_terms};
 use subspace::Moments;
 use task::Task;
+
+type Result<T, E = TrainError> = std::result::Result<T, E>;

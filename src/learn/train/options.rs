@@ -22,8 +22,10 @@ pub enum Method {
 }
 
 impl Method {
+    /// Learns a model, deterministically. A cancelled training ends with the seeds begun by then.
+    ///
     /// # Errors
-    /// As the method's own function.
+    /// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
     pub fn learn(
         self,
         recordings: Recordings<'_>,
@@ -31,10 +33,12 @@ impl Method {
         options: &TrainOptions,
         origin: &Origin,
         monitor: &mut Monitor<'_>,
-    ) -> Result<Trained, TrainError> {
+    ) -> Result<Trained> {
         match self {
-            Self::ClosedForm => closed_form(recordings, robot, options, origin, monitor),
-            Self::Joint => joint(recordings, robot, options, origin, monitor),
+            Self::ClosedForm => {
+                closed_form::closed_form(recordings, robot, options, origin, monitor)
+            }
+            Self::Joint => joint::run::joint(recordings, robot, options, origin, monitor),
         }
     }
 }
@@ -143,7 +147,6 @@ pub struct RegressionOptions {
     pub smoothing: usize,
     /// Parts of the recipe for named coordinates that are left out.
     pub leave_out: Vec<RecipePart>,
-    /// Equations of the momentum rows.
     pub body_equations: BodyEquations,
     /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
     pub slack: f64,
@@ -244,8 +247,7 @@ impl TrainOptions {
         (0..count).map(|i| self.seed.wrapping_add(i)).collect()
     }
 
-    /// Library of the given or default terms.
-    pub(crate) fn library(&self) -> Result<Library, TrainError> {
+    pub(crate) fn library(&self) -> Result<Library> {
         let choice = match &self.library {
             Some(given) => given.clone(),
             None => LibraryChoice::Standard(StandardLibrary {
@@ -262,7 +264,7 @@ impl TrainOptions {
     /// # Errors
     /// [`TrainError::Range`] or [`TrainError::Option`] naming the first setting out of range, [`TrainError::Model`] for
     /// a name that no model can have.
-    pub fn check(&self) -> Result<(), TrainError> {
+    pub fn check(&self) -> Result<()> {
         check_name(&self.name)?;
         let (encoder, regression) = (&self.encoder, &self.regression);
         table::LIFT_WEIGHT.check(encoder.lift_weight)?;
@@ -345,7 +347,7 @@ impl JointOptions {
     }
 
     /// Complains about a window of predictions out of range; one that no batch has room for would count for nothing.
-    fn check_predictions(&self) -> Result<(), TrainError> {
+    fn check_predictions(&self) -> Result<()> {
         table::BPTT_WEIGHT.check(self.weights.bptt)?;
         let (window, stride) = (self.unroll.window, self.unroll.stride);
         table::BPTT_WINDOW.check_count(window)?;
@@ -368,7 +370,7 @@ impl MapOptions {
         self.encoder_layers.is_empty() && self.decoder_layers.is_empty()
     }
 
-    fn check(&self, latent_dim: usize) -> Result<(), TrainError> {
+    fn check(&self, latent_dim: usize) -> Result<()> {
         let each = [
             ("encoder-layers", &self.encoder_layers, latent_dim.max(1)),
             ("decoder-layers", &self.decoder_layers, 1),

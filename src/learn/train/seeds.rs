@@ -4,7 +4,7 @@ use super::jumps::{Dynamics, learn_jumps};
 use super::task::{Fitted, provenance};
 use super::*;
 
-pub(super) type Outcome = Result<(SeedReport, Fitted), TrainError>;
+pub(super) type Outcome = Result<(SeedReport, Fitted)>;
 
 #[derive(Default)]
 pub(super) struct Seeds {
@@ -19,7 +19,7 @@ impl Seeds {
         seed: u64,
         outcome: Outcome,
         monitor: &mut Monitor<'_>,
-    ) -> Result<(), TrainError> {
+    ) -> Result<()> {
         match outcome.and_then(with_finite_coefficients) {
             Ok(finished) => self.finished.push(finished),
             Err(error) if is_of_one_seed(&error) => {
@@ -38,7 +38,7 @@ impl Seeds {
         task: Task<'_>,
         method: &str,
         origin: &Origin,
-    ) -> Result<Trained, TrainError> {
+    ) -> Result<Trained> {
         let runs = self.finished.iter();
         let runs: Vec<_> = runs
             .map(|(_, fit)| (&fit.maps.weights, &fit.xi[..]))

@@ -52,7 +52,7 @@ pub(super) fn select(
     judge: &Judge<'_>,
     options: &RegressionOptions,
     monitor: &mut Monitor<'_>,
-) -> Result<(Vec<Xi>, Choice, usize), TrainError> {
+) -> Result<(Vec<Xi>, Choice, usize)> {
     let features = judge.features;
     let regressions = &WINDOWS.map(|window| {
         let phases = 0..knowledge.len();
@@ -124,7 +124,7 @@ fn sparsest<'a>(
     refiner: &Refiner<'_>,
     options: &RegressionOptions,
     monitor: &mut Monitor<'_>,
-) -> Result<Trial<'a>, TrainError> {
+) -> Result<Trial<'a>> {
     let candidates = refined.len();
     let best = best_of(&refined)?;
     let limit = (1.0 + options.slack) * best.now.score;
@@ -324,7 +324,7 @@ fn any_stable(tried: &[Trial<'_>]) -> bool {
     tried.iter().any(Trial::is_stable)
 }
 
-fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>, TrainError> {
+fn best_of<'t, 'a>(tried: &'t [Trial<'a>]) -> Result<&'t Trial<'a>> {
     let best = (tried.iter().filter(|trial| trial.is_stable()))
         .min_by(|a, b| a.now.score.total_cmp(&b.now.score));
     best.ok_or(TrainError::NoStableModel {

@@ -50,7 +50,7 @@ impl<'a> Task<'a> {
         recordings: Recordings<'_>,
         robot: &'static Robot,
         options: &'a TrainOptions,
-    ) -> Result<Self, TrainError> {
+    ) -> Result<Self> {
         options.check()?;
         let (scaling, smoothing) = (options.scaling.factors(), options.regression.smoothing);
         let rule = options.input_rule(robot);
@@ -147,7 +147,7 @@ impl Task<'_> {
         fitted: Fitted,
         jumps: Option<JumpPrior>,
         provenance: Map<String, Value>,
-    ) -> Result<ReducedModel, TrainError> {
+    ) -> Result<ReducedModel> {
         let (options, robot, training) = (self.options, self.robot, &self.training);
         let (d, name) = (options.latent_dim, robot.name);
         let given_state = self.inputs_given_states(&fitted);
@@ -269,7 +269,7 @@ impl Fitted {
 
 impl Task<'_> {
     /// The encoder of the held rows and, in its canonical basis, of a space with orthonormal `basis` (`18 x (d - h)`).
-    pub(super) fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap, TrainError> {
+    pub(super) fn encoder_over(&self, basis: &DMatrix<f64>) -> Result<AffineMap> {
         let classes = match self.frame.is_spatial() && basis.ncols() > 0 {
             true => symmetry_classes(basis, self.robot).to_vec(),
             false => vec![basis.clone()],
@@ -320,7 +320,7 @@ impl Task<'_> {
         &self,
         (encoder, decoder): (StateMap, StateMap),
         monitor: &mut Monitor<'_>,
-    ) -> Result<Fitted, TrainError> {
+    ) -> Result<Fitted> {
         let maps = self.encoded(encoder, decoder);
         let (options, features) = (&self.options.regression, &self.features);
         let set = maps.training_set(self);

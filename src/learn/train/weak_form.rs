@@ -12,7 +12,7 @@ pub(super) fn check_terms(
     set: EncodedSet<'_>,
     features: &Features,
     library: &Library,
-) -> Result<(), TrainError> {
+) -> Result<()> {
     let bad = |value: &f64| value.is_nan() || value.abs() > LARGEST;
     let mut values = FeatureValues::default();
     for (phase, pattern) in set.dataset.phases.patterns.iter().enumerate() {

@@ -5,14 +5,8 @@ use std::cell::Cell;
 use nalgebra::DVector;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use serde_json::{Map, Number};
 
 use super::*;
-use crate::model::{
-    CoordinateNames, InputStatistics, JumpPrior, Landmarks, Library, LibraryChoice, Phase,
-    ScaleFactors, Scaling, StandardLibrary, StateMap,
-};
 use crate::robot::{Actuators, Robot, WrenchFrame};
 use crate::robot_file::{self, RobotEntry};
 
@@ -44,22 +38,37 @@ pub(super) struct Manifest {
     pub input_statistics: Vec<(String, InputStatistics)>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<RobotValue>,
-    #[serde(default, deserialize_with = "present")]
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub actuators: Option<Actuators>,
-    #[serde(default, deserialize_with = "present")]
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub wrench_frame: Option<WrenchFrame>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_time_s: Option<f64>,
-    #[serde(default, deserialize_with = "present")]
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub landmarks: Option<Landmarks>,
-    #[serde(default, deserialize_with = "present")]
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub prior: Option<JumpPrior>,
-    #[serde(default, deserialize_with = "object")]
-    #[serde(skip_serializing_if = "Map::is_empty")]
+    #[serde(
+        default,
+        deserialize_with = "object",
+        skip_serializing_if = "Map::is_empty"
+    )]
     pub provenance: Map<String, Value>,
 }
 
@@ -94,7 +103,7 @@ impl Manifest {
         manifest
     }
 
-    pub(super) fn model(self, file: &str) -> Result<ReducedModel, ArtifactError> {
+    pub(super) fn model(self, file: &str) -> Result<ReducedModel> {
         let refused = |source: ModelError| ArtifactError::unusable(file, source);
         let incomplete = |part, needs| Err(refused(ModelError::Incomplete { part, needs }));
         let prior = match (self.landmarks, self.prior) {
@@ -147,22 +156,32 @@ pub(super) enum RobotValue {
     Entry(RobotEntry),
 }
 
-impl<'de> Deserialize<'de> for RobotValue {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Robot;
-        impl<'de> Visitor<'de> for Robot {
-            type Value = RobotValue;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("the name of a robot, or an object that describes one")
-            }
-            fn visit_str<E: Error>(self, name: &str) -> Result<RobotValue, E> {
-                Ok(RobotValue::Name(name.to_owned()))
-            }
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RobotValue, A::Error> {
-                RobotEntry::deserialize(MapAccessDeserializer::new(map)).map(RobotValue::Entry)
+/// Reads a value by what stands in the file: words that say what is expected, then a visit for each form.
+macro_rules! read_by_form {
+    ($value:ty, $words:literal, $($visit:tt)*) => {
+        impl<'de> Deserialize<'de> for $value {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                struct Form;
+                impl<'de> Visitor<'de> for Form {
+                    type Value = $value;
+                    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                        f.write_str($words)
+                    }
+                    $($visit)*
+                }
+                deserializer.deserialize_any(Form)
             }
         }
-        deserializer.deserialize_any(Robot)
+    };
+}
+
+read_by_form! {
+    RobotValue, "the name of a robot, or an object that describes one",
+    fn visit_str<E: Error>(self, name: &str) -> Result<RobotValue, E> {
+        Ok(RobotValue::Name(name.to_owned()))
+    }
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RobotValue, A::Error> {
+        RobotEntry::deserialize(MapAccessDeserializer::new(map)).map(RobotValue::Entry)
     }
 }
 
@@ -174,7 +193,7 @@ impl RobotValue {
         }
     }
 
-    fn robot(self, file: &str) -> Result<&'static Robot, ArtifactError> {
+    fn robot(self, file: &str) -> Result<&'static Robot> {
         match self {
             Self::Name(name) => {
                 robot_file::by_name(&name).map_err(|source| ArtifactError::unusable(file, source))
@@ -208,49 +227,30 @@ impl Serialize for ScaleFactors {
     }
 }
 
-impl<'de> Deserialize<'de> for ScaleFactors {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Factors;
-        impl<'de> Visitor<'de> for Factors {
-            type Value = ScaleFactors;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number or a list of numbers")
-            }
-            fn visit_f64<E>(self, value: f64) -> Result<ScaleFactors, E> {
-                Ok(ScaleFactors::Uniform(value))
-            }
-            fn visit_u64<E>(self, value: u64) -> Result<ScaleFactors, E> {
-                Ok(ScaleFactors::Uniform(value as f64))
-            }
-            fn visit_i64<E>(self, value: i64) -> Result<ScaleFactors, E> {
-                Ok(ScaleFactors::Uniform(value as f64))
-            }
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<ScaleFactors, A::Error> {
-                let factors = Vec::deserialize(SeqAccessDeserializer::new(seq))?;
-                Ok(ScaleFactors::PerCoordinate(DVector::from_vec(factors)))
-            }
-        }
-        deserializer.deserialize_any(Factors)
+read_by_form! {
+    ScaleFactors, "a number or a list of numbers",
+    fn visit_f64<E>(self, value: f64) -> Result<ScaleFactors, E> {
+        Ok(ScaleFactors::Uniform(value))
+    }
+    fn visit_u64<E>(self, value: u64) -> Result<ScaleFactors, E> {
+        Ok(ScaleFactors::Uniform(value as f64))
+    }
+    fn visit_i64<E>(self, value: i64) -> Result<ScaleFactors, E> {
+        Ok(ScaleFactors::Uniform(value as f64))
+    }
+    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<ScaleFactors, A::Error> {
+        let factors = Vec::deserialize(SeqAccessDeserializer::new(seq))?;
+        Ok(ScaleFactors::PerCoordinate(DVector::from_vec(factors)))
     }
 }
 
-impl<'de> Deserialize<'de> for LibraryChoice {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Terms;
-        impl<'de> Visitor<'de> for Terms {
-            type Value = LibraryChoice;
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a list of terms, or an object with degree, trigonometric and inputs")
-            }
-            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<LibraryChoice, A::Error> {
-                Vec::deserialize(SeqAccessDeserializer::new(seq)).map(LibraryChoice::Terms)
-            }
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<LibraryChoice, A::Error> {
-                StandardLibrary::deserialize(MapAccessDeserializer::new(map))
-                    .map(LibraryChoice::Standard)
-            }
-        }
-        deserializer.deserialize_any(Terms)
+read_by_form! {
+    LibraryChoice, "a list of terms, or an object with degree, trigonometric and inputs",
+    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<LibraryChoice, A::Error> {
+        Vec::deserialize(SeqAccessDeserializer::new(seq)).map(LibraryChoice::Terms)
+    }
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<LibraryChoice, A::Error> {
+        StandardLibrary::deserialize(MapAccessDeserializer::new(map)).map(LibraryChoice::Standard)
     }
 }
 
@@ -324,35 +324,27 @@ impl<'de> DeserializeSeed<'de> for Bounded<'_> {
 
 impl<'de> Visitor<'de> for Bounded<'_> {
     type Value = Value;
-
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a JSON value")
     }
-
     fn visit_unit<E: Error>(self) -> Result<Value, E> {
         Ok(Value::Null)
     }
-
     fn visit_bool<E: Error>(self, value: bool) -> Result<Value, E> {
         Ok(value.into())
     }
-
     fn visit_i64<E: Error>(self, value: i64) -> Result<Value, E> {
         Ok(value.into())
     }
-
     fn visit_u64<E: Error>(self, value: u64) -> Result<Value, E> {
         Ok(value.into())
     }
-
     fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
         Ok(Number::from_f64(value).map_or(Value::Null, Value::Number))
     }
-
     fn visit_str<E: Error>(self, value: &str) -> Result<Value, E> {
         Ok(value.into())
     }
-
     fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<Value, A::Error> {
         let mut array = Vec::new();
         while let Some(value) = values.next_element_seed(Bounded(self.0))? {
@@ -360,7 +352,6 @@ impl<'de> Visitor<'de> for Bounded<'_> {
         }
         Ok(array.into())
     }
-
     fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
         let mut object = Map::new();
         while let Some(key) = entries.next_key::<String>()? {

@@ -27,20 +27,24 @@
 //!
 //! [`ReducedModel`]: crate::model::ReducedModel
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod manifest;
 mod read;
 mod write;
 
-pub use read::{ArtifactError, MAX_FILE_BYTES, describe, is_standard_input, read, read_from_bytes};
+pub use read::{ArtifactError, describe, is_standard_input, read, read_from_bytes};
 pub use write::{Digest, check_place, digest, to_text, write};
 
-use std::fmt;
 use std::path::Path;
+use std::{fmt, fs, io};
 
-use serde_json::Value;
-
-use crate::files::Place;
-use crate::model::{ModelError, ReducedModel};
 use manifest::Manifest;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::{Map, Number, Value};
+
+use crate::files::{Fault, Located, Overwrite, Place, hex, magic, write_whole};
+use crate::model::{
+    CoordinateNames, InputStatistics, JumpPrior, Landmarks, Library, LibraryChoice, ModelError,
+    Phase, ReducedModel, ScaleFactors, Scaling, StandardLibrary, StateMap,
+};
+
+type Result<T, E = ArtifactError> = std::result::Result<T, E>;

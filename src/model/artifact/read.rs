@@ -2,36 +2,27 @@
 
 use std::error::Error;
 use std::fs::File;
-use std::io::{self, Read};
-
-use serde::Deserialize;
+use std::io::Read;
 
 use super::manifest::{SCHEMA, SCHEMA_2, SchemaProbe};
 use super::*;
 use crate::files::size::Format;
-use crate::files::{Fault, Located, magic};
 
 pub type ArtifactError = Located<Fault<ModelError>>;
 
 pub fn describe(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(source) = cause {
-        text.push_str(": ");
-        text.push_str(&source.to_string());
-        cause = source.source();
-    }
-    text
+    let causes = std::iter::successors(error.source(), |&cause| cause.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
-pub const MAX_FILE_BYTES: u64 = Format::Model.most_bytes();
+const MAX_FILE_BYTES: u64 = Format::Model.most_bytes();
 
 pub fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
 /// Reads and checks a model file, or standard input for the path `-`.
-pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
+pub fn read(path: &Path) -> Result<ReducedModel> {
     let mut bytes = Vec::new();
     let file = || File::open(path).map(|file| Box::new(file) as Box<dyn Read>);
     let (name, source) = match is_standard_input(path) {
@@ -46,7 +37,7 @@ pub fn read(path: &Path) -> Result<ReducedModel, ArtifactError> {
 }
 
 /// The same of a file in memory; `file` names it in errors. Never panics, whatever the bytes are.
-pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, ArtifactError> {
+pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let text = format!("found more than {MAX_FILE_BYTES} bytes, which no model file needs");
         return Err(ArtifactError::text(file, Place::Whole, text));
@@ -64,7 +55,7 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel, Artifac
     }
 }
 
-fn parse<'de, T: Deserialize<'de>>(file: &str, bytes: &'de [u8]) -> Result<T, ArtifactError> {
+fn parse<'de, T: Deserialize<'de>>(file: &str, bytes: &'de [u8]) -> Result<T> {
     let syntax = |place: String, error: &serde_json::Error| {
         // serde_json ends its messages with line and column, which the fault has anyway.
         let text = error.to_string();
@@ -95,7 +86,7 @@ fn foreign(file: &str, bytes: &[u8]) -> Option<ArtifactError> {
 }
 
 /// Looks at the schema first: for a file of a later version it is the fault, not unknown keys.
-fn check_schema(file: &str, bytes: &[u8]) -> Result<(), ArtifactError> {
+fn check_schema(file: &str, bytes: &[u8]) -> Result<()> {
     if bytes.trim_ascii_start().first() == Some(&b'[') {
         // serde would take an array for an object whose keys are left out.
         let place = Place::Key(".".into(), 1, 1);

@@ -1,11 +1,8 @@
 //! From a model to a file and its digest. JSON as people like to compare it: one key, or one row of a matrix, per line.
 
-use std::{fs, io};
-
 use sha2::{Digest as _, Sha256};
 
 use super::*;
-use crate::files::{Overwrite, hex, write_whole};
 
 /// The model file as text: equal for equal models, numbers in the shortest form that reads back to the same bits.
 pub fn to_text(model: &ReducedModel) -> String {
@@ -14,15 +11,11 @@ pub fn to_text(model: &ReducedModel) -> String {
     print(&value)
 }
 
-pub fn check_place(
-    path: &Path,
-    model: &ReducedModel,
-    overwrite: Overwrite,
-) -> Result<(), ArtifactError> {
+pub fn check_place(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<()> {
     check_text(path, &to_text(model), overwrite)
 }
 
-fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), ArtifactError> {
+fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<()> {
     let same = || fs::read(path).is_ok_and(|bytes| bytes == text.as_bytes());
     match overwrite.allows(path) || same() {
         true => Ok(()),
@@ -34,7 +27,7 @@ fn check_text(path: &Path, text: &str, overwrite: Overwrite) -> Result<(), Artif
     }
 }
 
-pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<(), ArtifactError> {
+pub fn write(path: &Path, model: &ReducedModel, overwrite: Overwrite) -> Result<()> {
     let text = to_text(model);
     let written = write_whole(path, overwrite, |out| out.write_all(text.as_bytes()));
     match written {

@@ -1,7 +1,6 @@
 //! Putting emitted files into a folder, whole or not at all.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::io::{Read as _, Seek as _, Write as _};
 
 use sha2::{Digest as _, Sha256};
@@ -93,7 +92,7 @@ pub fn write_files_since(
     list.extend(files)?;
     for (part, is_there) in staged.iter_mut().zip(is_there) {
         // What nobody has checked is not replaced.
-        let overwrite = Overwrite::when_forced(is_there || overwrite == Overwrite::Replace);
+        let overwrite = Overwrite::from(is_there || overwrite == Overwrite::Replace);
         let put = part.put(overwrite);
         put.map_err(|error| io_error(&part.place, error))?;
     }

@@ -5,8 +5,6 @@
 //! is replaced. Stages that read state the place of a fault with [`Located`], stop where [`size`] says, and name
 //! formats that they do not read by [`magic`]. `text` has what texts of files may do on a terminal or in a shell.
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 pub mod magic;
 pub mod size;
 
@@ -22,6 +20,6 @@ pub use located::{Fault, Located, Place};
 pub use text::{is_invisible, shell_path, shell_word};
 pub use whole::{EmittedFile, Overwrite, write_whole};
 
-use std::fs::{File, OpenOptions};
-use std::io;
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
+use std::{fmt, io};

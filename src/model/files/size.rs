@@ -1,6 +1,6 @@
 //! How many bytes are read of a file, and how many those may unpack to, whatever sizes it states of itself.
 
-use std::io::{self, Read};
+use std::io::Read;
 
 use super::magic::{OtherFormat, recognised};
 use super::*;

@@ -2,9 +2,8 @@
 
 use std::collections::hash_map::RandomState;
 use std::ffi::OsString;
-use std::fs::{self, TryLockError};
 use std::hash::{BuildHasher as _, Hasher as _};
-use std::io::{self, BufWriter, Write};
+use std::io::{BufWriter, Write};
 
 use super::*;
 
@@ -30,11 +29,14 @@ pub enum Overwrite {
     Replace,
 }
 
-impl Overwrite {
-    pub fn when_forced(force: bool) -> Self {
+/// Whether it is forced.
+impl From<bool> for Overwrite {
+    fn from(force: bool) -> Self {
         if force { Self::Replace } else { Self::Refuse }
     }
+}
 
+impl Overwrite {
     pub fn allows(self, path: &Path) -> bool {
         match self {
             Self::Refuse => path.symlink_metadata().is_err(),

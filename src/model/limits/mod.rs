@@ -1,7 +1,5 @@
 //! Ranges of the numbers that users set, one [`table`] for flags, files of settings and programs.
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 pub mod table;
 
 use std::fmt;

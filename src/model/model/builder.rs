@@ -3,7 +3,6 @@
 use super::identifier::identifier_of;
 use super::maps::pinv_of_transpose;
 use super::*;
-use crate::robot::{FeetRule, LegMoments};
 
 const MAX_PHASES: usize = 16;
 const MAX_STATE_DIM: usize = 256;

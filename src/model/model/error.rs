@@ -1,10 +1,6 @@
 //! Faults of models, and of calls of their functions.
 
-use nalgebra::{Matrix, RawStorage};
-
 use super::*;
-use crate::robot::RobotError;
-use crate::symbolic::ParseError;
 
 pub(super) type Result<T, E = ModelError> = std::result::Result<T, E>;
 

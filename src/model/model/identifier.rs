@@ -1,7 +1,6 @@
 //! Names that are safe in generated C, C++ and Rust.
 
 use super::*;
-use crate::symbolic::Function;
 
 /// Longest identifier in bytes, so that names made of model, phase and function stay readable.
 pub(crate) const MAX_IDENTIFIER_LEN: usize = 40;

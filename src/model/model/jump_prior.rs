@@ -2,7 +2,7 @@
 //! nodes at equal shares of the duration. With the features `phi = (1, g_1, g_2, g_3)` of a goal, `g = (goal - mean) /
 //! std`, a coordinate at a node is `c . phi`; per part `delta ddz = Xi^T (delta z, delta dz, delta u_lat)`.
 
-use super::listed::{self, Listed};
+use super::listed::Listed;
 use super::*;
 
 pub const GOAL_DIM: usize = 3;

@@ -1,7 +1,6 @@
 //! Quantities and units of latent coordinates of a linear encoder over a robot's coordinates.
 
 use super::*;
-use crate::robot::{BODY_X, JOINT_DIM, LEG_JOINT_DIM, Leg};
 
 const BODY: [(&str, &str); 6] = [
     ("centre of mass forwards", "m"),

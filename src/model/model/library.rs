@@ -1,9 +1,6 @@
 //! The library Theta: ordered candidate terms over `z`, `dz` and `u`, evaluated in one pass over their subexpressions.
 
-use std::collections::BTreeMap;
-
 use super::*;
-use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId, integer_power};
 
 pub const MAX_LATENT_DIM: usize = 64;
 pub(crate) const MAX_LIBRARY_DIM: usize = 20_000;

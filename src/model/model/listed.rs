@@ -1,7 +1,7 @@
 //! Matrices as lists of rows and vectors as lists of numbers, for `#[serde(with = "listed")]`.
 
+use serde::Deserialize as _;
 use serde::de::{DeserializeOwned, Error as _};
-use serde::{Deserialize as _, Deserializer};
 
 use super::*;
 

@@ -27,8 +27,6 @@
 //! # }
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod builder;
 mod coordinates;
 mod error;
@@ -45,7 +43,7 @@ mod state_map;
 mod statistics;
 
 pub use crate::robot::FeetRule;
-pub use builder::ModelBuilder;
+pub(crate) use builder::ModelBuilder;
 pub use coordinates::{CoordinateNames, ScaleFactors, Scaling};
 pub use error::ModelError;
 pub use identifier::{Identifier, IdentifierError, check_name};
@@ -61,15 +59,21 @@ pub use standard_library::{LibraryOrder, StandardLibrary};
 pub use state_map::{AffineMap, Layer, MAX_LAYERS, StateMap};
 pub use statistics::{InputGivenState, InputStatistics};
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use nalgebra::{DMatrix, DVector, Dim};
-use serde::{Deserialize, Serialize, Serializer};
+use error::{Result, check, check_count, check_finite, check_shape, check_tensor};
+use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix, OMatrix, RawStorage};
+use rom::selected;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value};
 use thiserror::Error;
 
-use crate::robot::{Actuators, ContactFlags, FOOT_DIM, JOINT_NAMES, Robot, STATE_DIM, WrenchFrame};
-use error::{Result, check, check_count, check_finite, check_shape, check_tensor};
-use rom::selected;
+use crate::robot::{
+    Actuators, BODY_DIM, BODY_NAMES, BODY_X, ContactFlags, FOOT_DIM, InputRule, JOINT_DIM,
+    JOINT_NAMES, LEG_JOINT_DIM, Leg, LegMoments, Robot, RobotError, STATE_DIM, WrenchFrame,
+};
+use crate::symbolic::{
+    ExprId, ExprPool, Function, Node, Number, ParseError, SymbolId, integer_power,
+};

@@ -3,11 +3,8 @@
 use std::str::FromStr;
 
 use nalgebra::allocator::Allocator;
-use nalgebra::{DefaultAllocator, Dyn, OMatrix};
 
 use super::*;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{BODY_DIM, BODY_NAMES, JOINT_DIM, Leg};
 
 const KINDS: [&str; LEG_JOINT_DIM] = ["hx", "hy", "kn"];
 

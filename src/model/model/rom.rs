@@ -12,7 +12,6 @@
 //! equations of nonlinear maps. A function that needs a part which the model lacks returns [`ModelError::Missing`].
 
 use super::*;
-use crate::robot::{FeetRule, InputRule};
 
 /// One dynamics regime: `ddz = Xi^T Theta(z, dz, u_lat)`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -81,7 +81,7 @@ impl LibraryOrder {
         is_paired: false,
     };
     /// Appendix B of the paper: sin z, cos z, sin dz, cos dz.
-    pub const PAPER: Self = Self {
+    pub(crate) const PAPER: Self = Self {
         run: Run::Half,
         ..Self::ROMC
     };

@@ -208,10 +208,6 @@ impl StateMap {
         self.layers[self.layers.len() - 1].map.output_dim()
     }
 
-    pub fn shape(&self) -> (usize, usize) {
-        (self.output_dim(), self.input_dim())
-    }
-
     pub fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>> {
         let mut layers = self.layers.iter();
         layers.try_fold(x.clone(), |y, layer| {

@@ -2,14 +2,7 @@
 
 use std::fmt::Write as _;
 
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
-
-use super::legs::{Part, Places, build};
-use super::read::{RobotFileError, keep};
-use crate::files::{Located, Place};
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, LegGeometry, Robot};
+use super::*;
 
 pub(super) const LARGEST_ANGLE_RAD: f64 = 4.0 * std::f64::consts::PI; // of a joint or frame: two turns either way
 const USUAL_ANGLE_RAD: f64 = 9.5; // built joints do not exceed it: one and a half turns either way, as ANYmal's
@@ -36,7 +29,7 @@ pub(super) fn identified(
     places: &Places<'_>,
     chosen: Option<&str>,
     mut notes: Vec<String>,
-) -> Result<RobotReading, RobotFileError> {
+) -> Result<RobotReading> {
     if let Some(name) = chosen {
         entry.name = name.to_owned();
     }

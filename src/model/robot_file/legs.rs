@@ -1,18 +1,8 @@
 //! From an entry to a checked robot, and joint losses from a file or from a program's arrays.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use nalgebra::{Rotation3, Unit, Vector3};
-use serde::Deserialize;
-
-use super::identity::{JointEntry, LARGEST_ANGLE_RAD, LegEntry, RobotEntry, namesake};
-use super::read::{RobotFileError, from_toml_text, keep, text_of, word};
-use crate::files::is_invisible;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot::{
-    Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, Leg, LegGeometry, LegMoments, Robot,
-};
+use super::*;
 
 const MAX_NAME_LEN: usize = 80;
 const MAX_LINK_M: f64 = 10.0;
@@ -55,7 +45,7 @@ impl<'f> Places<'f> {
 
 impl RobotEntry {
     /// The robot of the entry, which is `entry` of `file` in errors; equal robots are one.
-    pub fn robot(&self, file: &str) -> Result<&'static Robot, RobotFileError> {
+    pub fn robot(&self, file: &str) -> Result<&'static Robot> {
         let robot = build(self, &Places::keys(file))?;
         match namesake(&robot) {
             None => Ok(keep(robot)),
@@ -70,7 +60,7 @@ impl RobotEntry {
     }
 }
 
-pub(super) fn build(entry: &RobotEntry, places: &Places<'_>) -> Result<Robot, RobotFileError> {
+pub(super) fn build(entry: &RobotEntry, places: &Places<'_>) -> Result<Robot> {
     places.name(Part::Name, &entry.name)?;
     places.positive(Part::Mass, entry.mass_kg)?;
     let found = format!("{} legs", entry.leg.len());
@@ -126,14 +116,14 @@ impl Places<'_> {
         part: Part<'_>,
         found: impl Into<Box<str>>,
         expected: impl Into<Box<str>>,
-    ) -> Result<(), RobotFileError> {
+    ) -> Result<()> {
         match is_fine {
             true => Ok(()),
             false => Err(self.fault(part, found, expected)),
         }
     }
 
-    fn name(&self, part: Part<'_>, name: &str) -> Result<(), RobotFileError> {
+    fn name(&self, part: Part<'_>, name: &str) -> Result<()> {
         // Comments and pages of generated files list names.
         let is_fine = !name.trim().is_empty()
             && name.len() <= MAX_NAME_LEN
@@ -145,13 +135,13 @@ impl Places<'_> {
         self.check(is_fine, part, format!("{name:?}"), expected)
     }
 
-    fn positive(&self, part: Part<'_>, value: f64) -> Result<f64, RobotFileError> {
+    fn positive(&self, part: Part<'_>, value: f64) -> Result<f64> {
         let is_fine = value.is_finite() && value > 0.0;
         self.check(is_fine, part, value.to_string(), "a finite number above 0")?;
         Ok(value)
     }
 
-    fn vector(&self, part: Part<'_>, vector: [f64; 3]) -> Result<(), RobotFileError> {
+    fn vector(&self, part: Part<'_>, vector: [f64; 3]) -> Result<()> {
         let is_fine = vector.iter().all(|v| v.abs() <= MAX_LINK_M);
         let expected = format!("three lengths of at most {MAX_LINK_M} m");
         self.check(is_fine, part, format!("{vector:?}"), expected)
@@ -161,7 +151,7 @@ impl Places<'_> {
         &self,
         part: impl Fn(&'static str) -> Part<'static>,
         joint: &JointEntry,
-    ) -> Result<(f64, f64), RobotFileError> {
+    ) -> Result<(f64, f64)> {
         let (key, unit, given, [low, high]) = match (joint.limits_rad, joint.limits_deg) {
             (Some(limits), None) => ("limits_rad", "rad", limits, limits),
             (None, Some(limits)) => {
@@ -191,7 +181,7 @@ impl Places<'_> {
     }
 
     /// Which leg each entry is, by where its first joint stands.
-    fn corners(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM], RobotFileError> {
+    fn corners(&self, legs: &[LegEntry]) -> Result<[Leg; FOOT_DIM]> {
         for (index, leg) in legs.iter().enumerate() {
             if leg.joint.len() != LEG_JOINT_DIM {
                 let place = format!("{}.joint", (self.of)(Part::Leg(index)));
@@ -224,7 +214,7 @@ impl Places<'_> {
         }
     }
 
-    fn axis(&self, part: Part<'_>, joint: &JointEntry) -> Result<Vector3<f64>, RobotFileError> {
+    fn axis(&self, part: Part<'_>, joint: &JointEntry) -> Result<Vector3<f64>> {
         let Some(given) = joint.axis.vector() else {
             let found = format!("{:?}", joint.axis);
             let expected = "\"x\", \"y\", \"z\", \"-x\", \"-y\", \"-z\" or three numbers";
@@ -246,7 +236,7 @@ impl Places<'_> {
         Ok((unit * sign).map(|v| v + 0.0)) // no -0.0, so that the usual axes are recognised
     }
 
-    fn geometry(&self, index: usize, leg: &LegEntry) -> Result<LegGeometry, RobotFileError> {
+    fn geometry(&self, index: usize, leg: &LegEntry) -> Result<LegGeometry> {
         let mut axes = [Vector3::zeros(); LEG_JOINT_DIM];
         for (offset, joint) in leg.joint.iter().enumerate() {
             axes[offset] = self.axis(Part::Joint(index, offset, "axis"), joint)?;
@@ -314,7 +304,7 @@ pub struct ActuatorsEntry {
 }
 
 impl ActuatorsEntry {
-    pub fn of_arrays(mut arrays: BTreeMap<String, Vec<f64>>) -> Result<Self, RobotFileError> {
+    pub fn of_arrays(mut arrays: BTreeMap<String, Vec<f64>>) -> Result<Self> {
         let mut take = |name: &str| {
             let missing = || RobotFileError::at("", format!("actuators.{name}"), "nothing", COUNT);
             arrays.remove(name).ok_or_else(missing)
@@ -334,7 +324,7 @@ impl ActuatorsEntry {
         }
     }
 
-    pub fn actuators(&self, file: &str) -> Result<Actuators, RobotFileError> {
+    pub fn actuators(&self, file: &str) -> Result<Actuators> {
         let joints = |name: &str, values: &[f64]| match values.len() {
             found @ (3 | JOINT_DIM) => Ok(std::array::from_fn(|joint| values[joint % found])),
             found => {
@@ -360,7 +350,7 @@ impl ActuatorsEntry {
 }
 
 /// Moments of a leg by name, as programs give them.
-pub fn leg_moments(mut values: BTreeMap<String, f64>) -> Result<LegMoments, RobotFileError> {
+pub fn leg_moments(mut values: BTreeMap<String, f64>) -> Result<LegMoments> {
     let fault = |name: &str, found: &str, expected: &str| {
         RobotFileError::at(
             "",
@@ -389,7 +379,7 @@ pub fn leg_moments(mut values: BTreeMap<String, f64>) -> Result<LegMoments, Robo
 
 /// Reads the tables `[actuators]` and, if there is one, `[legs]` of a TOML file, such as one of `romc identify`, for a
 /// robot if one is known.
-pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators, RobotFileError> {
+pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators> {
     let file = path.display().to_string();
     let File {
         robot: of,

@@ -1,6 +1,6 @@
 //! Robots from files: TOML, URDF, the object in a model file; those that romc brings; and tables of joint losses.
 //!
-//! Enters: a name, or the path or text of a file. Leaves: a checked [`Robot`](crate::robot::Robot) with its legs in
+//! Enters: a name, or the path or text of a file. Leaves: a checked [`Robot`] with its legs in
 //! romc's order, or file, place, what was found and what was expected. Legs are matched by where their first joints
 //! stand, joints by their order from the trunk. Read `identity.rs` first, the grammar, which doubts numbers; `legs.rs`
 //! makes a robot of it, `urdf` finds the legs of a tree. `docs/robots.md` describes the file.
@@ -18,8 +18,6 @@
 //! # Ok::<(), romc::robot_file::RobotFileError>(())
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
-
 mod identity;
 mod legs;
 mod read;
@@ -28,3 +26,19 @@ mod urdf;
 pub use identity::{RobotEntry, RobotReading, to_toml};
 pub use legs::{ActuatorsEntry, leg_moments, read_actuators};
 pub use read::{RobotFileError, RobotOptions, by_name, find, from_text, known_names, open};
+
+use std::path::Path;
+
+use identity::{Axis, JointEntry, LARGEST_ANGLE_RAD, LegEntry, identified, namesake};
+use legs::{Part, Places, build};
+use nalgebra::{Rotation3, Unit, Vector3};
+use read::{from_toml_text, keep, text_of, word};
+use serde::{Deserialize, Serialize};
+
+use crate::files::{Fault, Located, Place, is_invisible};
+use crate::robot::{
+    Actuators, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM, JOINT_NAMES, LEG_JOINT_DIM, Leg, LegGeometry,
+    LegMoments, Robot, RobotError,
+};
+
+type Result<T, E = RobotFileError> = std::result::Result<T, E>;

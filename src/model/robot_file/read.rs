@@ -1,17 +1,12 @@
 //! From a name or a file to a robot; the robots that romc brings, and those that were read.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use serde::de::DeserializeOwned;
 
-use super::identity::{RobotEntry, RobotReading, identified};
-use super::legs::{self, Places};
-use super::urdf;
+use super::*;
 use crate::files::size::{Format, read_text_capped, read_toml};
-use crate::files::{Fault, Located, Place};
-use crate::robot::{Robot, RobotError};
 
 /// A fault of a robot's file and its place; without a file, of a name or an option.
 pub type RobotFileError = Located<Fault>;
@@ -24,14 +19,11 @@ pub struct RobotOptions<'a> {
 }
 
 /// The robot of a name, or of a file that ends in `.toml` or `.urdf`.
-pub fn find(name_or_file: &str) -> Result<&'static Robot, RobotFileError> {
+pub fn find(name_or_file: &str) -> Result<&'static Robot> {
     Ok(open(name_or_file, &RobotOptions::default())?.robot)
 }
 
-pub fn open(
-    name_or_file: &str,
-    options: &RobotOptions<'_>,
-) -> Result<RobotReading, RobotFileError> {
+pub fn open(name_or_file: &str, options: &RobotOptions<'_>) -> Result<RobotReading> {
     let path = Path::new(name_or_file);
     match (
         crate::robot_file::by_name(name_or_file),
@@ -65,7 +57,7 @@ fn ending(path: &Path) -> String {
     ending.to_string_lossy().to_lowercase()
 }
 
-pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
+pub(super) fn text_of(path: &Path) -> Result<String> {
     let text = match ending(path).as_str() {
         "toml" => read_toml(path),
         _ => read_text_capped(path, Format::Robot),
@@ -75,11 +67,7 @@ pub(super) fn text_of(path: &Path) -> Result<String, RobotFileError> {
 }
 
 /// Reads a robot from TOML or, by the ending of `file`, which names it in errors, URDF.
-pub fn from_text(
-    file: &str,
-    text: &str,
-    options: &RobotOptions<'_>,
-) -> Result<RobotReading, RobotFileError> {
+pub fn from_text(file: &str, text: &str, options: &RobotOptions<'_>) -> Result<RobotReading> {
     if ending(Path::new(file)) != "toml" {
         return urdf::read(file, text, options);
     }
@@ -91,10 +79,7 @@ pub fn from_text(
     identified(entry, &Places::keys(file), options.name, Vec::new())
 }
 
-pub(super) fn from_toml_text<T: DeserializeOwned>(
-    file: &str,
-    text: &str,
-) -> Result<T, RobotFileError> {
+pub(super) fn from_toml_text<T: DeserializeOwned>(file: &str, text: &str) -> Result<T> {
     toml::from_str(text).map_err(|error| {
         let place = match error.span() {
             None => Place::Whole,

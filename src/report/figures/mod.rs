@@ -14,11 +14,11 @@ pub(crate) use figure::{Drawing, Figure, HeatMap, Panel, Series};
 pub(crate) use spelling::panel_svg;
 pub(crate) use sticks::{Film, Motion, film, film_strip, floor_m};
 
-use crate::files::EmittedFile;
-use crate::typeset::Table;
-use crate::typeset::mathml::HtmlText;
 use figure::StickPlot;
 use sticks::Sticks;
+
+use super::*;
+use crate::files::EmittedFile;
 
 pub(crate) fn figure_files(figure: &Figure) -> [EmittedFile; 3] {
     let file = |ending, contents| EmittedFile::new(format!("{}.{ending}", figure.id), contents);

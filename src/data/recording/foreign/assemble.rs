@@ -1,6 +1,5 @@
 //! Quantities of a log, each with its clock, to the segments of a recording.
 
-use super::elements::{angle_rates, in_world, unwrap};
 use super::map::Origin;
 use super::signal::{Signal, Source};
 use super::*;

@@ -153,13 +153,13 @@ pub(super) enum Origin {
 
 impl ColumnMap {
     /// Reads a map; errors name line or key, and what was expected.
-    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+    pub fn read(path: &Path) -> Outcome<Self> {
         let text = read_toml(path).map_err(|source| io_fault("read", source).of(path))?;
         Self::parse(&path.display().to_string(), &text)
     }
 
     /// [`Self::read`] of a text; `file` stands for the file in messages.
-    pub fn parse(file: &str, toml: &str) -> Result<Self, RecordingError> {
+    pub fn parse(file: &str, toml: &str) -> Outcome<Self> {
         let mut map: Self = toml::from_str(toml).map_err(|error| {
             let message = error.to_string();
             text(format!("no map of columns: {}", message.trim_end())).of(Path::new(file))

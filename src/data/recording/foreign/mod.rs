@@ -21,13 +21,15 @@ pub(super) use mcap::{is_mcap, read_mcap};
 pub(super) use mcap_write::write_mcap;
 pub(super) use text::{read_lines, read_texts};
 
-use super::*;
-
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use crate::recording::{clock::Instant, error::Checked, lines::MAX_ROWS, segment::Rows};
-use crate::robot::{JOINT_NAMES, rotation};
-use elements::{QUATERNION, Quantity};
+use elements::{Dimension, QUATERNION, Quantity, angle_rates, in_world, named, ordered, unwrap};
 use map::Frame;
 use signal::{Channel, Log};
+
+use super::*;
+use crate::recording::Recording;
+use crate::recording::clock::Instant;
+use crate::recording::error::{Checked, Outcome, RecordingError, RecordingFault, shortened};
+use crate::recording::lines::{self, Lines, MAX_ROWS, NumberReader};

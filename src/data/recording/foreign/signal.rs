@@ -1,6 +1,5 @@
 //! A log as it was read: named columns of numbers; and one quantity taken from it, in SI units and romc's order.
 
-use super::elements::{Dimension, named, ordered};
 use super::map::{Factors, List, Name, Table};
 use super::*;
 use crate::recording::reader::folded;

@@ -2,8 +2,6 @@
 
 use super::map::Delimiter;
 use super::*;
-use crate::recording::error::shortened;
-use crate::recording::lines::{self, Lines, NumberReader};
 
 const LARGE: f64 = 1e8; // numbers from which a column is kept as times: beyond, one number does not hold a microsecond
 

@@ -1,12 +1,8 @@
 //! Heights of the feet: while only some are on the ground, those in the air are higher, which tells which column of
 //! contact belongs to which foot; those on the ground are at height zero.
 
-use super::stance::{foot_place, orders};
-use super::{Found, mismatch};
-use crate::recording::check::outside;
-use crate::recording::preprocess::median;
-use crate::recording::{Recording, Segment};
-use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, Leg, Robot};
+use super::stance::orders;
+use super::*;
 
 /// By how much feet in the air have to be higher in sum in another order, m, and as a share of that sum: in right
 /// recordings single samples of a foot that rolls off or touches down can favour another order by 8 mm in sum.

@@ -1,18 +1,12 @@
 //! Places of the feet in the world, and how well those on the ground stay there; forces against weight and
 //! acceleration, falling in flight, hips' torques against the side they hold.
 
-use std::ops::Range;
+use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
+use serde::Serializer;
 
-use nalgebra::{DMatrix, Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
-use serde::{Serialize, Serializer};
-
-use super::weight_n;
+use super::*;
 use crate::recording::foreign::angles_of_quaternions;
-use crate::recording::preprocess::{differences, median};
-use crate::recording::segment::stretches;
-use crate::recording::{Recording, Segment};
-use crate::robot::rotation;
-use crate::robot::{BODY_NAMES, BODY_Z, FOOT_DIM, JOINT_DIM, Leg, Robot, STATE_DIM};
+use crate::robot::{BODY_NAMES, BODY_Z, rotation};
 
 type State = [f64; STATE_DIM];
 

@@ -42,7 +42,7 @@ pub(super) fn batches(
     recordings: &[Recording],
     dataset: &Dataset,
     frame: &Frame,
-) -> Result<Vec<Batch>, TrainError> {
+) -> Result<Vec<Batch>> {
     let mut out = Vec::new();
     let state = |columns| scaled(columns, &dataset.scaling.state).transpose();
     for recording in recordings {

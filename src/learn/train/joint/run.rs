@@ -14,18 +14,14 @@ use crate::train::weak_form::check_terms;
 
 /// Learns a model by Adam over encoder, decoder and Xi together (equations 9 to 20, steps of section IV-D).
 ///
-/// The seed of least score is kept, those without a model are left out. A cancelled training ends with the seeds begun
-/// by then. Deterministic, on any number of threads.
-///
-/// # Errors
-/// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
-pub fn joint(
+/// The seed of least score is kept, those without a model are left out. Deterministic, on any number of threads.
+pub(crate) fn joint(
     recordings: Recordings<'_>,
     robot: &'static Robot,
     options: &TrainOptions,
     origin: &Origin,
     monitor: &mut Monitor<'_>,
-) -> Result<Trained, TrainError> {
+) -> Result<Trained> {
     let task = Task::new(recordings, robot, options)?;
     let frame = frame(&task);
     let cut = |set| batches(set, &task.training, &frame);
@@ -212,7 +208,7 @@ impl Trainer<'_> {
     }
 
     /// The maps and Xi as they were learned, judged by the combined loss.
-    fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted, TrainError> {
+    fn published(&self, parameters: Parameters, judged: &[Batch]) -> Result<Fitted> {
         let plain = LatentBasis::unchanged(self.task.options.latent_dim);
         let (encoder, decoder) = folded(&parameters, self.frame, &plain)?;
         let weights = self.task.options.joint.weights;
@@ -229,7 +225,7 @@ impl Trainer<'_> {
     }
 
     /// The learned maps in the canonical latent basis, the decoder's last layer by least squares.
-    fn canonical_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap), TrainError> {
+    fn canonical_maps(&self, parameters: &Parameters) -> Result<(StateMap, StateMap)> {
         let (task, d) = (self.task, self.task.options.latent_dim);
         let learned = folded(parameters, self.frame, &LatentBasis::unchanged(d))?.0;
         if let (true, Some(linear)) = (self.is_linear(), learned.as_affine()) {

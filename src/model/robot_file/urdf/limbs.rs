@@ -1,12 +1,8 @@
 //! Which links of a tree are the trunk, which joints the legs, and where the feet are.
 
-use nalgebra::Vector3;
-
-use super::tree::{Body, Tree};
+use super::tree::Body;
+use super::*;
 use crate::files::shell_word;
-use crate::robot::FOOT_DIM;
-use crate::robot::LEG_JOINT_DIM;
-use crate::robot_file::RobotFileError;
 
 const SAME_PLACE_M: f64 = 1e-12; // largest distance of two feet that are one
 
@@ -27,10 +23,7 @@ type Chain = (Vec<usize>, bool); // moving joints below a body while they are a 
 
 impl Legs {
     /// Finds legs, or takes those that end at these feet.
-    pub(crate) fn find(
-        tree: &Tree<'_>,
-        feet: &[(String, Vector3<f64>)],
-    ) -> Result<Self, RobotFileError> {
+    pub(crate) fn find(tree: &Tree<'_>, feet: &[(String, Vector3<f64>)]) -> Result<Self> {
         let top = top(tree);
         let body = tree.body(top);
         let legs = match feet {
@@ -61,7 +54,7 @@ impl Legs {
 }
 
 /// The feet of `--feet`: names of links, each with a point in its frame if it is not the link's origin.
-pub(super) fn feet(list: &[String]) -> Result<Vec<(String, Vector3<f64>)>, RobotFileError> {
+pub(super) fn feet(list: &[String]) -> Result<Vec<(String, Vector3<f64>)>> {
     let joined = list.join(",");
     let mut words = (joined.split(',').map(str::trim)).filter(|word| !word.is_empty());
     let number = |word: &str| word.trim().parse::<f64>().ok().filter(|v| v.is_finite());
@@ -120,7 +113,7 @@ fn chain(tree: &Tree<'_>, first: usize) -> Chain {
     (joints, next.is_empty())
 }
 
-fn found_legs(tree: &Tree<'_>, top: usize, body: &Body) -> Result<Vec<Limb>, RobotFileError> {
+fn found_legs(tree: &Tree<'_>, top: usize, body: &Body) -> Result<Vec<Limb>> {
     let limbs = body.moving.iter().map(|joint| chain(tree, *joint));
     let limbs: Vec<Chain> = limbs.collect();
     let is_leg = |(joints, is_chain): &&Chain| *is_chain && joints.len() == LEG_JOINT_DIM;
@@ -166,7 +159,7 @@ fn found_legs(tree: &Tree<'_>, top: usize, body: &Body) -> Result<Vec<Limb>, Rob
 }
 
 /// The link at the foot: of those that the last joint carries, the one whose name says so, or the only one at the end.
-fn foot(tree: &Tree<'_>, joints: &[usize]) -> Result<usize, RobotFileError> {
+fn foot(tree: &Tree<'_>, joints: &[usize]) -> Result<usize> {
     let last = &tree.joints[joints[joints.len() - 1]];
     let held = tree.body(last.child).links.split_off(1);
     let name = |link: &usize| tree.links[*link].name;
@@ -215,7 +208,7 @@ fn named_legs(
     top: usize,
     body: &Body,
     feet: &[(String, Vector3<f64>)],
-) -> Result<Vec<Limb>, RobotFileError> {
+) -> Result<Vec<Limb>> {
     let leg = |(name, point): &(String, Vector3<f64>)| {
         let Some(foot) = tree.links.iter().position(|link| link.name == *name) else {
             let (place, found) = (format!("link `{name}`"), "no such link");

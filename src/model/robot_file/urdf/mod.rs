@@ -5,23 +5,16 @@
 mod limbs;
 mod tree;
 
-use nalgebra::{Rotation3, Vector3};
-
-use super::identity::{Axis, JointEntry, LegEntry, RobotEntry, RobotReading, identified};
-use super::legs::{Part, Places};
-use super::read::{RobotFileError, RobotOptions};
 use limbs::{Legs, Limb};
 use tree::{Element, Joint, Tree, document};
+
+use super::*;
 
 const ROUNDING: f64 = 1e-12; // components of axes and positions that are rounding of zero or one
 const ENDLESS_RAD: f64 = 2.0 * std::f64::consts::PI;
 const AXIS: std::ops::Range<f64> = 1e-6..1e6;
 
-pub(super) fn read(
-    file: &str,
-    text: &str,
-    options: &RobotOptions<'_>,
-) -> Result<RobotReading, RobotFileError> {
+pub(super) fn read(file: &str, text: &str, options: &RobotOptions<'_>) -> Result<RobotReading> {
     let feet = limbs::feet(options.feet)?;
     let document = document(file, text)?;
     let robot = Element::root(file, &document);
@@ -49,7 +42,7 @@ pub(super) fn read(
 }
 
 /// Where the body's frame is if not at the root, and which parts have no mass.
-fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>, RobotFileError> {
+fn notes(tree: &Tree<'_>, legs: &Legs) -> Result<Vec<String>> {
     let (trunk, body) = (&tree.links[legs.trunk], tree.body(legs.top));
     if tree.mass(&body.links) == 0.0 {
         let found = "no mass, nor in a link that fixed joints hold to it";
@@ -117,7 +110,7 @@ fn place(robot: Element<'_>, tree: &Tree<'_>, legs: &[Limb], part: Part<'_>) -> 
     }
 }
 
-fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry, RobotFileError> {
+fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry> {
     let (origin, frame) = tree.frame(trunk);
     let seen = |link: usize| {
         let (position, turn) = tree.frame(link);
@@ -137,7 +130,7 @@ fn entry(tree: &Tree<'_>, trunk: usize, leg: &Limb) -> Result<LegEntry, RobotFil
     Ok(LegEntry { joint, foot })
 }
 
-fn axis(joint: &Joint<'_>, turn: Rotation3<f64>) -> Result<[f64; 3], RobotFileError> {
+fn axis(joint: &Joint<'_>, turn: Rotation3<f64>) -> Result<[f64; 3]> {
     let Some(element) = joint.element.child("axis")? else {
         return Ok(rounded(turn * Vector3::x()));
     };
@@ -150,11 +143,7 @@ fn axis(joint: &Joint<'_>, turn: Rotation3<f64>) -> Result<[f64; 3], RobotFileEr
     Ok(rounded((turn * axis).normalize()))
 }
 
-fn joint_entry(
-    joint: &Joint<'_>,
-    at: [f64; 3],
-    axis: [f64; 3],
-) -> Result<JointEntry, RobotFileError> {
+fn joint_entry(joint: &Joint<'_>, at: [f64; 3], axis: [f64; 3]) -> Result<JointEntry> {
     let element = joint.element;
     let (is_endless, attributes) = match joint.kind {
         "revolute" => (false, "<limit lower=... upper=... effort=... velocity=...>"),

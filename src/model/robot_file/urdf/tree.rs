@@ -2,11 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Rotation3, Vector3};
 use roxmltree::{Attribute, Document, Node};
 
-use crate::files::{Place, shell_word};
-use crate::robot_file::RobotFileError;
+use super::*;
+use crate::files::shell_word;
 use crate::robot_file::identity::LARGEST_ANGLE_RAD;
 
 /// Kinds of joints; of them `fixed` alone does not move.
@@ -50,7 +49,7 @@ pub(super) struct Body {
 }
 
 impl<'x> Tree<'x> {
-    pub(crate) fn new(robot: Element<'x>) -> Result<Self, RobotFileError> {
+    pub(crate) fn new(robot: Element<'x>) -> Result<Self> {
         let mut tree = Self {
             file: robot.file,
             links: Vec::new(),
@@ -95,7 +94,7 @@ impl<'x> Tree<'x> {
         RobotFileError::at(self.file, "the tree", found, expected)
     }
 
-    fn only_root(&self) -> Result<usize, RobotFileError> {
+    fn only_root(&self) -> Result<usize> {
         let roots = (0..self.links.len()).filter(|link| self.links[*link].above.is_none());
         let roots: Vec<usize> = roots.collect();
         let name = |link: &usize| format!("`{}`", self.links[*link].name);
@@ -179,7 +178,7 @@ impl<'x> Tree<'x> {
 }
 
 /// Mass of a link, 0 without `<inertial>`. Moments of inertia are not used, but have to be possible.
-fn mass(link: Element<'_>) -> Result<f64, RobotFileError> {
+fn mass(link: Element<'_>) -> Result<f64> {
     let Some(inertial) = link.child("inertial")? else {
         return Ok(0.0);
     };
@@ -201,10 +200,7 @@ fn mass(link: Element<'_>) -> Result<f64, RobotFileError> {
     Ok(value)
 }
 
-fn joint<'x>(
-    element: Element<'x>,
-    links: &BTreeMap<&'x str, usize>,
-) -> Result<Joint<'x>, RobotFileError> {
+fn joint<'x>(element: Element<'x>, links: &BTreeMap<&'x str, usize>) -> Result<Joint<'x>> {
     let link = |tag: &'static str| {
         let name = (element.child(tag)?).and_then(|child| child.attribute("link"));
         let missing = || element.fault("", format!("no <{tag}>"), format!("<{tag} link=...>"));
@@ -262,7 +258,7 @@ pub(super) struct Element<'x> {
     node: Node<'x, 'x>,
 }
 
-pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>, RobotFileError> {
+pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>> {
     let document = Document::parse(text).map_err(|error| {
         // A prefix that nothing declares; macros of included files have none.
         if let roxmltree::Error::UnknownNamespace(prefix, at) = &error
@@ -334,7 +330,7 @@ impl<'x> Element<'x> {
     }
 
     /// The child of a kind, which may be there once.
-    pub(crate) fn child(self, tag: &'static str) -> Result<Option<Self>, RobotFileError> {
+    pub(crate) fn child(self, tag: &'static str) -> Result<Option<Self>> {
         let mut found = self.children(tag);
         let first = found.next();
         match found.next() {
@@ -348,12 +344,12 @@ impl<'x> Element<'x> {
     }
 
     /// The attribute `name`, without which nothing can refer to the element.
-    pub(crate) fn name(&self) -> Result<&'x str, RobotFileError> {
+    pub(crate) fn name(&self) -> Result<&'x str> {
         let name = self.attribute("name").filter(|name| !name.is_empty());
         name.ok_or_else(|| self.fault("", "no name", "name=\"...\""))
     }
 
-    pub(crate) fn number(&self, key: &str) -> Result<f64, RobotFileError> {
+    pub(crate) fn number(&self, key: &str) -> Result<f64> {
         let text = self.attribute(key);
         let value = text.and_then(|text| text.trim().parse::<f64>().ok());
         value.filter(|value| value.is_finite()).ok_or_else(|| {
@@ -362,7 +358,7 @@ impl<'x> Element<'x> {
         })
     }
 
-    pub(crate) fn triple(&self, key: &str) -> Result<Option<Vector3<f64>>, RobotFileError> {
+    pub(crate) fn triple(&self, key: &str) -> Result<Option<Vector3<f64>>> {
         let Some(text) = self.attribute(key) else {
             return Ok(None);
         };
@@ -375,7 +371,7 @@ impl<'x> Element<'x> {
     }
 
     /// Refuses attributes other than these, such as `quat_xyzw` of other dialects, that would change the result.
-    pub(crate) fn only_with(&self, keys: &[&str]) -> Result<(), RobotFileError> {
+    pub(crate) fn only_with(&self, keys: &[&str]) -> Result<()> {
         let mut own = self.node.attributes().filter(|a| a.namespace().is_none());
         match own.find(|a| !keys.contains(&a.name())) {
             None => Ok(()),

@@ -11,24 +11,20 @@ mod write;
 
 use std::path::Path;
 
-use nalgebra::DMatrix;
+use columns::Group;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use names::unit;
+use physics::{scale, slopes};
 
 use super::text::read_text;
 use super::*;
-use crate::recording::error::{Outcome, RecordingError, RecordingFault, text};
-use crate::recording::{
-    Recording,
-    foreign::{elements::Dimension, map::ColumnMap},
-};
-use crate::robot::{JOINT_DIM, Robot};
-use columns::Group;
-use names::unit;
-use physics::{scale, slopes};
+use crate::recording::error::text;
+use crate::recording::foreign::map::{ColumnMap, Name};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, Leg, Robot, STATE_DIM};
 
 const MOST_SKIPPED: usize = 20; // most lines before the header of a text
 const LEAST_COLUMNS: usize = 3; // fewest columns of a table
 
-/// A first map of a log.
 #[derive(Debug, Clone)]
 pub struct Guess {
     /// The map, TOML with comments.
@@ -46,7 +42,7 @@ pub struct Guess {
 ///
 /// # Errors
 /// [`RecordingError`] for a file that is no table, or whose columns have no names.
-pub fn guess(path: &Path, robot: &Robot) -> Result<Guess, RecordingError> {
+pub fn guess(path: &Path, robot: &Robot) -> Outcome<Guess> {
     if is_mcap(path) {
         return guess_of(path, &read_mcap(path)?, robot);
     }

@@ -1,15 +1,12 @@
 //! Units, order and signs under which feet on the ground stay in place, and signs and unit of torques under which they
 //! carry the body, tried on one recording read without scales; scales under which velocities are derivatives.
 
-use nalgebra::{Matrix3, Vector3};
-
 use super::*;
 use crate::recording::Segment;
 use crate::recording::check::quantile;
 use crate::recording::mismatch::{foot_place, hip_torque, median_place, stances};
 use crate::recording::preprocess::differences_within;
 use crate::recording::segment::stretches;
-use crate::robot::{GRAVITY_M_S2, Leg, STATE_DIM};
 
 const MOST: (usize, usize) = (40, 24); // most stances of a leg, and most samples of a stance, that are looked at
 const OUTSIDE_M: f64 = 4e-3; // that a joint outside of its limits counts as

@@ -1,6 +1,5 @@
 //! The guessed map as text, each line with what it rests on.
 
-use super::super::map::Name;
 use super::columns::{Clock, clock, groups};
 use super::scales::order_line;
 use super::*;

@@ -1,0 +1,189 @@
+"""Faults of sensors, clock and robot while a simulated Go1 jumps by the controller in C.
+
+The supervisor of the controller has to name each fault, and torques have to fade into joint damping.
+Torques are those of the command and of the joint PD with the command's gains.
+"""
+
+import argparse
+import json
+import pathlib
+import sys
+
+import numpy as np
+
+import c_controller
+from closed_loop import ROBOT, ROMC, ROOT, TRAINING, read_jump
+from model_inputs import ModelInputs
+from perturbations import NOMINAL, perturbed_simulation
+from simulation import CONTROL_STEP_S, Push
+
+EXAMPLE = """example:
+  cargo build --release
+  python faults.py --rate 500
+prints what each fault ended in and how long after its first measurement; exits with 1 if one is not
+named in time or if a run without fault is stopped."""
+FIRST_SUPERVISED = 20
+FADED_S = 0.3
+MOST_DAMPING_NM, DAMPING_NM_S = 10.0, 1.0
+PUSH_S = 0.1
+
+
+def exchanged_sides(x, dx, feet):
+    order = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8, *range(12, 18)]
+    return x[order], dx[order], feet[[1, 0, 3, 2]]
+
+
+def frozen(self, time_s, x, dx, feet):
+    self.held = self.held or (x, dx, feet)
+    return (time_s, *self.held)
+
+
+def changed(**changes):
+    """A fault that replaces parts of x or dx: names x or dx, values {coordinate: function of the value}."""
+
+    def fault(_, time_s, x, dx, feet):
+        x, dx = x.copy(), dx.copy()
+        for name, change in changes.items():
+            values = {"x": x, "dx": dx}[name]
+            for coordinate, of in change.items():
+                values[coordinate] = of(values[coordinate])
+        return time_s, x, dx, feet
+
+    return fault
+
+
+ZERO = {i: lambda _: 0.0 for i in (12, 13, 14)}
+FAULTS = {
+    "none": lambda _, *measured: measured,
+    "roll of 3.1 rad": changed(x={15: lambda _: 3.1}),
+    "measurement frozen": frozen,
+    "body 5 m aside": changed(x={13: lambda y: y + 5}),
+    "thigh and calf exchanged": lambda _, t, x, dx, feet: (
+        t,
+        x[[0, 2, 1, *range(3, 18)]],
+        dx[[0, 2, 1, *range(3, 18)]],
+        feet,
+    ),
+    "signs of joints turned": changed(x={i: lambda q: -q for i in range(12)}),
+    "encoder 0.6 rad off": changed(x={4: lambda q: q + 0.6}),
+    "clock stands": lambda self, t, *others: (self.fault_s, *others),
+    "clock runs backwards": lambda self, t, *others: (2 * self.fault_s - t, *others),
+    "clock 0.3 s ahead": lambda _, t, *others: (t + 0.3, *others),
+    "clock 0.3 s behind": lambda _, t, *others: (t - 0.3, *others),
+    "velocity of the base zero": changed(dx=ZERO),
+    "contacts inverted": lambda _, t, x, dx, feet: (t, x, dx, ~feet),
+    "left and right exchanged": lambda _, t, x, dx, feet: (t, *exchanged_sides(x, dx, feet)),
+    "not a number": changed(x={4: lambda _: np.nan}),
+    "push of 60 N": lambda _, *measured: measured,
+    "push of 200 N": lambda _, *measured: measured,
+}
+# The robot stays on its feet, at least in some of the runs.
+HARMLESS = ("clock 0.3 s ahead", "clock 0.3 s behind", "left and right exchanged", "push of 60 N")
+
+
+class Faulty:
+    """The controller with its joint PD, told wrong measurements from `fault_s` on."""
+
+    def __init__(self, controller, fault, fault_s, rate_hz):
+        self.controller, self.fault, self.fault_s = controller, fault, fault_s
+        self.every = round(1 / (rate_hz * CONTROL_STEP_S))
+        self.steps, self.held, self.command = 0, None, None
+        self.supervised = None
+        self.off_law_nm = 0.0
+
+    def torque(self, time_s, x, dx, feet):
+        """Twelve torques (N m) for a measurement."""
+        if self.steps % self.every == 0:
+            self.step(time_s, x, dx, feet)
+        self.steps += 1
+        command = self.command
+        joints, rates = np.array(command.joint_position), np.array(command.joint_velocity)
+        return (
+            np.array(command.torque)
+            + command.stiffness * (joints - x[:12])
+            + command.damping * (rates - dx[:12])
+        )
+
+    def step(self, time_s, x, dx, feet):
+        measured = (time_s, x, dx, feet)
+        if time_s > self.fault_s - 1e-6:
+            measured = self.fault(self, *measured)
+        self.command = self.controller.step(*measured)
+        if self.command.status >= FIRST_SUPERVISED and self.supervised is None:
+            self.supervised = time_s, self.command.status
+        if self.supervised and time_s > self.supervised[0] + FADED_S:
+            torque, damped = np.array(self.command.torque), -DAMPING_NM_S * measured[2][:12]
+            if not np.isfinite(np.concatenate(measured[1:3])).all():
+                damped = np.zeros(12)
+            damped = np.clip(damped, -MOST_DAMPING_NM, MOST_DAMPING_NM)
+            law = min(np.abs(torque - damped).max(), np.abs(torque).max())
+            self.off_law_nm = max(self.off_law_nm, law + self.command.stiffness)
+
+
+def run(module, inputs, jump, fault, fault_s, rate_hz):
+    """Name of the status, delay and contact of the trunk after the fault (s, or none), and what torques
+    are off the damping law (N m)."""
+    controller = module.Controller(module.Library().default_settings())
+    controller.set_reference(jump.time_s, jump.x, jump.dx, inputs.of(jump), jump.feet)
+    simulation = perturbed_simulation(ROBOT, NOMINAL, jump.floor, jump.x[0], jump.dx[0], 0.0)
+    if fault.startswith("push"):
+        simulation.push = Push(fault_s, fault_s + PUSH_S, (0.0, float(fault.split()[2]), 0.0))
+    faulty = Faulty(controller, FAULTS[fault], fault_s, rate_hz)
+    log = simulation.run(faulty, jump.time_s[-1] + 0.5)
+    touched = np.flatnonzero(log.other_contact & (log.time_s >= fault_s))
+    touch_s = log.time_s[touched[0]] - fault_s if len(touched) else None
+    if faulty.supervised is None:
+        return None, None, touch_s, 0.0
+    at_s, status = faulty.supervised
+    word = controller.status_text(status).split(":")[0]
+    return word, at_s - fault_s, touch_s, faulty.off_law_nm
+
+
+def main():
+    arguments = parse_arguments()
+    crate = c_controller.build(arguments.model, arguments.out_dir / "controller", arguments.romc)
+    inputs = ModelInputs.compiled(arguments.model, arguments.out_dir / "inputs", arguments.romc)
+    module, jump = c_controller.load(crate), read_jump(arguments.jump)
+    rows, missed = [], []
+    print(f"{'fault':27} {'from s':>6} {'status':18} {'after s':>7} {'touches s':>9} {'off law N m':>11}")
+    for fault in FAULTS:
+        for fault_s in (0.0, 0.2, 0.36):
+            word, after_s, touch_s, law = run(module, inputs, jump, fault, fault_s, arguments.rate)
+            rows.append(
+                {"fault": fault, "from_s": fault_s, "status": word, "after_s": after_s, "touches_s": touch_s}
+            )
+            numbers = [f"{s:.3f}" if s is not None else "-" for s in (after_s, touch_s)]
+            print(f"{fault:27} {fault_s:6.2f} {word or '-':18} {numbers[0]:>7} {numbers[1]:>9} {law:11.2g}")
+            if not is_right(fault, word, after_s, touch_s, law):
+                missed.append(f"{fault} from {fault_s} s")
+    if arguments.json:
+        print(json.dumps(rows))
+    if missed:
+        print("FAILED " + "; ".join(missed))
+    sys.exit(1 if missed else 0)
+
+
+def is_right(fault, word, after_s, touch_s, law):
+    """Whether a fault is named before the trunk touches the floor, and torques follow the law."""
+    if fault == "none":
+        return word is None
+    if word is None and fault in HARMLESS:
+        return touch_s is None
+    return word is not None and (touch_s is None or after_s < touch_s) and law < 1e-3
+
+
+def parse_arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--model", type=pathlib.Path, default=ROOT / "models/go1-d7.json")
+    parser.add_argument("--jump", type=pathlib.Path, default=TRAINING / "test_01.csv.gz")
+    parser.add_argument("--rate", type=int, default=100, help="control steps a second (default: 100)")
+    parser.add_argument("--romc", type=pathlib.Path, default=ROMC, help="the compiler")
+    parser.add_argument("--out-dir", type=pathlib.Path, default=ROOT / "out/faults")
+    parser.add_argument("--json", action="store_true", help="the table as JSON as well")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
