@@ -4,7 +4,7 @@ use super::source::integers;
 use super::*;
 use crate::model::ReducedModel;
 use crate::mpc::{
-    Command, Lift, Linearisation, Measurement, MissingInput, ReferenceSamples, Solver,
+    Bounds, Command, Lift, Linearisation, Measurement, MissingInput, ReferenceSamples, Solver,
 };
 use crate::robot::InputRule;
 
@@ -48,7 +48,12 @@ pub(super) fn text(
         },
         lift: Lift::Transpose,
         linearisation: Linearisation::Reference,
+        bounds: Bounds::OFF,
         ..jump.settings
+    };
+    let supervised = MpcSettings {
+        bounds: jump.settings.bounds,
+        ..plain
     };
     let consistent = MpcSettings {
         lift: Lift::Consistent,
@@ -62,6 +67,7 @@ pub(super) fn text(
         commands(model, jump, plain, true)?,
         commands(model, jump, consistent, true)?,
         commands(model, jump, about_plan, false)?,
+        commands(model, jump, supervised, true)?,
     ];
     let torques = runs.each_ref().map(|commands| {
         Numbers(Precision::Double).matrix(commands.iter().map(|command| command.torque_nm))
