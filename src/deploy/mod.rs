@@ -52,6 +52,24 @@ mod planned;
 pub use emit::{EmitError, EmitOptions, Target, emit};
 pub(crate) use planned::PlannedJump;
 
+use askama::Template;
+use nalgebra::DMatrix;
+
+use crate::codegen::interface::{ModelInterface, PhaseInterface};
+use crate::codegen::{
+    CodegenError, Precision, SineCosine, Units, c, rust, script::Script, tidy, wrapped,
+};
+use crate::equations::Equations;
+use crate::files::EmittedFile;
+use crate::lower::{Form, LowerError};
+use crate::model::ReducedModel;
+use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings, all_codes};
+use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
+use crate::recording::{self, LogColumn, RecordingError};
+use crate::robot::{
+    ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, Leg, Robot, RobotError, STATE_DIM, WrenchFrame,
+};
+
 /// The first line of a generated file: a comment in its language, or the text for a template to make one of.
 fn banner(path: &str, provenance: &str) -> String {
     match path.rsplit_once('.').map(|(_, ending)| ending) {

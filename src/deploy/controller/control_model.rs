@@ -1,13 +1,8 @@
 //! The numbers of a model as `src/control_model.rs`, and settings as generated files have them, from [`SETTINGS`].
 
-use askama::Template;
+use super::*;
 use nalgebra::storage::RawStorage;
-use nalgebra::{DMatrix, DVector, Dim};
-
-use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings};
-use crate::mpc::{ControlModel, ControlPhase};
-use crate::robot::{Leg, Robot, WrenchFrame};
+use nalgebra::{DVector, Dim};
 
 const WIDTH: usize = 5;
 

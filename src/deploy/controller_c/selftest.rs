@@ -2,11 +2,9 @@
 
 use super::source::integers;
 use super::*;
-use crate::model::ReducedModel;
 use crate::mpc::{
     Bounds, Command, Lift, Linearisation, Measurement, MissingInput, ReferenceSamples, Solver,
 };
-use crate::robot::InputRule;
 
 /// Most steps of each run of the self-test: the shipped jump to its end, where the horizon is at rest.
 const STEPS: usize = 200;
