@@ -2,9 +2,7 @@
 //! [`write_files`](crate::files::write_files). Equations come from `typeset`, code from `codegen`; `controller` adds
 //! the sources of `romc-control` and `romc-robot` and the model's numbers. Read `emit` first.
 
-/// Templates of whole files and their paths, in which `NAME` stands for the model's name, and `texts` of them. The
-/// caller writes the derive: askama looks for files from where it stands.
-/// Templates of a type also see the members of one of its fields.
+/// A template also sees the members of one of its fields.
 macro_rules! extends {
     (<$life:lifetime> $name:ty: $base:ty, $field:ident) => {
         impl<$life> std::ops::Deref for $name {
@@ -17,6 +15,7 @@ macro_rules! extends {
     };
 }
 
+/// Templates of whole files, of which `NAME` in a path is the model's; askama looks from where the derive stands.
 macro_rules! templates {
     (#[$derive:meta] $($path:literal: $template:ident $source:literal),* $(,)?) => {
         templates! { @each [#[$derive]] $($template $source),* }
