@@ -55,8 +55,7 @@ fn of_plans(robot: &Robot) -> MpcSettings {
     }
 }
 
-/// The file for a plan of a robot: the settings that differ from the usual ones, the joint PD, and the torques in flight,
-/// which plans need.
+/// The file for a plan of a robot: settings that differ from the usual ones, joint PD, torques in flight.
 pub(super) fn text(robot: &Robot) -> String {
     let both = [of_plans(robot), MpcSettings::default()];
     let [own, usual] = both.map(|settings| Settings::from(&settings).numbers());

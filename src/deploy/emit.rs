@@ -1,23 +1,9 @@
 //! Equations to the files of the chosen targets.
 
+use super::*;
+use crate::typeset::{PrintOptions, TypesetError, latex, markdown, mathml};
 use clap::ValueEnum as _;
 use once_cell::unsync::OnceCell;
-
-use super::controller;
-use super::controller_c;
-use super::planned::PlannedJump;
-use crate::codegen::script::Script;
-use crate::codegen::{
-    CodegenError, Precision, SineCosine, Units, c, interface::ModelInterface, rust,
-};
-use crate::equations::Equations;
-use crate::files::EmittedFile;
-use crate::lower::{Form, LowerError};
-use crate::model::ReducedModel;
-use crate::mpc::MpcError;
-use crate::recording::RecordingError;
-use crate::robot::RobotError;
-use crate::typeset::{PrintOptions, TypesetError, latex, markdown, mathml};
 
 /// What can be generated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]

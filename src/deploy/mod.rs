@@ -2,9 +2,7 @@
 //! [`write_files`](crate::files::write_files). Equations come from `typeset`, code from `codegen`; `controller` adds
 //! the sources of `romc-control` and `romc-robot` and the model's numbers. Read `emit` first.
 
-/// Templates of whole files and their paths, in which `NAME` stands for the model's name, and `texts` of them. The
-/// caller writes the derive: askama looks for files from where it stands.
-/// Templates of a type also see the members of one of its fields.
+/// A template also sees the members of one of its fields.
 macro_rules! extends {
     (<$life:lifetime> $name:ty: $base:ty, $field:ident) => {
         impl<$life> std::ops::Deref for $name {
@@ -17,6 +15,7 @@ macro_rules! extends {
     };
 }
 
+/// Templates of whole files, of which `NAME` in a path is the model's; askama looks from where the derive stands.
 macro_rules! templates {
     (#[$derive:meta] $($path:literal: $template:ident $source:literal),* $(,)?) => {
         templates! { @each [#[$derive]] $($template $source),* }
@@ -51,6 +50,24 @@ mod planned;
 
 pub use emit::{EmitError, EmitOptions, Target, emit};
 pub(crate) use planned::PlannedJump;
+
+use askama::Template;
+use nalgebra::DMatrix;
+
+use crate::codegen::interface::{ModelInterface, PhaseInterface};
+use crate::codegen::{
+    CodegenError, Precision, SineCosine, Units, c, rust, script::Script, tidy, wrapped,
+};
+use crate::equations::Equations;
+use crate::files::EmittedFile;
+use crate::lower::{Form, LowerError};
+use crate::model::ReducedModel;
+use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings, all_codes};
+use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
+use crate::recording::{self, ControllerLog, RecordingError};
+use crate::robot::{
+    ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, Leg, Robot, RobotError, STATE_DIM, WrenchFrame,
+};
 
 /// The first line of a generated file: a comment in its language, or the text for a template to make one of.
 fn banner(path: &str, provenance: &str) -> String {

@@ -1,15 +1,7 @@
 //! A jump, planned or recorded, as C arrays: what examples and self-tests of generated controllers jump.
 
-use nalgebra::DMatrix;
-
-use super::EmitError;
 use super::controller_c::source::{Numbers, integers, list, nested};
-use crate::codegen::{Precision, tidy};
-use crate::files::EmittedFile;
-use crate::model::ReducedModel;
-use crate::mpc::MpcSettings;
-use crate::recording;
-use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
+use super::*;
 
 /// A jump of a simulated go1 that no shipped model was trained on.
 const SHIPPED: &[u8] = include_bytes!("../../examples/recordings/go1/test_01.csv.gz");

@@ -1,13 +1,8 @@
 //! The numbers of a model as `src/control_model.rs`, and settings as generated files have them, from [`SETTINGS`].
 
-use askama::Template;
+use super::*;
 use nalgebra::storage::RawStorage;
-use nalgebra::{DMatrix, DVector, Dim};
-
-use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings};
-use crate::mpc::{ControlModel, ControlPhase};
-use crate::robot::{Leg, Robot, WrenchFrame};
+use nalgebra::{DVector, Dim};
 
 const WIDTH: usize = 5;
 
@@ -149,11 +144,21 @@ impl SettingText {
     pub(in crate::deploy) fn default_in_c(&self) -> String {
         let number = match self.default.is_finite() {
             true => self.default.to_string(),
-            false => "INFINITY".to_owned(),
+            false => "(double)INFINITY".to_owned(),
         };
         match self.setting.kind {
             "Real" => format!("(real){number}"),
             _ => number,
+        }
+    }
+
+    /// What switches it off in the generated C of this precision, if it is a bound of the supervisor.
+    pub(in crate::deploy) fn off(&self, real: &str) -> Option<String> {
+        match (self.setting.accepts, self.setting.kind) {
+            (Accepts::Bound, "Real") => Some(format!("({real})INFINITY")),
+            (Accepts::Bound, _) => Some("(double)INFINITY".to_owned()),
+            (Accepts::Count, _) => Some("0".to_owned()),
+            _ => None,
         }
     }
 

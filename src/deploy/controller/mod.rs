@@ -5,19 +5,7 @@
 mod control_model;
 mod lock;
 
-use askama::Template;
-
-use crate::codegen::interface::ModelInterface;
-use crate::codegen::{Precision, SineCosine, Units, rust};
-use crate::codegen::{tidy, wrapped};
-use crate::deploy::{EmitError, PlannedJump, banner};
-use crate::equations::Equations;
-use crate::files::EmittedFile;
-use crate::lower::Form;
-use crate::model::ReducedModel;
-use crate::mpc::ControlModel;
-use crate::mpc::interface::{SETTINGS, Settings, all_codes};
-use crate::robot::{InputRule, Leg, Robot, STATE_DIM, WrenchFrame};
+use super::*;
 use control_model::{ControlModelText, SettingText};
 
 /// What the files of a controller, as a crate or in C, take from the model, the robot and romc.

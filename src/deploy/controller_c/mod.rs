@@ -7,26 +7,13 @@ mod ros2_control;
 mod selftest;
 pub(super) mod source;
 
-use askama::Template;
-
-use crate::codegen::interface::{ModelInterface, PhaseInterface};
-use crate::codegen::tidy;
-use crate::codegen::{Precision, Units, c};
+use super::*;
 use crate::deploy::controller::{self, plant};
 use crate::deploy::emit::{EmitOptions, compiled};
-use crate::deploy::{EmitError, PlannedJump};
-use crate::equations::Equations;
-use crate::files::EmittedFile;
-use crate::mpc::ControlModel;
-use crate::mpc::interface::{Accepts, SETTINGS, Setting};
 use crate::mpc::problem::StageRows;
-use crate::recording::ControllerLog;
 use crate::solver::ROW_NUMBERS;
-use source::{Numbers, Source};
-
-use crate::mpc::{MpcError, MpcSettings};
-use crate::robot::{JOINT_DIM, STATE_DIM};
 use source::nested;
+use source::{Numbers, Source};
 
 struct Facts<'a> {
     controller: controller::Facts<'a>,

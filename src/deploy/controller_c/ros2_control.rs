@@ -6,7 +6,6 @@ use super::*;
 use crate::mpc::STEP_SLACK;
 use crate::recording::Column;
 use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
-use crate::robot::FOOT_DIM;
 
 struct Facts<'a> {
     controller: &'a super::Facts<'a>,

@@ -2,11 +2,9 @@
 
 use super::source::integers;
 use super::*;
-use crate::model::ReducedModel;
 use crate::mpc::{
-    Command, Lift, Linearisation, Measurement, MissingInput, ReferenceSamples, Solver,
+    Bounds, Command, Lift, Linearisation, Measurement, MissingInput, ReferenceSamples, Solver,
 };
-use crate::robot::InputRule;
 
 /// Most steps of each run of the self-test: the shipped jump to its end, where the horizon is at rest.
 const STEPS: usize = 200;
@@ -48,7 +46,12 @@ pub(super) fn text(
         },
         lift: Lift::Transpose,
         linearisation: Linearisation::Reference,
+        bounds: Bounds::OFF,
         ..jump.settings
+    };
+    let supervised = MpcSettings {
+        bounds: jump.settings.bounds,
+        ..plain
     };
     let consistent = MpcSettings {
         lift: Lift::Consistent,
@@ -62,6 +65,7 @@ pub(super) fn text(
         commands(model, jump, plain, true)?,
         commands(model, jump, consistent, true)?,
         commands(model, jump, about_plan, false)?,
+        commands(model, jump, supervised, true)?,
     ];
     let torques = runs.each_ref().map(|commands| {
         Numbers(Precision::Double).matrix(commands.iter().map(|command| command.torque_nm))

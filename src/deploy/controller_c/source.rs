@@ -2,13 +2,11 @@
 
 use std::borrow::Borrow;
 
-use nalgebra::DMatrix;
-
 use super::*;
 use crate::mpc::problem::{Row, pairs};
 use crate::mpc::structured::{LINK_SOFTNESS, LINK_TOLERANCE, TOLERANCE};
-use crate::mpc::{ControlPhase, FallbackSettings, InputGivenState, NO_PHASE, torque_deviation};
-use crate::robot::{GRAVITY_M_S2, Leg, LegShape, WrenchFrame};
+use crate::mpc::{FallbackSettings, InputGivenState, NO_PHASE, torque_deviation};
+use crate::robot::{GRAVITY_M_S2, LegShape};
 
 #[derive(Template)]
 #[template(path = "controller_c/source.askama", config = "templates/askama.toml")]

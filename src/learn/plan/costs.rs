@@ -33,10 +33,8 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
         let next = task.seed.parts.get(part + 1);
         let lifts = of.is_grounded() && next.is_some_and(|next| !next.is_grounded());
         for node in 0..of.z.len() {
-            let [input, rate] = match lifts && node == of.intervals() {
-                true => settings.at_take_off,
-                false => [1.0; 2],
-            };
+            let is_take_off = lifts && node == of.intervals();
+            let [input, rate] = [[1.0; 2], settings.at_take_off][usize::from(is_take_off)];
             let end = node == 0 || node == of.intervals();
             let time = step / TIME_UNIT_S * if end { 0.5 } else { 1.0 };
             let at = task.node(part, node);
