@@ -20,8 +20,7 @@ pub struct Invariance {
     pub gravity_m_s2: Option<f64>,
     /// Vertical force of four feet over the acceleration of that combination.
     pub mass_kg: Option<f64>,
-    /// Acceleration of the rotation about the centre of mass by the feet's moment of pitch; none without such a latent
-    /// combination.
+    /// Acceleration of the rotation about the centre of mass by the feet's moment of pitch; none without such a latent.
     pub rotation_rad_s2_per_nm: Option<f64>,
     /// Largest change of a decoded joint angle for a body 1 m further on, rad/m.
     pub joint_shift_rad_m: f64,
@@ -234,8 +233,7 @@ fn momentum(
     Ok(Some((combination, Some(in_flight))))
 }
 
-/// The change of a combination's acceleration over a load, of vertical forces of the feet; none if no phase has four feet
-/// down.
+/// The change of a combination's acceleration over a load of vertical forces of the feet; none without four feet down.
 fn response(
     model: &ReducedModel,
     rest: &DVector<f64>,

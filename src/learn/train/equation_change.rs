@@ -57,8 +57,7 @@ pub(super) enum Kind {
     Share,
 }
 
-/// Changes of an equation: its coefficients change along these directions, `library_dim x m`, after they moved by a
-/// shift.
+/// Changes of an equation: after a shift its coefficients change along these directions, `library_dim x m`.
 pub(super) struct Family {
     pub(super) kind: Kind,
     directions: DMatrix<f64>,

@@ -280,8 +280,7 @@ fn loads_on(coordinate: usize, inputs: &DMatrix<f64>) -> DMatrix<f64> {
     loads.resize_vertically(count + constant, 1.0)
 }
 
-/// Ridge regression of `target` on the accelerations of joints (`k x n`) and on loads: the weights of the joints. None where
-/// joints rest.
+/// Weights of the joints: ridge regression of `target` on their accelerations (`k x n`) and on loads. None at rest.
 fn joint_weights(
     of_joints: DMatrix<f64>,
     loads: Option<DMatrix<f64>>,

@@ -15,8 +15,7 @@ pub(super) struct Controlled {
     pub(super) terms: [usize; 2],
 }
 
-/// Coefficients of `dz` and `z` that fit best if each equation is multiplied and shifted as well; none if none fit
-/// better.
+/// Coefficients of `dz` and `z` that fit best if each equation is multiplied and shifted as well; none if none is better.
 pub(super) fn coefficients(
     equations: &[Controlled],
     sums: &Sums,

@@ -233,8 +233,7 @@ impl Knowledge {
         .collect()
     }
 
-    /// Terms that depend on certain variables (counted over `z`, `dz`, `u_lat`) are not free in these columns, unless this
-    /// part is left out.
+    /// Terms of certain variables (counted over `z`, `dz`, `u_lat`) are not free in these columns with this part.
     fn forbid(
         &mut self,
         part: impl Into<Option<RecipePart>>,

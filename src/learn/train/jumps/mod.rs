@@ -26,8 +26,7 @@ pub(super) struct Dynamics<'a> {
 }
 
 impl Dynamics<'_> {
-    /// Slopes of the accelerations of the momentum by `z`, `dz` and `u_lat` about the mean node of a part, `3 d x m`, by
-    /// central differences.
+    /// Central differences of the momentum's accelerations by `z`, `dz`, `u_lat` about a part's mean node, `3 d x m`.
     fn slopes(&self, phase: usize, sampled: &[Sampled], part: usize) -> DMatrix<f64> {
         let nodes: Vec<&PartNodes> = sampled.iter().map(|jump| &jump.parts[part]).collect();
         let d = nodes[0].z.ncols();
