@@ -1,4 +1,4 @@
-//! A model to files: [`Equations`](crate::equations::Equations) enter [`emit()`], files in memory leave, for
+//! A model to files: [`Equations`] enter [`emit()`], files in memory leave, for
 //! [`write_files`](crate::files::write_files). Equations come from `typeset`, code from `codegen`; `controller` adds
 //! the sources of `romc-control` and `romc-robot` and the model's numbers. Read `emit` first.
 
