@@ -173,10 +173,10 @@ def test_settings_are_those_of_the_table(model, jump):
 
 
 def test_bounds_and_the_end_reach_the_command(model, jump):
-    def last(x=jump.x[40], t=jump.t[40], **settings):
+    def last(x=jump.x[40], t=jump.t[40], dx=jump.dx[40], **settings):
         controller = romc.Controller(model, clock_gap_s=float("inf"), **settings).set_reference(jump)
-        controller.step(t, x, jump.dx[40], jump.feet[40])
-        return controller.step(t + 0.03, x, jump.dx[40], jump.feet[40])
+        controller.step(t, x, dx, jump.feet[40])
+        return controller.step(t + 0.03, x, dx, jump.feet[40])
 
     tilted = np.array(jump.x[40])
     tilted[16] += 0.7
@@ -184,7 +184,8 @@ def test_bounds_and_the_end_reach_the_command(model, jump):
     assert last(tilted, tilt_rad=float("inf")).source != "damping"
     assert set(romc.STATUSES) >= {"solved", "ended", "tilt", "poor_steps", "no_reference"}
     assert romc.STATUSES["tilt"].endswith("damping until reset")
-    ends = {end: last(t=jump.t[-1] + 1.0, after_end=end) for end in ("hold", "damp", "stop")}
+    end_s, at_end = jump.t[-1] + 1.0, (jump.x[-1], jump.dx[-1])
+    ends = {end: last(at_end[0], end_s, at_end[1], after_end=end) for end in ("hold", "damp", "stop")}
     assert ends["hold"].status != "ended" and ends["hold"].stiffness == 20.0 and ends["hold"].damping == 0.8
     for end in ("damp", "stop"):
         assert ends[end].status == "ended" and ends[end].stiffness < 20.0, end
