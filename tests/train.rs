@@ -528,7 +528,7 @@ fn cancelled_at(
     method.learn(recordings, go1(), options, &Origin::default(), &mut monitor)
 }
 
-fn tells(progress: &Progress, part: &str) -> bool {
+fn is_done_with(progress: &Progress, part: &str) -> bool {
     matches!(progress, Progress::Done { text, .. } if text.contains(part))
 }
 
@@ -541,7 +541,9 @@ fn joint_training_cancelled_during_descent_gives_a_model() {
     for transfer in [Transfer::Chosen, Transfer::Published] {
         for mut options in [options.clone(), networks.clone()] {
             options.joint.transfer = transfer;
-            let ended = cancelled_at(Method::Joint, &options, |news| tells(news, "epoch 4:"));
+            let ended = cancelled_at(Method::Joint, &options, |progress| {
+                is_done_with(progress, "epoch 4:")
+            });
             let Trained { model, report } = ended.expect("the best so far");
             assert_eq!(report.seeds.len(), 1, "{transfer:?}");
             let training = jumps("train", 1);
@@ -558,7 +560,9 @@ fn joint_training_cancelled_during_descent_of_a_curved_library_gives_a_model() {
         trigonometric: false,
         inputs: true,
     }));
-    let ended = cancelled_at(Method::Joint, &options, |news| tells(news, "epoch 4:"));
+    let ended = cancelled_at(Method::Joint, &options, |progress| {
+        is_done_with(progress, "epoch 4:")
+    });
     let report = ended.expect("the best so far").report;
     assert!(report.choice.is_some_and(|choice| choice.score.is_finite()));
 }

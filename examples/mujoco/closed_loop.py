@@ -17,7 +17,7 @@ import romc_controller
 from assessment import assess, longest_flight, repetition_faults
 from closed_loop_table import missed_aims, summary, table
 from film_strip import render
-from followers import Jump, LatentMpc, Replay, TorquesOnly, WithoutFeedback
+from followers import FIRST_SUPERVISED, Jump, LatentMpc, Replay, TorquesOnly, WithoutFeedback
 from jump_sets import recorded_floor
 from model_inputs import ModelInputs
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
@@ -98,6 +98,7 @@ class Outcome:
     final_height_m: float
     torque_share: float
     steps_without_plan: int
+    supervisor_status: int  # the first from 20 on, or 0
     median_step_us: float
 
 
@@ -327,6 +328,7 @@ def run(task):
         final_height_m=repeated.final_height_m,
         torque_share=repeated.torque_share,
         steps_without_plan=sum(n for s, n in statuses.items() if s < 0 or s >= 10),
+        supervisor_status=next((s for s in statuses if s >= FIRST_SUPERVISED), 0),
         median_step_us=float(np.median(getattr(follower, "solve_us", []) or [0.0])),
     )
     if controller:

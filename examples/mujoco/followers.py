@@ -15,6 +15,7 @@ from simulation import CONTROL_STEP_S
 POSITION_GAIN = 20.0
 VELOCITY_GAIN = 0.8
 MPC_STEP_S = 0.01
+FIRST_SUPERVISED = 20
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,10 @@ class Jump:
 
 
 class Follower:
-    """Feed-forward torque plus joint PD; `plan` is asked every 10 ms for both."""
+    """Feed-forward torque plus joint PD; `plan` is asked every `step_s` for both."""
 
     feed_forward_in_flight = False
+    step_s = MPC_STEP_S
 
     def __init__(self):
         self.next_s = 0.0
@@ -49,7 +51,7 @@ class Follower:
         """Twelve torques (N m) for a measurement."""
         if time_s > self.next_s - 1e-6:
             self.feed_forward_nm, self.joints, self.rates = self.plan(time_s, x, dx, feet)
-            self.next_s += MPC_STEP_S
+            self.next_s += self.step_s
         torque = POSITION_GAIN * (self.joints - x[:12]) + VELOCITY_GAIN * (self.rates - dx[:12])
         if feet.any() or self.feed_forward_in_flight:
             torque = torque + self.feed_forward_nm

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+import c_controller
 import romc_controller
 from assessment import assess, longest_flight, repetition_faults
 from closed_loop import named_number, read_jump, write_strip
@@ -61,6 +62,7 @@ METHODS = {
     "nearest jump, controller": Method("nearest", True),
     "plan by the no-dynamics model, controller": Method("uninformed", True),
 }
+KINDS = {"crate": romc_controller, "c": c_controller}
 ABLATIONS = (
     "no refit: the phases' own Xi",
     "Xi of deviations zero",
@@ -113,7 +115,7 @@ def main():
     if answer is None:
         raise SystemExit("no goal has a plan")
     arguments.setting = settings_of(answer) | dict(arguments.setting)
-    crate = romc_controller.build(arguments.model, folder / arguments.model.stem, arguments.romc)
+    crate = KINDS[arguments.controller].build(arguments.model, folder / arguments.model.stem, arguments.romc)
     tasks = [
         (arguments, models, inputs, crate, name, method, goal, condition)
         for name, method in methods.items()
@@ -162,6 +164,10 @@ def parse_arguments():
         "--strips", action="store_true",
         help="a film strip of each nominal plan with the controller, planned above, jumped below",
     )
+    parser.add_argument(
+        "--controller", choices=KINDS, default="crate", help="the generated crate, or the controller in C99"
+    )
+    parser.add_argument("--rate", type=int, default=100, help="control steps a second (default: 100)")
     parser.add_argument("--json", action="store_true", help="print JSON, not the table")
     parser.add_argument("--jobs", type=int, help="runs at a time (default: one per core)")
     arguments = parser.parse_args()
@@ -273,6 +279,7 @@ def run(task):
         u = inputs.of(reference)
         controller.set_reference(reference.time_s, reference.x, reference.dx, u, reference.feet)
         follower = LatentMpc(controller)
+        follower.step_s = 1 / arguments.rate
     else:
         follower = Replay(reference, with_torques=True)
     # Of these references, torques in flight are known: they swing the legs.
@@ -302,7 +309,8 @@ def run(task):
 
 def made_controller(crate, settings):
     """The generated controller with settings that are not its own."""
-    module = romc_controller.load(crate)
+    kind = c_controller if crate.name.endswith("-c") else romc_controller
+    module = kind.load(crate)
     chosen = module.Library().default_settings()
     for setting, number in settings.items():
         setattr(chosen, setting, type(getattr(chosen, setting))(number))

@@ -223,7 +223,7 @@ impl Controller {
         py.detach(|| self.lock().reset());
     }
 
-    /// Runs along a recording; returns what the command line prints, as JSON and as text, and a dictionary of arrays.
+    /// Runs along a recording; returns the JSON and the text of `romc mpc`, and a dictionary of arrays.
     fn along<'py>(
         &self,
         py: Python<'py>,

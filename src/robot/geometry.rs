@@ -93,9 +93,7 @@ impl LegGeometry {
     }
 
     fn posture(&self, q: &[f64; 3]) -> Posture {
-        let mut posture = Posture::filled(0.0);
-        posture.bend(&self.shape, q);
-        posture
+        Posture::bent(&self.shape, q)
     }
 
     /// Foot position from the first joint, in the body's axes, m, at joint angles `q` in rad.

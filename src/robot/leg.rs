@@ -131,8 +131,21 @@ where
 }
 
 impl Posture {
+    /// A leg at the angles of its joints, rad.
+    pub(crate) fn bent(leg: &LegShape, q: &[Real]) -> Self {
+        let mut posture: Self = Self {
+            frame: [[0.0; 3]; 3],
+            foot: [0.0; 3],
+            by_first: [0.0; 3],
+            limb: [0.0; 2],
+            calf: [0.0; 2],
+        };
+        posture.bend(leg, q);
+        posture
+    }
+
     /// Turns a leg by the angles of its joints, rad.
-    pub(crate) fn bend(&mut self, leg: &LegShape, q: &[Real]) {
+    fn bend(&mut self, leg: &LegShape, q: &[Real]) {
         let calf = q[1] + leg.knee * q[2];
         let sine: [Real; 3] = [q[0].sin(), q[1].sin(), calf.sin()];
         let cosine: [Real; 3] = [q[0].cos(), q[1].cos(), calf.cos()];
@@ -211,14 +224,7 @@ pub(crate) fn write_force_map(
     map: &mut [[Real; 3]; 3],
     foot: &mut [Real; 3],
 ) -> bool {
-    let mut posture: Posture = Posture {
-        frame: [[0.0; 3]; 3],
-        foot: [0.0; 3],
-        by_first: [0.0; 3],
-        limb: [0.0; 2],
-        calf: [0.0; 2],
-    };
-    posture.bend(leg, q);
+    let posture = Posture::bent(leg, q);
     posture.write_in_body(&posture.foot, foot);
     let area = posture.area().abs();
     let lever = posture.lever().abs();
@@ -236,15 +242,8 @@ pub(crate) fn write_force_map(
 
 /// Height of a leg's foot at a state of the robot, m; `q` are the leg's angles.
 pub fn foot_height(leg: &LegShape, hip: &[Real], x: &[Real], q: &[Real]) -> Real {
-    let mut posture: Posture = Posture {
-        frame: [[0.0; 3]; 3],
-        foot: [0.0; 3],
-        by_first: [0.0; 3],
-        limb: [0.0; 2],
-        calf: [0.0; 2],
-    };
+    let posture = Posture::bent(leg, q);
     let mut foot: [Real; 3] = [0.0; 3];
-    posture.bend(leg, q);
     posture.write_in_body(&posture.foot, &mut foot);
     let aside = x[15].sin() * (hip[1] + foot[1]);
     let above = x[15].cos() * (hip[2] + foot[2]);

@@ -44,13 +44,17 @@
 
 #define ONLINE_LIFT_ITERATIONS 60
 
+/* How many steps are not too long between two measurements, whatever the bound says. */
+#define ONLINE_LONGEST_STEPS 1.5
+
 /* Time over which velocities are compared with positions, s. */
 #define ONLINE_MEMORY_S (real)0.05
 
 /* Error of pitch beyond which legs turn no further, rad. */
 #define ONLINE_MOST_TURN_RAD (real)0.3
 
-/* Share of the distances from the reference that the first measurement may be off, and others off what the last predicts. */
+/* The first measurement must be within this share of the distances from the reference. Every later one must be within it of a
+ * prediction: the last good measurement moved by its velocity, or by the mean of both velocities. */
 #define ONLINE_NEAR (real)0.5
 
 /* Phase of feet that select none. */
@@ -100,7 +104,7 @@
 #define ONLINE_WHOLE_STAGE 0.75
 
 /* What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
- * supervisor says what each is compared with. */
+ * Supervisor::watch says what each is compared with. */
 typedef struct {
     real tilt_rad;
     real joint_margin_rad;
@@ -313,6 +317,14 @@ static inline MAYBE_UNUSED void online_posture_bend(online_posture *restrict sel
     online_posture_turn(self, leg, sine, cosine);
 }
 
+/* A leg at the angles of its joints, rad. */
+static inline MAYBE_UNUSED online_posture online_posture_bent(const online_leg_shape *leg, const real *q)
+{
+    online_posture posture = {.frame = {{0}}, .foot = {0}, .by_first = {0}, .limb = {0}, .calf = {0}};
+    online_posture_bend(&posture, leg, q);
+    return posture;
+}
+
 /* Writes a vector of the frame in the body's axes. */
 static inline MAYBE_UNUSED void online_posture_write_in_body(online_posture *self, const real *vector,
         real out[restrict 3])
@@ -406,8 +418,7 @@ static inline MAYBE_UNUSED void online_posture_write_damped(online_posture *self
 static inline MAYBE_UNUSED bool online_write_force_map(const online_leg_shape *leg, const real *q, bool is_exact,
         real map[restrict 3][3], real foot[restrict 3])
 {
-    online_posture posture = {.frame = {{0}}, .foot = {0}, .by_first = {0}, .limb = {0}, .calf = {0}};
-    online_posture_bend(&posture, leg, q);
+    online_posture posture = online_posture_bent(leg, q);
     online_posture_write_in_body(&posture, posture.foot, foot);
     const real area = solver_magnitude(online_posture_area(&posture));
     const real lever = solver_magnitude(online_posture_lever(&posture));
@@ -504,9 +515,8 @@ static inline MAYBE_UNUSED int online_first_undefined(const real *values, int co
 static inline MAYBE_UNUSED real online_foot_height(const online_leg_shape *leg, const real *hip, const real *x,
         const real *q)
 {
-    online_posture posture = {.frame = {{0}}, .foot = {0}, .by_first = {0}, .limb = {0}, .calf = {0}};
+    online_posture posture = online_posture_bent(leg, q);
     real foot[3] = {0};
-    online_posture_bend(&posture, leg, q);
     online_posture_write_in_body(&posture, posture.foot, foot);
     const real aside = SIN(x[15]) * (hip[1] + foot[1]);
     const real above = COS(x[15]) * (hip[2] + foot[2]);
@@ -1353,7 +1363,7 @@ static inline MAYBE_UNUSED online_fault online_supervisor_clock_fault(online_sup
     if (is_first || bounds->clock_gap_s > 1e9) {
         return ONLINE_NONE;
     }
-    if (passed_s > bounds->clock_gap_s) {
+    if (passed_s > bounds->clock_gap_s && passed_s > ONLINE_LONGEST_STEPS * self->step_s) {
         return ONLINE_CLOCK_LEAPS;
     }
     if (passed_s < -ONLINE_CLOCK_JITTER_S) {
@@ -1407,6 +1417,36 @@ static inline MAYBE_UNUSED real online_distance(const real *place, const real *o
     return SQRT(x * x + y * y + z * z);
 }
 
+/* Whether a state leaps from its prediction, a time after the last good measurement. */
+static inline MAYBE_UNUSED online_fault online_supervisor_leap(online_supervisor *self, const online_bounds *bounds,
+        double passed_s, const real *x, const real *dx)
+{
+    if (passed_s > bounds->clock_gap_s) {
+        return ONLINE_NONE;
+    }
+    const real passed = (real)passed_s;
+    real by_last[3] = {0};
+    real by_mean[3] = {0};
+    for (int i = 0; i < 3; ++i) {
+        const real mean = (real)0.5 * (self->good_dx[12 + i] + dx[12 + i]);
+        by_last[i] = self->good_x[12 + i] + passed * self->good_dx[12 + i];
+        by_mean[i] = self->good_x[12 + i] + passed * mean;
+    }
+    const real off = online_smaller(online_distance(x + 12, by_last), online_distance(x + 12, by_mean));
+    if (off > ONLINE_NEAR * bounds->distance_m) {
+        return ONLINE_BODY_LEAP;
+    }
+    for (int i = 0; i < 12; ++i) {
+        const real moved = x[i] - self->good_x[i];
+        const real from_last = solver_magnitude(moved - passed * self->good_dx[i]);
+        const real from_mean = solver_magnitude(moved - (real)0.5 * passed * (self->good_dx[i] + dx[i]));
+        if (online_smaller(from_last, from_mean) > ONLINE_NEAR * bounds->posture_rad) {
+            return ONLINE_JOINTS_LEAP;
+        }
+    }
+    return ONLINE_NONE;
+}
+
 /* The first bound that a state is beyond. */
 static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_supervisor *self,
         const online_bounds *bounds, double time_s, const real *x, const real *dx, const real *nominal,
@@ -1442,25 +1482,7 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
     if (!self->has_good && !is_near) {
         return ONLINE_NOT_AT_START;
     }
-    const double passed_s = time_s - self->good_s;
-    if (!self->has_good || passed_s > bounds->clock_gap_s) {
-        return ONLINE_NONE;
-    }
-    const real passed = (real)passed_s;
-    real body[3] = {0};
-    for (int i = 0; i < 3; ++i) {
-        body[i] = self->good_x[12 + i] + passed * self->good_dx[12 + i];
-    }
-    if (online_distance(x + 12, body) > ONLINE_NEAR * bounds->distance_m) {
-        return ONLINE_BODY_LEAP;
-    }
-    for (int i = 0; i < 12; ++i) {
-        const real predicted = self->good_x[i] + passed * self->good_dx[i];
-        if (solver_magnitude(x[i] - predicted) > ONLINE_NEAR * bounds->posture_rad) {
-            return ONLINE_JOINTS_LEAP;
-        }
-    }
-    return ONLINE_NONE;
+    return self->has_good ? online_supervisor_leap(self, bounds, time_s - self->good_s, x, dx) : ONLINE_NONE;
 }
 
 /* Whether the body's velocity contradicts its positions since the last good measurement. */

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use romc::mpc::{
-    AfterEnd, Command, Controller, Drives, Measurement, MpcSettings, ReferenceSamples, Source,
-    Status,
+    AfterEnd, Bounds, Command, Controller, Drives, Measurement, MpcSettings, ReferenceSamples,
+    Source, Status,
 };
 use romc::recording::Segment;
 use romc::robot::ContactFlags;
@@ -25,6 +25,11 @@ fn following(segment: &Segment, settings: MpcSettings) -> Controller {
     let path = root().join("models/go1-d7.json");
     let model = romc::artifact::read(&path).expect("a sound model");
     let mut controller = romc::mpc::controller(&model, settings).expect("a complete model");
+    follow(&mut controller, segment);
+    controller
+}
+
+fn follow(controller: &mut Controller, segment: &Segment) {
     let input = segment
         .input(controller.plant().input_rule())
         .expect("inputs");
@@ -36,7 +41,7 @@ fn following(segment: &Segment, settings: MpcSettings) -> Controller {
         feet: &segment.feet,
     };
     controller.set_reference(samples).expect("sound");
-    controller
+    controller.reset();
 }
 
 /// A measurement that a fault may change: time, state, velocity, feet.
@@ -209,6 +214,61 @@ fn each_fault_ends_in_its_status_and_in_damping_until_a_reset() {
             assert!(stepped(&mut controller, &again).status.has_plan(), "{name}");
         }
     }
+}
+
+/// Right recordings are far from every bound: none is a fault or refused at 60 % of the bounds, and at other rates of control.
+#[test]
+fn no_right_recording_is_a_fault() {
+    let usual = MpcSettings::default().bounds;
+    let tight = Bounds {
+        tilt_rad: 0.6 * usual.tilt_rad,
+        joint_velocity: 0.6 * usual.joint_velocity,
+        distance_m: 0.6 * usual.distance_m,
+        posture_rad: 0.6 * usual.posture_rad,
+        clock_gap_s: 0.6 * usual.clock_gap_s,
+        velocity_mismatch: 0.6 * usual.velocity_mismatch,
+        ..usual
+    };
+    let sets = [
+        ("go1-d7", "examples/recordings/go1"),
+        ("go1-d7", "examples/recordings/go1-noisy"),
+        ("go1-d7", "examples/recordings/go1-other"),
+        ("go2-async-d4", "examples/recordings/go2-asynchronous"),
+    ];
+    let mut steps = 0;
+    for (model, folder) in sets {
+        let path = root().join("models").join(format!("{model}.json"));
+        let model = romc::artifact::read(&path).expect("a sound model");
+        for (bounds, step_s) in [(tight, 0.01), (usual, 0.002), (usual, 0.05)] {
+            let settings = MpcSettings {
+                solver: romc::mpc::Solver::Riccati,
+                step_s,
+                bounds,
+                ..Default::default()
+            };
+            let mut controller = romc::mpc::controller(&model, settings).expect("complete");
+            for entry in std::fs::read_dir(root().join(folder)).expect("a folder") {
+                let path = entry.expect("a file").path();
+                if path.extension().is_none_or(|ending| ending != "gz") {
+                    continue;
+                }
+                let recording = romc::recording::read(&path).expect("a sound recording");
+                for segment in &recording.segments {
+                    follow(&mut controller, segment);
+                    let stride = (step_s / segment.mean_step_s()).round().max(1.0) as usize;
+                    for sample in (0..segment.len()).step_by(stride) {
+                        let status = stepped(&mut controller, &measured(segment, sample)).status;
+                        assert!(
+                            status.code() < Status::MeasurementJump.code(),
+                            "{path:?} {sample}: {status:?}"
+                        );
+                        steps += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(steps > 30_000, "{steps}");
 }
 
 #[test]

@@ -17,7 +17,7 @@ from romc.recording import PathLike, Recording, Segment, natives, read
 
 
 STATUSES: Dict[str, str] = dict(_romc.statuses())
-"""Every status of a step, with what it means."""
+"""Words of all statuses of a step, with their meanings."""
 
 
 @dataclass(frozen=True)

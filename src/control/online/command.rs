@@ -99,7 +99,7 @@ impl Status {
     }
 
     /// The status of a fault.
-    fn of(fault: Fault) -> Option<Self> {
+    pub(super) fn of(fault: Fault) -> Option<Self> {
         let code = Self::Tilt.code() - 1 + fault as i32;
         (Self::ALL.iter().copied()).find(|status| fault != Fault::None && status.code() == code)
     }
@@ -374,6 +374,10 @@ impl Controller {
             &mut command.torque_nm,
             &mut command.joint_position_rad,
         );
+        if share == 0.0 {
+            // Measurements without joints find the last ones here.
+            memory.keep_posture(&joints, &lower, &upper);
+        }
         command.drives.stiffness_nm_rad *= share;
         command.drives.damping_nm_s_rad *= share;
         command.losses_nm = [0.0; JOINT_DIM];

@@ -50,7 +50,8 @@ pub use plan::Plan;
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, sparse};
 pub use reference::{Reference, ReferenceSamples};
 pub use settings::{
-    AfterEnd, Bounds, Drift, Drives, FallbackSettings, Lift, Linearisation, MissingInput,
-    MpcSettings, RowSelection, Solver,
+    AfterEnd, Drift, Drives, FallbackSettings, Lift, Linearisation, MissingInput, MpcSettings,
+    RowSelection, Solver,
 };
+pub use supervisor::Bounds;
 pub use trajectory::NO_PHASE;

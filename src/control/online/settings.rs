@@ -3,6 +3,7 @@
 
 use super::error::ControlError;
 use super::qp::QpSettings;
+use super::supervisor::Bounds;
 use crate::robot::{Leg, Robot};
 
 /// How a latent input becomes joint torques, each way with its number for interfaces without enumerations.
@@ -130,58 +131,6 @@ impl Drives {
     }
 }
 
-/// What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
-/// `supervisor` says what each is compared with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs, reason = "the table of settings describes them")]
-pub struct Bounds {
-    pub tilt_rad: Real,
-    pub joint_margin_rad: Real,
-    pub joint_velocity: Real,
-    pub distance_m: Real,
-    pub posture_rad: Real,
-    pub clock_gap_s: f64,
-    pub frozen_steps: usize,
-    pub velocity_mismatch: Real,
-    pub contact_mismatch_steps: usize,
-    pub poor_steps: usize,
-    pub fade_s: f64,
-    pub damping_nm_s_rad: Real,
-    pub damping_torque_nm: Real,
-}
-
-impl Bounds {
-    /// Nothing is watched.
-    pub const OFF: Self = Self {
-        tilt_rad: f64::INFINITY,
-        joint_margin_rad: f64::INFINITY,
-        joint_velocity: f64::INFINITY,
-        distance_m: f64::INFINITY,
-        posture_rad: f64::INFINITY,
-        clock_gap_s: f64::INFINITY,
-        frozen_steps: 0,
-        velocity_mismatch: f64::INFINITY,
-        contact_mismatch_steps: 0,
-        poor_steps: 0,
-        ..Self::USUAL
-    };
-    const USUAL: Self = Self {
-        tilt_rad: 0.5,
-        joint_margin_rad: 0.1,
-        joint_velocity: 1.5,
-        distance_m: 0.3,
-        posture_rad: 0.8,
-        clock_gap_s: 0.1,
-        frozen_steps: 8,
-        velocity_mismatch: 0.3,
-        contact_mismatch_steps: 5,
-        poor_steps: 10,
-        fade_s: 0.1,
-        damping_nm_s_rad: 1.0,
-        damping_torque_nm: 10.0,
-    };
-}
-
 /// Longest horizon that is accepted.
 pub(crate) const MAX_HORIZON: usize = 500;
 
@@ -248,8 +197,23 @@ pub struct Setting {
     pub text: &'static str,
     /// Description in the header of the generated C; empty if the setting is not in it.
     pub in_c: &'static str,
-    /// Description as a parameter of the ros2_control plugin; `None` if it is not one.
+    /// Description as a parameter of the ros2_control plugin, if it differs; `None` if there is none.
     pub in_ros: Option<&'static str>,
+}
+
+impl Setting {
+    /// Description as a parameter of the ros2_control plugin; none if it is not one.
+    pub fn of_ros(&self) -> Option<String> {
+        let off = match self.accepts {
+            Accepts::Bound => "; .inf is off",
+            Accepts::Count => "; 0 is off",
+            _ => "",
+        };
+        let own = (self.field == "bounds")
+            .then_some(self.text)
+            .or(self.in_ros)?;
+        Some(own.to_owned() + off)
+    }
 }
 
 type Real = f64;
@@ -292,23 +256,28 @@ in_c! {
         [number] => Self { max_iterations: number as u32, ..Self::default() };
     AfterEnd, 1: (value, _none) [f64::from(value as u8)],
         [number] => [Self::Hold, Self::Damp, Self::Stop][number as usize];
-    Drives, 2: (value, _none) [value.stiffness_nm_rad, value.damping_nm_s_rad],
-        [stiffness_nm_rad, damping_nm_s_rad] => Self { stiffness_nm_rad, damping_nm_s_rad };
-    Bounds, 13:
-        (value, _none) [
-            value.tilt_rad, value.joint_margin_rad, value.joint_velocity, value.distance_m, value.posture_rad,
-            value.clock_gap_s, value.frozen_steps as f64, value.velocity_mismatch,
-            value.contact_mismatch_steps as f64, value.poor_steps as f64, value.fade_s, value.damping_nm_s_rad,
-            value.damping_torque_nm,
-        ],
-        [
-            tilt_rad, joint_margin_rad, joint_velocity, distance_m, posture_rad, clock_gap_s, frozen,
-            velocity_mismatch, contacts, poor, fade_s, damping_nm_s_rad, damping_torque_nm,
-        ] => Self {
-            tilt_rad, joint_margin_rad, joint_velocity, distance_m, posture_rad, clock_gap_s,
-            frozen_steps: frozen as usize, velocity_mismatch, contact_mismatch_steps: contacts as usize,
-            poor_steps: poor as usize, fade_s, damping_nm_s_rad, damping_torque_nm,
-        };
+}
+
+/// The same of structs, by the numbers of their fields.
+macro_rules! fields_in_c {
+    ($($type:ident, $n:literal: $($field:ident)*;)*) => {$(
+        impl InC<$n> for $type {
+            fn numbers(self, none: f64) -> [f64; $n] {
+                let [$($field),*] = [$(InC::<1>::numbers(self.$field, none)),*];
+                [$($field[0]),*]
+            }
+
+            fn of([$($field),*]: [f64; $n]) -> Self {
+                Self { $($field: InC::<1>::of([$field])),* }
+            }
+        }
+    )*};
+}
+
+fields_in_c! {
+    Drives, 2: stiffness_nm_rad damping_nm_s_rad;
+    Bounds, 13: tilt_rad joint_margin_rad joint_velocity distance_m posture_rad clock_gap_s frozen_steps
+        velocity_mismatch contact_mismatch_steps poor_steps fade_s damping_nm_s_rad damping_torque_nm;
 }
 
 /// Makes the structures of Rust and C and [`SETTINGS`] of a table. Rows of `c` are fields of [`MpcSettings`], each with
@@ -481,34 +450,22 @@ settings! {
         after_end: AfterEnd = AfterEnd::Hold => after_end: i32, Accepts::Whole(0, 2, "0 (hold), 1 (damp) or 2 (stop)"),
             "after the reference: UPPER_HOLD (default), _DAMP or _STOP", in_c "after the reference: UPPER_HOLD, _DAMP or _STOP";
         /// Chosen so that no right recording, plan or simulated jump of the repository comes near; see `docs/control.md`.
-        bounds: Bounds = Bounds::USUAL => tilt_rad: Real, Accepts::Bound,
-            "most angle between the verticals of body and reference",
-            in_ros "most angle between the verticals of body and reference, rad; .inf is off"
-            | joint_margin_rad: Real, Accepts::Bound, "how far joints may be outside their limits",
-            in_ros "how far joints may be outside their limits, rad; .inf is off"
-            | joint_velocity: Real, Accepts::Bound, "most joint velocity, in largest speeds of the joint",
-            in_ros "most joint velocity, in largest speeds of the joint; .inf is off"
+        bounds: Bounds = Bounds::USUAL =>
+            tilt_rad: Real, Accepts::Bound, "most angle between the verticals of body and reference, rad"
+            | joint_margin_rad: Real, Accepts::Bound, "how far joints may be outside their limits, rad"
+            | joint_velocity: Real, Accepts::Bound, "most joint velocity, in largest speeds of the joint"
             | distance_m: Real, Accepts::Bound,
-            "most distance of the body from the reference; half of it at the start and from where the last measurement leads",
-            in_ros "most distance of the body from the reference, m; .inf is off"
+            "most distance of the body from the reference, m; half of it at the start and from its prediction"
             | posture_rad: Real, Accepts::Bound,
-            "most distance of a joint from the reference; half of it at the start and from where the last measurement leads",
-            in_ros "most distance of a joint from the reference, rad; .inf is off"
-            | clock_gap_s: f64, Accepts::Bound, "most time between steps, s; infinite: clocks may stand and go back, too",
-            in_ros "most time between steps, s; .inf is off"
-            | frozen_steps: i32, Accepts::Count, "steps in which a clock may stand or a moving measurement stay the same",
-            in_ros "steps in which a measurement may stay the same; 0 is off"
-            | velocity_mismatch: Real, Accepts::Bound, "most velocity of the body that its positions do not show, m/s",
-            in_ros "most velocity of the body that its positions do not show, m/s; .inf is off"
-            | contact_mismatch_steps: i32, Accepts::Count, "steps with contacts that heights of feet or the fall contradict",
-            in_ros "steps with contacts that heights of feet or the fall contradict; 0 is off"
-            | poor_steps: i32, Accepts::Count, "steps in a row without a plan or with unknown contacts",
-            in_ros "steps in a row without a plan or with unknown contacts; 0 is off"
-            | fade_s: f64, Accepts::Positive, "time in which torques fade into damping, s",
-            in_ros "time in which torques fade into damping, s"
-            | damping_nm_s_rad: Real, Accepts::NotNegative, "damping of the joints then",
-            in_ros "damping of the joints then, N m s/rad"
-            | damping_torque_nm: Real, Accepts::Positive, "most torque of it", in_ros "most torque of it, N m";
+            "most distance of a joint from the reference, rad; half of it at the start and from its prediction"
+            | clock_gap_s: f64, Accepts::Bound, "most time between steps, s; infinite: clocks may stand and go back, too"
+            | frozen_steps: i32, Accepts::Count, "steps in which a clock may stand or a moving measurement stay the same"
+            | velocity_mismatch: Real, Accepts::Bound, "most velocity of the body that its positions do not show, m/s"
+            | contact_mismatch_steps: i32, Accepts::Count, "steps with contacts that heights of feet or the fall contradict"
+            | poor_steps: i32, Accepts::Count, "steps in a row without a plan or with unknown contacts"
+            | fade_s: f64, Accepts::Positive, "time in which torques fade into damping after a fault, s"
+            | damping_nm_s_rad: Real, Accepts::NotNegative, "damping of the joints then, N m s/rad"
+            | damping_torque_nm: Real, Accepts::Positive, "most torque of it, N m";
     }
     rust {
         /// What stands for the reference's own dynamics.

@@ -3,12 +3,13 @@
 use nalgebra::SVector;
 
 use super::command::{Command, Source, Status};
-use super::control_model::violation;
+use super::control_model::{ControlModel, violation};
 use super::controller::{Controller, Measurement, SOFTENED_FROM, foot_height};
 use super::lift::StanceState;
+use super::reference::Reference;
 use super::settings::AfterEnd;
 use super::stage::unscale;
-use super::supervisor::Fault;
+use super::supervisor::{Bounds, Fault, Supervisor};
 use super::trajectory::{NO_PHASE, Trajectory};
 use crate::robot::{JOINT_DIM, Leg, STATE_DIM};
 use crate::solver::Outcome;
@@ -26,8 +27,8 @@ impl Controller {
         if !self.memory.accepts(time_s, x, dx) {
             return Err(Status::NotFinite);
         }
-        if self.supervisor.fault != Fault::None {
-            return Err(Status::NoReference);
+        if let Some(status) = Status::of(self.supervisor.fault) {
+            return Err(status);
         }
         let Some(reference) = &self.reference else {
             // Nothing to follow yet: the robot stays as it is.
@@ -40,24 +41,12 @@ impl Controller {
         if self.settings.after_end != AfterEnd::Hold && reference.is_over(time_s) {
             return Err(Status::Ended);
         }
-        let nominal = reference.robot_state_at(time_s);
-        let robot = self.plant.robot();
-        let heights = Leg::ALL.map(|leg| foot_height(robot, leg, x));
-        let [lower, upper] = self.plant.joint_limits();
-        let (bounds, feet) = (&self.settings.bounds, &measurement.feet);
-        let fault = self.supervisor.watch(
-            bounds,
-            time_s,
-            x,
-            dx,
-            &nominal,
-            &heights,
-            feet,
-            &lower,
-            &upper,
-            &robot.joint_speed_limit_rad_s,
-        );
-        if fault != Fault::None || self.supervisor.is_doubted {
+        if !watched(
+            &mut self.supervisor,
+            &self.plant,
+            &self.settings.bounds,
+            (reference, measurement),
+        ) {
             // The measured velocities must not become torques.
             self.memory.joint_velocity = [0.0; JOINT_DIM];
             return Err(Status::MeasurementJump);
@@ -199,4 +188,35 @@ impl Controller {
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
     }
+}
+
+/// Whether the supervisor lets a measurement pass.
+fn watched(
+    supervisor: &mut Supervisor,
+    plant: &ControlModel,
+    bounds: &Bounds,
+    (reference, measurement): (&Reference, &Measurement<'_>),
+) -> bool {
+    let &Measurement {
+        time_s,
+        x,
+        dx,
+        ref feet,
+    } = measurement;
+    let robot = plant.robot();
+    let heights = Leg::ALL.map(|leg| foot_height(robot, leg, x));
+    let [lower, upper] = plant.joint_limits();
+    let fault = supervisor.watch(
+        bounds,
+        time_s,
+        x,
+        dx,
+        &reference.robot_state_at(time_s),
+        &heights,
+        feet,
+        &lower,
+        &upper,
+        &robot.joint_speed_limit_rad_s,
+    );
+    fault == Fault::None && !supervisor.is_doubted
 }

@@ -7,8 +7,7 @@
 //! good plan are counted. Read [`Supervisor::watch`] first.
 
 use super::control_model::{clamped_joint, clamped_torque};
-use super::dense::{Real, greater};
-use super::settings::Bounds;
+use super::dense::{Real, greater, smaller};
 use crate::robot::GRAVITY_M_S2;
 
 /// How long measurements are refused before they are a fault, s.
@@ -17,10 +16,13 @@ const PATIENCE_S: f64 = 0.019;
 const HALF_TURN: Real = 3.1;
 /// Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down.
 const UPSIDE_DOWN: Real = 0.5;
-/// Share of the distances from the reference that the first measurement may be off, and others off what the last predicts.
+/// The first measurement must be within this share of the distances from the reference. Every later one must be within it of a
+/// prediction: the last good measurement moved by its velocity, or by the mean of both velocities.
 const NEAR: Real = 0.5;
 /// How far a clock may go back, s: measurements may be exchanged.
 const CLOCK_JITTER_S: f64 = 0.005;
+/// How many steps are not too long between two measurements, whatever the bound says.
+const LONGEST_STEPS: f64 = 1.5;
 /// Time over which velocities are compared with positions, s.
 const MEMORY_S: Real = 0.05;
 /// Height above the floor at which a foot is not on it, m.
@@ -30,6 +32,59 @@ const FALL_S: f64 = 0.03;
 const FALL_SHARE: Real = 0.5;
 /// How far a reference moves, rad or m, while a measurement that stays the same is not believed.
 const REFERENCE_MOVES: Real = 0.01;
+
+/// What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
+/// [`Supervisor::watch`] says what each is compared with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs, reason = "the table of settings describes them")]
+pub struct Bounds {
+    pub tilt_rad: Real,
+    pub joint_margin_rad: Real,
+    pub joint_velocity: Real,
+    pub distance_m: Real,
+    pub posture_rad: Real,
+    pub clock_gap_s: f64,
+    pub frozen_steps: usize,
+    pub velocity_mismatch: Real,
+    pub contact_mismatch_steps: usize,
+    pub poor_steps: usize,
+    pub fade_s: f64,
+    pub damping_nm_s_rad: Real,
+    pub damping_torque_nm: Real,
+}
+
+impl Bounds {
+    /// Nothing is watched.
+    pub const OFF: Self = Self {
+        tilt_rad: f64::INFINITY,
+        joint_margin_rad: f64::INFINITY,
+        joint_velocity: f64::INFINITY,
+        distance_m: f64::INFINITY,
+        posture_rad: f64::INFINITY,
+        clock_gap_s: f64::INFINITY,
+        frozen_steps: 0,
+        velocity_mismatch: f64::INFINITY,
+        contact_mismatch_steps: 0,
+        poor_steps: 0,
+        ..Self::USUAL
+    };
+    /// What no right recording, plan or simulated jump of the repository comes near; see `docs/control.md`.
+    pub(super) const USUAL: Self = Self {
+        tilt_rad: 0.5,
+        joint_margin_rad: 0.1,
+        joint_velocity: 1.5,
+        distance_m: 0.3,
+        posture_rad: 0.8,
+        clock_gap_s: 0.1,
+        frozen_steps: 8,
+        velocity_mismatch: 0.3,
+        contact_mismatch_steps: 5,
+        poor_steps: 10,
+        fade_s: 0.1,
+        damping_nm_s_rad: 1.0,
+        damping_torque_nm: 10.0,
+    };
+}
 
 /// What is wrong. Each has a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -205,7 +260,7 @@ impl Supervisor {
         if is_first || bounds.clock_gap_s > 1e9 {
             return Fault::None;
         }
-        if passed_s > bounds.clock_gap_s {
+        if passed_s > bounds.clock_gap_s && passed_s > LONGEST_STEPS * self.step_s {
             return Fault::ClockLeaps;
         }
         if passed_s < -CLOCK_JITTER_S {
@@ -280,21 +335,35 @@ impl Supervisor {
         if !self.has_good && !is_near {
             return Fault::NotAtStart;
         }
-        let passed_s = time_s - self.good_s;
-        if !self.has_good || passed_s > bounds.clock_gap_s {
+        if self.has_good {
+            self.leap(bounds, time_s - self.good_s, x, dx)
+        } else {
+            Fault::None
+        }
+    }
+
+    /// Whether a state leaps from its prediction, a time after the last good measurement.
+    fn leap(&self, bounds: &Bounds, passed_s: f64, x: &[Real], dx: &[Real]) -> Fault {
+        if passed_s > bounds.clock_gap_s {
             return Fault::None;
         }
         let passed = passed_s as Real;
-        let mut body: [Real; 3] = [0.0; 3];
+        let mut by_last: [Real; 3] = [0.0; 3];
+        let mut by_mean: [Real; 3] = [0.0; 3];
         for i in 0..3 {
-            body[i] = self.good_x[12 + i] + passed * self.good_dx[12 + i];
+            let mean = 0.5 * (self.good_dx[12 + i] + dx[12 + i]);
+            by_last[i] = self.good_x[12 + i] + passed * self.good_dx[12 + i];
+            by_mean[i] = self.good_x[12 + i] + passed * mean;
         }
-        if distance(&x[12..], &body) > NEAR * bounds.distance_m {
+        let off = smaller(distance(&x[12..], &by_last), distance(&x[12..], &by_mean));
+        if off > NEAR * bounds.distance_m {
             return Fault::BodyLeap;
         }
         for i in 0..12 {
-            let predicted = self.good_x[i] + passed * self.good_dx[i];
-            if (x[i] - predicted).abs() > NEAR * bounds.posture_rad {
+            let moved = x[i] - self.good_x[i];
+            let from_last = (moved - passed * self.good_dx[i]).abs();
+            let from_mean = (moved - 0.5 * passed * (self.good_dx[i] + dx[i])).abs();
+            if smaller(from_last, from_mean) > NEAR * bounds.posture_rad {
                 return Fault::JointsLeap;
             }
         }

@@ -6,6 +6,7 @@ mod control_model;
 mod lock;
 
 use super::*;
+use crate::mpc::Drives;
 use control_model::{ControlModelText, SettingText};
 
 /// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
@@ -38,8 +39,12 @@ impl<'a> Facts<'a> {
         plant: &'a ControlModel,
         plan: Option<&PlannedJump>,
     ) -> Self {
-        let settings = plan.map_or_else(Default::default, |plan| Settings::from(&plan.settings));
         let (name, robot) = (entries.identifier.as_str(), plant.robot());
+        let usual = MpcSettings {
+            drives: Drives::of(robot),
+            ..MpcSettings::default()
+        };
+        let settings = Settings::from(plan.map_or(&usual, |plan| &plan.settings));
         let texts = all_codes().map(|(code, text)| (code, text.to_string_lossy().into_owned()));
         let texts: Vec<(i32, String)> = texts.collect();
         Self {

@@ -100,6 +100,7 @@ pub fn along_recording(
             continue;
         }
         set_reference(controller, segment, reference_input)?;
+        controller.reset(); // a fault along one segment does not end the next
         for &sample in schedule {
             let started = Instant::now();
             controller.prepare(segment.time_s[sample]);

@@ -357,8 +357,7 @@ fn flight_accelerations(training: &Dataset, jump: &Jump, all: &mut Vec<DVector<f
 /// Rows of the legs as columns, forwards and upwards of the front pair, then of the rear pair; none if a pair has fewer
 /// than [`LEAST_STANDING`] samples of stance. While a pair stands, `x + arm pitch + w^T q` over its flexions and knees
 /// `q` is constant, and so is the same sum with `z`. Ridge regression of the deviations from the mean of each stance
-/// gives `arm` and `w`. A row is this sum less the momentum rows, and with weights of the abductions by
-/// [`add_abductions`].
+/// gives `arm` and `w`. A row is this sum less the momentum rows, with weights of the abductions.
 fn leg_rows(
     training: &Dataset,
     momentum: &DMatrix<f64>,
