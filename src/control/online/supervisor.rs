@@ -34,7 +34,7 @@ const FALL_SHARE: Real = 0.5;
 const REFERENCE_MOVES: Real = 0.01;
 
 /// What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
-/// [`Supervisor::watch`] says what each is compared with.
+/// `docs/control.md`, "The supervisor", says what each is compared with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs, reason = "the table of settings describes them")]
 pub struct Bounds {
