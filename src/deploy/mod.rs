@@ -63,7 +63,7 @@ use crate::files::EmittedFile;
 use crate::lower::{Form, LowerError};
 use crate::model::ReducedModel;
 use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings, all_codes};
-use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings};
+use crate::mpc::{ControlModel, ControlPhase, MpcError, MpcSettings, Timing};
 use crate::recording::{self, ControllerLog, RecordingError};
 use crate::robot::{
     ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, Leg, Robot, RobotError, STATE_DIM, WrenchFrame,

@@ -39,6 +39,9 @@
 /* Largest weight of a step, in first steps. */
 #define ONLINE_LARGEST_WEIGHT (real)2.0
 
+/* How long the joints may need, in times that they should, before they are not at the start. */
+#define ONLINE_LATEST 2.0
+
 /* Smallest and largest estimate. */
 #define ONLINE_LEAST (real)0.7
 
@@ -81,12 +84,18 @@
  * needs two iterations more if it has to bring them to 100. */
 #define ONLINE_SLACK_PRICE (real)10.0
 
+/* Angle over which the height of a foot is differentiated, rad. */
+#define ONLINE_SMALL_TURN (real)1e-3
+
 /* Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the rows that were
  * left out may hide. */
 #define ONLINE_SOFTENED_FROM (real)(1.05 * 0.02)
 
 /* Distance from the reference, in its standard deviations, within which joint limits matter. */
 #define ONLINE_STATE_REACH (real)4.0
+
+/* Speed of the body below which it stands still, m/s. */
+#define ONLINE_STILL_M_S (real)0.1
 
 /* Share of a joint's half range within which a trajectory stands still. */
 #define ONLINE_STILL_SHARE (real)0.02
@@ -104,7 +113,7 @@
 #define ONLINE_WHOLE_STAGE 0.75
 
 /* What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
- * Supervisor::watch says what each is compared with. */
+ * docs/control.md, "The supervisor", says what each is compared with. */
 typedef struct {
     real tilt_rad;
     real joint_margin_rad;
@@ -940,6 +949,22 @@ static inline MAYBE_UNUSED void online_write_still(const real *decoder, const re
     }
 }
 
+/* Writes the torques with which a leg, at a state of the robot, presses on the ground with a vertical force, N m: the
+ * force times minus the gradient of the foot's height. */
+static inline MAYBE_UNUSED void online_write_support(const online_leg_shape *leg, const real *hip, const real *x,
+        const real *q, real force, real *restrict torque)
+{
+    real turned[3] = {q[0], q[1], q[2]};
+    for (int i = 0; i < 3; ++i) {
+        turned[i] = q[i] + ONLINE_SMALL_TURN;
+        const real above = online_foot_height(leg, hip, x, turned);
+        turned[i] = q[i] - ONLINE_SMALL_TURN;
+        const real below = online_foot_height(leg, hip, x, turned);
+        turned[i] = q[i];
+        torque[i] = -force * (above - below) / (2 * ONLINE_SMALL_TURN);
+    }
+}
+
 /* Writes m + C y. */
 static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real *deviation, const real *y,
         real *restrict torque)
@@ -1229,6 +1254,119 @@ static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self,
 static inline MAYBE_UNUSED double online_plan_time_stage_s(online_plan_time *self, int stage)
 {
     return self->start_s + (double)stage * self->step_s;
+}
+
+/* The mode after a measurement of a robot that follows the reference, which may be over. */
+static inline MAYBE_UNUSED online_mode online_routine_after_jump(online_routine *restrict self,
+        const online_timing *timing, double time_s, bool is_over, const real *dx, bool *is_down)
+{
+    int down = 0;
+    for (int foot = 0; foot < 4; ++foot) {
+        if (is_down[foot]) {
+            down += 1;
+        }
+    }
+    self->has_flown = self->has_flown || down == 0;
+    const bool has_landed = is_over || (self->has_flown && down > 0);
+    if (self->mode == ONLINE_JUMP && has_landed) {
+        self->mode = ONLINE_LAND;
+    }
+    const real by_x_y = online_greater(solver_magnitude(dx[12]), solver_magnitude(dx[13]));
+    const real speed = online_greater(by_x_y, solver_magnitude(dx[14]));
+    const bool is_still = self->mode == ONLINE_LAND && is_over && down == 4 && speed < ONLINE_STILL_M_S;
+    if (is_still && !self->is_still) {
+        self->still_s = time_s;
+    }
+    self->is_still = is_still;
+    return is_still && time_s - self->still_s >= timing->settle_s ? ONLINE_RECOVER : self->mode;
+}
+
+/* The mode after a measurement of joints that move to the stand: Mode::Ready when they are there,
+ * Mode::Damp if they do not arrive. */
+static inline MAYBE_UNUSED online_mode online_routine_after_standing(online_routine *self,
+        const online_bounds *bounds, const online_timing *timing, double time_s, const real *joints, bool *is_down)
+{
+    bool is_there = true;
+    for (int i = 0; i < 12; ++i) {
+        const real off = solver_magnitude(joints[i] - self->stand[i]);
+        is_there = is_there && off <= ONLINE_NEAR * bounds->posture_rad;
+    }
+    for (int foot = 0; foot < 4; ++foot) {
+        is_there = is_there && is_down[foot];
+    }
+    const double passed_s = time_s - self->since_s;
+    if (self->mode == ONLINE_READY || passed_s < timing->stand_s) {
+        return self->mode;
+    }
+    if (is_there) {
+        return ONLINE_READY;
+    }
+    return passed_s > ONLINE_LATEST * timing->stand_s ? ONLINE_DAMP : self->mode;
+}
+
+/* Begins a mode at a time, from a posture. */
+static inline MAYBE_UNUSED void online_routine_enter(online_routine *restrict self, online_mode mode, double time_s,
+        const real *joints)
+{
+    self->mode = mode;
+    self->is_asked = false;
+    self->since_s = time_s;
+    self->is_still = false;
+    for (int i = 0; i < 12; ++i) {
+        self->from[i] = joints[i];
+    }
+}
+
+/* Begins a jump: the reference starts now, where the robot stands and looks. */
+static inline MAYBE_UNUSED void online_routine_leap(online_routine *restrict self, double time_s, double start_s,
+        const real *x, const real *start)
+{
+    online_routine_enter(self, ONLINE_JUMP, time_s, x);
+    self->has_flown = false;
+    self->offset_s = time_s - start_s;
+    self->yaw = start[17] - x[17];
+    self->cosine = COS(self->yaw);
+    self->sine = SIN(self->yaw);
+    for (int i = 0; i < 2; ++i) {
+        self->place[i] = x[12 + i];
+        self->start[i] = start[12 + i];
+    }
+}
+
+/* Writes a state and its velocity in the frame of the reference. */
+static inline MAYBE_UNUSED void online_routine_write_in_frame(online_routine *self, const real *x, const real *dx,
+        real *restrict framed_x, real *restrict framed_dx)
+{
+    for (int i = 0; i < 18; ++i) {
+        framed_x[i] = x[i];
+        framed_dx[i] = dx[i];
+    }
+    const real along = x[12] - self->place[0];
+    const real aside = x[13] - self->place[1];
+    framed_x[12] = self->start[0] + self->cosine * along - self->sine * aside;
+    framed_x[13] = self->start[1] + self->sine * along + self->cosine * aside;
+    framed_x[17] = x[17] + self->yaw;
+    framed_dx[12] = self->cosine * dx[12] - self->sine * dx[13];
+    framed_dx[13] = self->sine * dx[12] + self->cosine * dx[13];
+}
+
+/* Writes where the joints should be at a time, rad, and how fast they should move, rad/s; the share of the weight
+ * that they carry. */
+static inline MAYBE_UNUSED real online_routine_write_posture(online_routine *self, const online_timing *timing,
+        double time_s, real *restrict joints, real *restrict velocity)
+{
+    const bool moves = self->mode == ONLINE_STAND_UP || self->mode == ONLINE_RECOVER;
+    const real passed = (real)((time_s - self->since_s) / timing->stand_s);
+    const real begun = passed > 0 ? online_smaller(passed, 1) : 0;
+    const real done = moves ? begun : 1;
+    const real share = done * done * (3 - 2 * done);
+    const real rate = 6 * done * (1 - done) / (real)timing->stand_s;
+    for (int i = 0; i < 12; ++i) {
+        const real way = self->stand[i] - self->from[i];
+        joints[i] = self->from[i] + share * way;
+        velocity[i] = rate * way;
+    }
+    return self->mode == ONLINE_STAND_UP ? share : 1;
 }
 
 static inline MAYBE_UNUSED online_share online_share_unknown(void)

@@ -84,3 +84,39 @@ typedef struct {
     double step_s;
 } online_supervisor;
 
+/* Times of the state machine. */
+typedef struct {
+    /* Time in which the joints move to the reference's first posture, s. */
+    double stand_s;
+    /* How long the robot stands still after the reference's end before it recovers, s. */
+    double settle_s;
+} online_timing;
+
+/* What the state machine does, each with its number for interfaces without enumerations. */
+typedef enum { ONLINE_DAMP, ONLINE_STAND_UP, ONLINE_READY, ONLINE_JUMP, ONLINE_LAND, ONLINE_RECOVER } online_mode;
+
+/* Mode of the state machine with what its transitions need, and the frame of the reference. */
+typedef struct {
+    online_mode mode;
+    /* Whether a jump was requested. */
+    bool is_asked;
+    /* When the mode began, s, and the joints then, rad. */
+    double since_s;
+    real from[12];
+    /* Where the joints move to, rad. */
+    real stand[12];
+    /* Whether no foot was on the ground in this jump. */
+    bool has_flown;
+    /* Since when the body stands still, s. */
+    bool is_still;
+    double still_s;
+    /* The robot's time minus the reference's, s. */
+    double offset_s;
+    /* A turn about the vertical and a shift: the robot's world to the reference's. */
+    real yaw;
+    real cosine;
+    real sine;
+    real place[2];
+    real start[2];
+} online_routine;
+

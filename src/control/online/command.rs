@@ -49,6 +49,7 @@ statuses! {
         "contact late: a checked plan, the feet are in the reference's last phase";
     ContactUnknown = 4, "contact_unknown",
         "contact unknown: a checked plan, the feet are in no phase of the model or in one far from the reference";
+    Standing = 5, "standing", "standing: the state machine moves the joints to the start, or holds them there";
     Inaccurate = 10, "inaccurate",
         "inaccurate: the solver's point fails the optimality conditions; fallback";
     Infeasible = 11, "infeasible", "infeasible: the constraints contradict each other; fallback";
@@ -59,6 +60,7 @@ statuses! {
         "measurement jump: a measurement far from the prediction; fallback";
     LiftFailed = 15, "lift_failed", "lift failed: no torques for the latent input; fallback";
     Ended = 16, "ended", "ended: the reference is over, as settings say torques fade";
+    Damped = 17, "damped", "damped: joints are damped, as requested or before a start";
     Tilt = 20, "tilt", "tilt: roll or pitch far from the reference's, or near upside down; damping until reset";
     JointBeyond = 21, "joint_beyond", "joint beyond: a joint beyond its limits; damping until reset";
     JointSpeed = 22, "joint_speed", "joint speed: a joint faster than it can be; damping until reset";
@@ -119,6 +121,8 @@ pub enum Source {
     ShiftedPlan,
     /// No plan: posture held, feed-forward torque fading, joints damped.
     Hold,
+    /// No plan: the posture of the state machine's stand, with the torques that carry the weight.
+    Stand,
     /// The motion was left: torques and joint PD fade into joint damping.
     Damping,
 }
@@ -130,6 +134,7 @@ impl Source {
             Source::Plan => "plan",
             Source::ShiftedPlan => "shifted_plan",
             Source::Hold => "hold",
+            Source::Stand => "stand",
             Source::Damping => "damping",
         }
     }

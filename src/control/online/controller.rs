@@ -222,7 +222,16 @@ impl Controller {
         self.forget();
     }
 
-    fn forget(&mut self) {
+    /// Clears what a step without a plan leaves as it is, and gives the gains.
+    pub(super) fn begin(&self, command: &mut Command) {
+        command.iterations = 0;
+        command.slack = 0.0;
+        command.phase = None;
+        command.inconsistency = None;
+        command.drives = self.settings.drives;
+    }
+
+    pub(super) fn forget(&mut self) {
         self.supervisor.forget();
         self.plan.time.is_made = false;
         self.horizon.forget();
@@ -274,11 +283,7 @@ impl Controller {
     /// Computes the command for a measurement.
     pub fn step_into(&mut self, measurement: Measurement<'_>, command: &mut Command) {
         let started = Instant::now();
-        command.iterations = 0;
-        command.slack = 0.0;
-        command.phase = None;
-        command.inconsistency = None;
-        command.drives = self.settings.drives;
+        self.begin(command);
         let status = match self.take(&measurement) {
             Ok(()) => self.plan_step(&measurement, command),
             Err(status) => status,

@@ -96,6 +96,11 @@ impl Reference {
         state
     }
 
+    /// Time of the first sample, s.
+    pub(super) fn start_s(&self) -> f64 {
+        self.time_s[0]
+    }
+
     /// Whether a time is after the last sample.
     pub(super) fn is_over(&self, time_s: f64) -> bool {
         time_s > self.time_s[self.time_s.len() - 1]

@@ -6,7 +6,6 @@ use super::command::{Command, Source, Status};
 use super::control_model::{ControlModel, violation};
 use super::controller::{Controller, Measurement, SOFTENED_FROM, foot_height};
 use super::lift::StanceState;
-use super::reference::Reference;
 use super::settings::AfterEnd;
 use super::stage::unscale;
 use super::supervisor::{Bounds, Fault, Supervisor};
@@ -45,7 +44,7 @@ impl Controller {
             &mut self.supervisor,
             &self.plant,
             &self.settings.bounds,
-            (reference, measurement),
+            (&reference.robot_state_at(measurement.time_s), measurement),
         ) {
             // The measured velocities must not become torques.
             self.memory.joint_velocity = [0.0; JOINT_DIM];
@@ -190,12 +189,12 @@ impl Controller {
     }
 }
 
-/// Whether the supervisor lets a measurement pass.
-fn watched(
+/// Whether the supervisor lets a measurement pass, beside the state that the robot should have.
+pub(super) fn watched(
     supervisor: &mut Supervisor,
     plant: &ControlModel,
     bounds: &Bounds,
-    (reference, measurement): (&Reference, &Measurement<'_>),
+    (nominal, measurement): (&[f64; STATE_DIM], &Measurement<'_>),
 ) -> bool {
     let &Measurement {
         time_s,
@@ -211,7 +210,7 @@ fn watched(
         time_s,
         x,
         dx,
-        &reference.robot_state_at(time_s),
+        nominal,
         &heights,
         feet,
         &lower,

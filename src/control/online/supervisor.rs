@@ -18,7 +18,7 @@ const HALF_TURN: Real = 3.1;
 const UPSIDE_DOWN: Real = 0.5;
 /// The first measurement must be within this share of the distances from the reference. Every later one must be within it of a
 /// prediction: the last good measurement moved by its velocity, or by the mean of both velocities.
-const NEAR: Real = 0.5;
+pub(super) const NEAR: Real = 0.5;
 /// How far a clock may go back, s: measurements may be exchanged.
 const CLOCK_JITTER_S: f64 = 0.005;
 /// How many steps are not too long between two measurements, whatever the bound says.

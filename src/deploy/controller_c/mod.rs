@@ -31,6 +31,7 @@ struct Facts<'a> {
     /// Whether the model knows what its states say of its inputs, in all phases.
     has_given_state: bool,
     rows: &'a StageRows,
+    timing: Timing,
     /// Names of the columns of a log.
     log_columns: Vec<String>,
 }
@@ -130,6 +131,7 @@ impl<'a> Facts<'a> {
             n_phases: plant.phases().len(),
             has_given_state: (plant.phases().iter()).all(|phase| phase.given_state.is_some()),
             rows,
+            timing: Timing::default(),
             log_columns: ControllerLog::column_names(entries.latent_dim),
         }
     }

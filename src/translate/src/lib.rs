@@ -204,8 +204,21 @@ pub fn controller(root: &Path) -> Result<[(&'static str, String); 4], Fault> {
     let online = Unit {
         prefix: "online",
         users: &users,
-        fixed: &["LegShape", "FallbackSettings", "Settings", "Bounds"],
-        header: &["Share", "Memory", "PlanTime", "Supervisor"],
+        fixed: &[
+            "LegShape",
+            "FallbackSettings",
+            "Settings",
+            "Bounds",
+            "Timing",
+        ],
+        header: &[
+            "Share",
+            "Memory",
+            "PlanTime",
+            "Supervisor",
+            "Timing",
+            "Routine",
+        ],
         elsewhere: &[
             ("MOST_LATENT", "D"),
             ("MOST_STATE", "X"),

@@ -1,0 +1,495 @@
+//! A state machine around the controller: stand up, be ready, jump, land, recover, damp.
+//!
+//! In: every measurement, in the robot's own world and on its own clock, and requests. Out: a command of the same kind as
+//! the controller's. The joints move on a smooth curve to the reference's first posture, with the torques that carry the
+//! weight. A jump begins where the robot then stands. The supervisor watches in every mode, and its fault leads to
+//! [`Mode::Damp`] until a reset. C is made of [`Routine`]. Read [`Machine::step_into`] first.
+
+use super::command::{Command, Source, Status};
+use super::controller::{Controller, Measurement};
+use super::dense::{Real, greater, smaller};
+use super::error::ControlError;
+use super::step::watched;
+use super::supervisor::{Bounds, Fault, NEAR};
+use crate::robot::{GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, LegShape, STATE_DIM, foot_height};
+
+/// Speed of the body below which it stands still, m/s.
+const STILL_M_S: Real = 0.1;
+/// How long the joints may need, in times that they should, before they are not at the start.
+const LATEST: f64 = 2.0;
+/// Angle over which the height of a foot is differentiated, rad.
+const SMALL_TURN: Real = 1e-3;
+
+/// What the state machine does, each with its number for interfaces without enumerations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mode {
+    /// The joints are damped: before a start, after a fault, or as requested.
+    #[default]
+    Damp,
+    /// The joints move to the reference's first posture.
+    StandUp,
+    /// The robot stands at the reference's start.
+    Ready,
+    /// The controller follows the reference.
+    Jump,
+    /// The same after the flight, until the robot stands still after the reference's end.
+    Land,
+    /// The joints move back to the first posture.
+    Recover,
+}
+
+/// Times of the state machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timing {
+    /// Time in which the joints move to the reference's first posture, s.
+    pub stand_s: f64,
+    /// How long the robot stands still after the reference's end before it recovers, s.
+    pub settle_s: f64,
+}
+
+impl Default for Timing {
+    fn default() -> Self {
+        Self {
+            stand_s: 1.5,
+            settle_s: 0.3,
+        }
+    }
+}
+
+/// Mode of the state machine with what its transitions need, and the frame of the reference.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Routine {
+    pub mode: Mode,
+    /// Whether a jump was requested.
+    pub is_asked: bool,
+    /// When the mode began, s, and the joints then, rad.
+    since_s: f64,
+    from: [Real; 12],
+    /// Where the joints move to, rad.
+    pub stand: [Real; 12],
+    /// Whether no foot was on the ground in this jump.
+    has_flown: bool,
+    /// Since when the body stands still, s.
+    is_still: bool,
+    still_s: f64,
+    /// The robot's time minus the reference's, s.
+    pub offset_s: f64,
+    /// A turn about the vertical and a shift: the robot's world to the reference's.
+    yaw: Real,
+    cosine: Real,
+    sine: Real,
+    place: [Real; 2],
+    start: [Real; 2],
+}
+
+impl Routine {
+    /// Begins a mode at a time, from a posture.
+    pub(super) fn enter(&mut self, mode: Mode, time_s: f64, joints: &[Real]) {
+        self.mode = mode;
+        self.is_asked = false;
+        self.since_s = time_s;
+        self.is_still = false;
+        for i in 0..12 {
+            self.from[i] = joints[i];
+        }
+    }
+
+    /// Begins a jump: the reference starts now, where the robot stands and looks.
+    pub(super) fn leap(&mut self, time_s: f64, start_s: f64, x: &[Real], start: &[Real]) {
+        self.enter(Mode::Jump, time_s, x);
+        self.has_flown = false;
+        self.offset_s = time_s - start_s;
+        self.yaw = start[17] - x[17];
+        self.cosine = self.yaw.cos();
+        self.sine = self.yaw.sin();
+        for i in 0..2 {
+            self.place[i] = x[12 + i];
+            self.start[i] = start[12 + i];
+        }
+    }
+
+    /// Writes a state and its velocity in the frame of the reference.
+    pub(super) fn write_in_frame(
+        &self,
+        x: &[Real],
+        dx: &[Real],
+        framed_x: &mut [Real],
+        framed_dx: &mut [Real],
+    ) {
+        for i in 0..18 {
+            framed_x[i] = x[i];
+            framed_dx[i] = dx[i];
+        }
+        let along = x[12] - self.place[0];
+        let aside = x[13] - self.place[1];
+        framed_x[12] = self.start[0] + self.cosine * along - self.sine * aside;
+        framed_x[13] = self.start[1] + self.sine * along + self.cosine * aside;
+        framed_x[17] = x[17] + self.yaw;
+        framed_dx[12] = self.cosine * dx[12] - self.sine * dx[13];
+        framed_dx[13] = self.sine * dx[12] + self.cosine * dx[13];
+    }
+
+    /// Writes where the joints should be at a time, rad, and how fast they should move, rad/s; the share of the weight
+    /// that they carry.
+    pub(super) fn write_posture(
+        &self,
+        timing: &Timing,
+        time_s: f64,
+        joints: &mut [Real],
+        velocity: &mut [Real],
+    ) -> Real {
+        let moves = self.mode == Mode::StandUp || self.mode == Mode::Recover;
+        let passed = ((time_s - self.since_s) / timing.stand_s) as Real;
+        let begun: Real = if passed > 0.0 {
+            smaller(passed, 1.0)
+        } else {
+            0.0
+        };
+        let done: Real = if moves { begun } else { 1.0 };
+        let share = done * done * (3.0 - 2.0 * done);
+        let rate = 6.0 * done * (1.0 - done) / (timing.stand_s as Real);
+        for i in 0..12 {
+            let way = self.stand[i] - self.from[i];
+            joints[i] = self.from[i] + share * way;
+            velocity[i] = rate * way;
+        }
+        if self.mode == Mode::StandUp {
+            share
+        } else {
+            1.0
+        }
+    }
+
+    /// The mode after a measurement of joints that move to the stand: [`Mode::Ready`] when they are there,
+    /// [`Mode::Damp`] if they do not arrive.
+    pub(super) fn after_standing(
+        &self,
+        bounds: &Bounds,
+        timing: &Timing,
+        time_s: f64,
+        joints: &[Real],
+        is_down: &[bool],
+    ) -> Mode {
+        let mut is_there = true;
+        for i in 0..12 {
+            let off = (joints[i] - self.stand[i]).abs();
+            is_there = is_there && off <= NEAR * bounds.posture_rad;
+        }
+        for foot in 0..4 {
+            is_there = is_there && is_down[foot];
+        }
+        let passed_s = time_s - self.since_s;
+        if self.mode == Mode::Ready || passed_s < timing.stand_s {
+            return self.mode;
+        }
+        if is_there {
+            return Mode::Ready;
+        }
+        if passed_s > LATEST * timing.stand_s {
+            Mode::Damp
+        } else {
+            self.mode
+        }
+    }
+
+    /// The mode after a measurement of a robot that follows the reference, which may be over.
+    pub(super) fn after_jump(
+        &mut self,
+        timing: &Timing,
+        time_s: f64,
+        is_over: bool,
+        dx: &[Real],
+        is_down: &[bool],
+    ) -> Mode {
+        let mut down = 0;
+        for foot in 0..4 {
+            if is_down[foot] {
+                down += 1;
+            }
+        }
+        self.has_flown = self.has_flown || down == 0;
+        let has_landed = is_over || (self.has_flown && down > 0);
+        if self.mode == Mode::Jump && has_landed {
+            self.mode = Mode::Land;
+        }
+        let by_x_y = greater(dx[12].abs(), dx[13].abs());
+        let speed = greater(by_x_y, dx[14].abs());
+        let is_still = self.mode == Mode::Land && is_over && down == 4 && speed < STILL_M_S;
+        if is_still && !self.is_still {
+            self.still_s = time_s;
+        }
+        self.is_still = is_still;
+        if is_still && time_s - self.still_s >= timing.settle_s {
+            Mode::Recover
+        } else {
+            self.mode
+        }
+    }
+}
+
+/// Writes the torques with which a leg, at a state of the robot, presses on the ground with a vertical force, N m: the
+/// force times minus the gradient of the foot's height.
+pub(super) fn write_support(
+    leg: &LegShape,
+    hip: &[Real],
+    x: &[Real],
+    q: &[Real],
+    force: Real,
+    torque: &mut [Real],
+) {
+    let mut turned: [Real; 3] = [q[0], q[1], q[2]];
+    for i in 0..3 {
+        turned[i] = q[i] + SMALL_TURN;
+        let above = foot_height(leg, hip, x, &turned);
+        turned[i] = q[i] - SMALL_TURN;
+        let below = foot_height(leg, hip, x, &turned);
+        turned[i] = q[i];
+        torque[i] = -force * (above - below) / (2.0 * SMALL_TURN);
+    }
+}
+
+/// The controller with the state machine around it. References are set on [`Machine::controller_mut`], before a jump.
+#[derive(Debug)]
+pub struct Machine {
+    controller: Controller,
+    timing: Timing,
+    routine: Routine,
+}
+
+impl Machine {
+    /// A state machine in [`Mode::Damp`] around a controller; an error names a time that is not positive.
+    pub fn new(controller: Controller, timing: Timing) -> Result<Self, ControlError> {
+        for (name, found) in [("stand_s", timing.stand_s), ("settle_s", timing.settle_s)] {
+            if !(found.is_finite() && found > 0.0) {
+                let expected = "a positive number";
+                return Err(ControlError::Setting {
+                    name,
+                    found,
+                    expected,
+                });
+            }
+        }
+        Ok(Self {
+            controller,
+            timing,
+            routine: Routine::default(),
+        })
+    }
+
+    /// What it does.
+    pub fn mode(&self) -> Mode {
+        self.routine.mode
+    }
+
+    /// The controller.
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// The controller, for its reference.
+    pub fn controller_mut(&mut self) -> &mut Controller {
+        &mut self.controller
+    }
+
+    /// Stands up from [`Mode::Damp`], or moves from [`Mode::Ready`] to the start of another reference; false in other
+    /// modes, after a fault and without a reference.
+    pub fn stand(&mut self, time_s: f64, x: &[f64]) -> bool {
+        let has_fault = self.controller.supervisor.fault != Fault::None;
+        let Some(start) = self.start() else {
+            return false;
+        };
+        let (mode, from) = match (self.routine.mode, x.first_chunk::<JOINT_DIM>()) {
+            (Mode::Damp, Some(joints)) if !has_fault => (Mode::StandUp, *joints),
+            (Mode::Ready, _) => (Mode::Recover, self.routine.stand),
+            _ => return false,
+        };
+        if !(time_s.is_finite() && from.iter().all(|joint| joint.is_finite())) {
+            return false;
+        }
+        self.routine.stand.copy_from_slice(&start[..JOINT_DIM]);
+        self.routine.enter(mode, time_s, &from);
+        self.controller.forget();
+        true
+    }
+
+    /// Jumps with the next measurement; false in other modes than [`Mode::Ready`], and where the robot does not stand at
+    /// the start of the reference.
+    pub fn jump(&mut self) -> bool {
+        let is_ready = self.routine.mode == Mode::Ready;
+        let stands = (self.start()).is_some_and(|start| start[..JOINT_DIM] == self.routine.stand);
+        self.routine.is_asked = is_ready && stands;
+        self.routine.is_asked
+    }
+
+    /// Damps the joints, whatever it does.
+    pub fn damp(&mut self) {
+        self.routine.mode = Mode::Damp;
+    }
+
+    /// Forgets the supervisor's fault, plan and measurements, and damps the joints.
+    pub fn reset(&mut self) {
+        self.controller.reset();
+        self.routine = Routine::default();
+    }
+
+    /// See [`Controller::prepare`].
+    pub fn prepare(&mut self, time_s: f64) {
+        if let Mode::Jump | Mode::Land = self.routine.mode {
+            self.controller.prepare(time_s - self.routine.offset_s);
+        }
+    }
+
+    /// Computes the command for a measurement in the robot's world, on its clock.
+    pub fn step_into(&mut self, measurement: Measurement<'_>, command: &mut Command) {
+        let is_whole = measurement.x.len() == STATE_DIM && measurement.dx.len() == STATE_DIM;
+        let Measurement { time_s, x, .. } = measurement;
+        let is_finite = time_s.is_finite() && x.iter().all(|value| value.is_finite());
+        if self.routine.mode == Mode::Ready && self.routine.is_asked && is_whole && is_finite {
+            let start = self.start().expect("a jump was accepted");
+            let start_s = self.controller.reference().expect("it has one").start_s();
+            self.routine.leap(time_s, start_s, x, &start);
+            self.controller.forget();
+        }
+        match self.routine.mode {
+            Mode::Jump | Mode::Land => self.follow(measurement, is_whole, command),
+            Mode::StandUp | Mode::Ready | Mode::Recover => self.hold(measurement, command),
+            Mode::Damp => self.damped(measurement, command),
+        }
+    }
+
+    fn start(&self) -> Option<[f64; STATE_DIM]> {
+        let reference = self.controller.reference()?;
+        Some(reference.robot_state_at(reference.start_s()))
+    }
+
+    /// A step of the controller, in its frame and on its clock.
+    fn follow(&mut self, measurement: Measurement<'_>, is_whole: bool, command: &mut Command) {
+        let (routine, mut x, mut dx) = (&mut self.routine, [0.0; STATE_DIM], [0.0; STATE_DIM]);
+        if is_whole {
+            routine.write_in_frame(measurement.x, measurement.dx, &mut x, &mut dx);
+        }
+        let width = if is_whole { STATE_DIM } else { 0 };
+        let time_s = measurement.time_s - routine.offset_s;
+        let framed = Measurement {
+            time_s,
+            x: &x[..width],
+            dx: &dx[..width],
+            feet: measurement.feet,
+        };
+        self.controller.step_into(framed, command);
+        if command.source == Source::Damping {
+            routine.mode = Mode::Damp;
+        } else if command.status.has_plan()
+            && let Some(reference) = self.controller.reference()
+        {
+            let is_over = reference.is_over(time_s);
+            let (timing, feet) = (&self.timing, &measurement.feet);
+            let mode =
+                routine.after_jump(timing, measurement.time_s, is_over, measurement.dx, feet);
+            if mode == Mode::Recover {
+                routine.enter(mode, measurement.time_s, &command.joint_position_rad);
+                self.controller.forget();
+            }
+        }
+    }
+
+    /// A step in which the joints move to the stand, or hold it.
+    fn hold(&mut self, measurement: Measurement<'_>, command: &mut Command) {
+        self.controller.begin(command);
+        let status = self.stand_status(&measurement);
+        let controller = &mut self.controller;
+        let status = controller.judged(status, measurement.time_s);
+        command.status = status;
+        if controller.supervisor.fault != Fault::None {
+            self.routine.mode = Mode::Damp;
+            controller.damp(measurement.time_s, measurement.x, command);
+        } else {
+            self.write_stand(&measurement, command);
+        }
+        let step_s = self.controller.settings.step_s;
+        (self.controller.memory).keep_time(measurement.time_s, step_s);
+    }
+
+    /// What a measurement of a robot that moves to the stand, or holds it, is.
+    fn stand_status(&mut self, measurement: &Measurement<'_>) -> Status {
+        let (controller, routine) = (&mut self.controller, &mut self.routine);
+        let &Measurement { time_s, x, dx, .. } = measurement;
+        if x.len() != STATE_DIM || dx.len() != STATE_DIM {
+            return Status::WrongDimension;
+        }
+        if !controller.memory.accepts(time_s, x, dx) {
+            return Status::NotFinite;
+        }
+        // The body may be anywhere, upright; the joints should be where they are sent.
+        let mut nominal = [0.0; STATE_DIM];
+        nominal.copy_from_slice(x);
+        (nominal[15], nominal[16]) = (0.0, 0.0);
+        let mut velocity = [0.0; JOINT_DIM];
+        routine.write_posture(&self.timing, time_s, &mut nominal, &mut velocity);
+        let mut bounds = controller.settings.bounds;
+        if routine.mode == Mode::StandUp {
+            // A robot that lies on its belly has no foot on the ground and does not fall.
+            bounds.contact_mismatch_steps = 0;
+        }
+        let (supervisor, plant) = (&mut controller.supervisor, &controller.plant);
+        if !watched(supervisor, plant, &bounds, (&nominal, measurement)) {
+            controller.memory.joint_velocity = [0.0; JOINT_DIM];
+            return Status::MeasurementJump;
+        }
+        let (timing, feet) = (&self.timing, &measurement.feet);
+        let mode = routine.after_standing(&bounds, timing, time_s, x, feet);
+        if mode == Mode::Damp {
+            controller.supervisor.fault = Fault::NotAtStart;
+        }
+        routine.mode = mode;
+        Status::Standing
+    }
+
+    /// Writes the posture of the stand and, for a good measurement, the torques that carry the weight.
+    fn write_stand(&mut self, measurement: &Measurement<'_>, command: &mut Command) {
+        let controller = &mut self.controller;
+        let (robot, limits) = (controller.plant.robot(), controller.plant.joint_limits());
+        let step_s = controller.settings.step_s;
+        let now_s = controller.memory.now_s(measurement.time_s, step_s);
+        let (mut joints, mut velocity) = ([0.0; JOINT_DIM], [0.0; JOINT_DIM]);
+        let share = (self.routine).write_posture(&self.timing, now_s, &mut joints, &mut velocity);
+        if command.status == Status::Standing {
+            let down = Leg::down(measurement.feet).count().max(1) as f64;
+            let force = share * (robot.mass_kg() * GRAVITY_M_S2) / down;
+            let mut torque = [0.0; JOINT_DIM];
+            for leg in Leg::down(measurement.feet) {
+                let first = leg.index() * LEG_JOINT_DIM;
+                let (shape, hip) = (&robot.geometry(leg).shape, robot.hip_position(leg));
+                let (q, of_leg) = (&measurement.x[first..], &mut torque[first..]);
+                write_support(shape, hip.as_slice(), measurement.x, q, force, of_leg);
+            }
+            let limit = robot.torque_limit_nm();
+            (controller.memory).keep_torque(&torque, 1.0, limit);
+        }
+        (controller.memory).keep_posture(&joints, &limits[0], &limits[1]);
+        command.torque_nm = controller.memory.feed_forward_nm;
+        command.joint_position_rad = controller.memory.joint_position;
+        command.joint_velocity_rad_s = velocity;
+        command.losses_nm = [0.0; JOINT_DIM];
+        command.u_lat.fill(0.0);
+        command.source = Source::Stand;
+    }
+
+    /// A step of damped joints.
+    fn damped(&mut self, measurement: Measurement<'_>, command: &mut Command) {
+        let controller = &mut self.controller;
+        controller.begin(command);
+        let &Measurement { time_s, x, dx, .. } = &measurement;
+        let is_whole = x.len() == STATE_DIM && dx.len() == STATE_DIM;
+        let is_finite = is_whole && controller.memory.accepts(time_s, x, dx);
+        let status = match (is_whole, is_finite) {
+            (true, true) => Status::Damped,
+            (true, false) => Status::NotFinite,
+            (false, _) => Status::WrongDimension,
+        };
+        command.status = Status::of(controller.supervisor.fault).unwrap_or(status);
+        controller.damp(time_s, x, command);
+        let step_s = controller.settings.step_s;
+        (controller.memory).keep_time(time_s, step_s);
+    }
+}
