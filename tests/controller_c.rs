@@ -24,6 +24,8 @@ mod emitted;
 mod legs;
 #[path = "controller_c/log.rs"]
 mod log;
+#[path = "controller_c/machine.rs"]
+mod machine;
 #[path = "controller/programs.rs"]
 mod programs;
 #[path = "mpc/random.rs"]
