@@ -1,6 +1,6 @@
 /* A Go1 in MuJoCo that stands up, jumps and stands again, by the state machine of a generated controller: measurements go in,
- * torques come out, 500 times a second. Prints a line for each mode and four times a second; with a path as second argument
- * writes the log there. usage: robot GO1.xml [LOG.csv] */
+ * torques come out, 500 times a second. Prints a line for each mode and four times a second; with a path as argument
+ * writes the log there. usage: robot [LOG.csv] */
 #include CONTROLLER_HEADER
 #include JUMP_HEADER
 #include LOG_HEADER
@@ -144,8 +144,7 @@ int main(int argc, char **argv)
     robot r;
     double x[18], dx[18];
     uint8_t feet[4] = {0};
-    if (argc < 2 || load(&r, argv[1]) != 0) {
-        fprintf(stderr, "usage: robot GO1.xml [LOG.csv]\n");
+    if (load(&r, GO1_XML) != 0) {
         return 1;
     }
     ROMC(log_init)(&log, rows, sizeof rows / sizeof rows[0]);
@@ -197,9 +196,9 @@ int main(int argc, char **argv)
     }
     printf("\n%s: jumped %.3f m (the trajectory %.3f m), highest %.3f m (%.3f m)\n", stands ? "stands" : "does not stand",
            to - from, end[12] - JUMP_X[0][12], highest, apex);
-    FILE *file = argc > 2 ? fopen(argv[2], "w") : NULL;
-    if (argc > 2 && (!file || ROMC(log_write)(&log, put, file) != 0 || fclose(file) != 0)) {
-        fprintf(stderr, "cannot write %s\n", argv[2]);
+    FILE *file = argc > 1 ? fopen(argv[1], "w") : NULL;
+    if (argc > 1 && (!file || ROMC(log_write)(&log, put, file) != 0 || fclose(file) != 0)) {
+        fprintf(stderr, "cannot write %s\n", argv[1]);
         return 1;
     }
     mj_deleteData(r.data);
