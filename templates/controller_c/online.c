@@ -1256,6 +1256,24 @@ static inline MAYBE_UNUSED double online_plan_time_stage_s(online_plan_time *sel
     return self->start_s + (double)stage * self->step_s;
 }
 
+/* Whether a motion that is done has left the body still on four feet for long enough. */
+static inline MAYBE_UNUSED bool online_routine_rests(online_routine *restrict self, const online_timing *timing,
+        double time_s, bool is_done, const real *dx, bool *is_down)
+{
+    bool is_still = is_done;
+    for (int foot = 0; foot < 4; ++foot) {
+        is_still = is_still && is_down[foot];
+    }
+    for (int i = 12; i < 15; ++i) {
+        is_still = is_still && solver_magnitude(dx[i]) < ONLINE_STILL_M_S;
+    }
+    if (is_still && !self->is_still) {
+        self->still_s = time_s;
+    }
+    self->is_still = is_still;
+    return is_still && time_s - self->still_s >= timing->settle_s;
+}
+
 /* The mode after a measurement of a robot that follows the reference, which may be over. */
 static inline MAYBE_UNUSED online_mode online_routine_after_jump(online_routine *restrict self,
         const online_timing *timing, double time_s, bool is_over, const real *dx, bool *is_down)
@@ -1271,34 +1289,27 @@ static inline MAYBE_UNUSED online_mode online_routine_after_jump(online_routine 
     if (self->mode == ONLINE_JUMP && has_landed) {
         self->mode = ONLINE_LAND;
     }
-    const real by_x_y = online_greater(solver_magnitude(dx[12]), solver_magnitude(dx[13]));
-    const real speed = online_greater(by_x_y, solver_magnitude(dx[14]));
-    const bool is_still = self->mode == ONLINE_LAND && is_over && down == 4 && speed < ONLINE_STILL_M_S;
-    if (is_still && !self->is_still) {
-        self->still_s = time_s;
-    }
-    self->is_still = is_still;
-    return is_still && time_s - self->still_s >= timing->settle_s ? ONLINE_RECOVER : self->mode;
+    const bool is_done = self->mode == ONLINE_LAND && is_over;
+    return online_routine_rests(self, timing, time_s, is_done, dx, is_down) ? ONLINE_RECOVER : self->mode;
 }
 
 /* The mode after a measurement of joints that move to the stand: Mode::Ready when they are there,
  * Mode::Damp if they do not arrive. */
-static inline MAYBE_UNUSED online_mode online_routine_after_standing(online_routine *self,
-        const online_bounds *bounds, const online_timing *timing, double time_s, const real *joints, bool *is_down)
+static inline MAYBE_UNUSED online_mode online_routine_after_standing(online_routine *restrict self,
+        const online_bounds *bounds, const online_timing *timing, double time_s, const real *x, const real *dx,
+        bool *is_down)
 {
-    bool is_there = true;
+    const double passed_s = time_s - self->since_s;
+    bool is_there = passed_s >= timing->stand_s;
     for (int i = 0; i < 12; ++i) {
-        const real off = solver_magnitude(joints[i] - self->stand[i]);
+        const real off = solver_magnitude(x[i] - self->stand[i]);
         is_there = is_there && off <= ONLINE_NEAR * bounds->posture_rad;
     }
-    for (int foot = 0; foot < 4; ++foot) {
-        is_there = is_there && is_down[foot];
-    }
-    const double passed_s = time_s - self->since_s;
-    if (self->mode == ONLINE_READY || passed_s < timing->stand_s) {
+    const bool rests = online_routine_rests(self, timing, time_s, is_there, dx, is_down);
+    if (self->mode == ONLINE_READY) {
         return self->mode;
     }
-    if (is_there) {
+    if (rests) {
         return ONLINE_READY;
     }
     return passed_s > ONLINE_LATEST * timing->stand_s ? ONLINE_DAMP : self->mode;

@@ -88,7 +88,7 @@ typedef struct {
 typedef struct {
     /* Time in which the joints move to the reference's first posture, s. */
     double stand_s;
-    /* How long the robot stands still after the reference's end before it recovers, s. */
+    /* How long the robot stands still before it is ready, and after the reference's end before it recovers, s. */
     double settle_s;
 } online_timing;
 

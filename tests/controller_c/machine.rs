@@ -211,7 +211,7 @@ fn robot_stands_up_jumps_where_it_stands_lands_and_stands_again() {
     assert!(!robot.still(Request::Jump), "jumps from the floor");
     assert_eq!(robot.command.status, Status::Damped);
     assert!(robot.still(Request::Stand));
-    assert_eq!(robot.until(Mode::Ready), 151);
+    assert_eq!(robot.until(Mode::Ready), 182);
     let off = |robot: &Robot| {
         let first = robot.recorded(0).0;
         (0..12)

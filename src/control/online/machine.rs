@@ -7,7 +7,7 @@
 
 use super::command::{Command, Source, Status};
 use super::controller::{Controller, Measurement};
-use super::dense::{Real, greater, smaller};
+use super::dense::{Real, smaller};
 use super::error::ControlError;
 use super::step::watched;
 use super::supervisor::{Bounds, Fault, NEAR};
@@ -43,7 +43,7 @@ pub enum Mode {
 pub struct Timing {
     /// Time in which the joints move to the reference's first posture, s.
     pub stand_s: f64,
-    /// How long the robot stands still after the reference's end before it recovers, s.
+    /// How long the robot stands still before it is ready, and after the reference's end before it recovers, s.
     pub settle_s: f64,
 }
 
@@ -163,26 +163,25 @@ impl Routine {
     /// The mode after a measurement of joints that move to the stand: [`Mode::Ready`] when they are there,
     /// [`Mode::Damp`] if they do not arrive.
     pub(super) fn after_standing(
-        &self,
+        &mut self,
         bounds: &Bounds,
         timing: &Timing,
         time_s: f64,
-        joints: &[Real],
+        x: &[Real],
+        dx: &[Real],
         is_down: &[bool],
     ) -> Mode {
-        let mut is_there = true;
+        let passed_s = time_s - self.since_s;
+        let mut is_there = passed_s >= timing.stand_s;
         for i in 0..12 {
-            let off = (joints[i] - self.stand[i]).abs();
+            let off = (x[i] - self.stand[i]).abs();
             is_there = is_there && off <= NEAR * bounds.posture_rad;
         }
-        for foot in 0..4 {
-            is_there = is_there && is_down[foot];
-        }
-        let passed_s = time_s - self.since_s;
-        if self.mode == Mode::Ready || passed_s < timing.stand_s {
+        let rests = self.rests(timing, time_s, is_there, dx, is_down);
+        if self.mode == Mode::Ready {
             return self.mode;
         }
-        if is_there {
+        if rests {
             return Mode::Ready;
         }
         if passed_s > LATEST * timing.stand_s {
@@ -212,18 +211,35 @@ impl Routine {
         if self.mode == Mode::Jump && has_landed {
             self.mode = Mode::Land;
         }
-        let by_x_y = greater(dx[12].abs(), dx[13].abs());
-        let speed = greater(by_x_y, dx[14].abs());
-        let is_still = self.mode == Mode::Land && is_over && down == 4 && speed < STILL_M_S;
-        if is_still && !self.is_still {
-            self.still_s = time_s;
-        }
-        self.is_still = is_still;
-        if is_still && time_s - self.still_s >= timing.settle_s {
+        let is_done = self.mode == Mode::Land && is_over;
+        if self.rests(timing, time_s, is_done, dx, is_down) {
             Mode::Recover
         } else {
             self.mode
         }
+    }
+
+    /// Whether a motion that is done has left the body still on four feet for long enough.
+    fn rests(
+        &mut self,
+        timing: &Timing,
+        time_s: f64,
+        is_done: bool,
+        dx: &[Real],
+        is_down: &[bool],
+    ) -> bool {
+        let mut is_still = is_done;
+        for foot in 0..4 {
+            is_still = is_still && is_down[foot];
+        }
+        for i in 12..15 {
+            is_still = is_still && dx[i].abs() < STILL_M_S;
+        }
+        if is_still && !self.is_still {
+            self.still_s = time_s;
+        }
+        self.is_still = is_still;
+        is_still && time_s - self.still_s >= timing.settle_s
     }
 }
 
@@ -437,7 +453,7 @@ impl Machine {
             return Status::MeasurementJump;
         }
         let (timing, feet) = (&self.timing, &measurement.feet);
-        let mode = routine.after_standing(&bounds, timing, time_s, x, feet);
+        let mode = routine.after_standing(&bounds, timing, time_s, x, dx, feet);
         if mode == Mode::Damp {
             controller.supervisor.fault = Fault::NotAtStart;
         }
