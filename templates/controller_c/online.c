@@ -1338,6 +1338,9 @@ static inline MAYBE_UNUSED void online_routine_leap(online_routine *restrict sel
     self->yaw = start[17] - x[17];
     self->cosine = COS(self->yaw);
     self->sine = SIN(self->yaw);
+    for (int i = 0; i < 12; ++i) {
+        self->stand[i] = start[i];
+    }
     for (int i = 0; i < 2; ++i) {
         self->place[i] = x[12 + i];
         self->start[i] = start[12 + i];

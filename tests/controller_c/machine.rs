@@ -208,10 +208,11 @@ impl Robot {
 #[test]
 fn robot_stands_up_jumps_where_it_stands_lands_and_stands_again() {
     let mut robot = Robot::new(Vec::new());
-    assert!(!robot.still(Request::Jump), "jumps from the floor");
+    robot.still(Request::None);
     assert_eq!(robot.command.status, Status::Damped);
     assert!(robot.still(Request::Stand));
-    assert_eq!(robot.until(Mode::Ready), 182);
+    assert!(!robot.still(Request::Jump), "jumps while it stands up");
+    assert_eq!(robot.until(Mode::Ready), 181);
     let off = |robot: &Robot| {
         let first = robot.recorded(0).0;
         (0..12)
@@ -239,6 +240,11 @@ fn robot_stands_up_jumps_where_it_stands_lands_and_stands_again() {
     }
     robot.still(Request::Damp);
     assert_eq!(robot.machine.mode(), Mode::Damp);
+    let start = robot.recorded(0).0;
+    robot.x[..12].copy_from_slice(&start[..12]);
+    assert!(robot.still(Request::Jump), "stands at the start");
+    assert_eq!(robot.machine.mode(), Mode::Jump);
+    robot.still(Request::Damp);
     for _ in 0..20 {
         robot.still(Request::None);
     }
@@ -350,6 +356,7 @@ fn state_machine_in_c_repeats_the_library_bit_for_bit() {
                 (_, draw) if draw < 0.5 => Request::Prepare,
                 (Mode::Damp, draw) if draw < 0.6 && has_fault => Request::Reset,
                 (Mode::Damp, draw) if draw < 0.7 => Request::Stand,
+                (Mode::Damp, draw) if draw < 0.75 => Request::Jump,
                 (Mode::Ready, draw) if draw < 0.6 => Request::Jump,
                 _ => Request::None,
             };

@@ -102,6 +102,9 @@ impl Routine {
         self.yaw = start[17] - x[17];
         self.cosine = self.yaw.cos();
         self.sine = self.yaw.sin();
+        for i in 0..12 {
+            self.stand[i] = start[i];
+        }
         for i in 0..2 {
             self.place[i] = x[12 + i];
             self.start[i] = start[12 + i];
@@ -328,18 +331,22 @@ impl Machine {
         true
     }
 
-    /// Jumps with the next measurement; false in other modes than [`Mode::Ready`], and where the robot does not stand at
-    /// the start of the reference.
+    /// Jumps with the next measurement: from [`Mode::Ready`] at the start of the reference, or from [`Mode::Damp`] where
+    /// something else made the robot stand there. False in other modes, after a fault, and without a reference.
     pub fn jump(&mut self) -> bool {
-        let is_ready = self.routine.mode == Mode::Ready;
-        let stands = (self.start()).is_some_and(|start| start[..JOINT_DIM] == self.routine.stand);
-        self.routine.is_asked = is_ready && stands;
+        let is_sound = self.controller.supervisor.fault == Fault::None;
+        let mode = self.routine.mode;
+        let may_start = |start: [f64; STATE_DIM]| match mode {
+            Mode::Ready => start[..JOINT_DIM] == self.routine.stand,
+            _ => mode == Mode::Damp && is_sound,
+        };
+        self.routine.is_asked = self.start().is_some_and(may_start);
         self.routine.is_asked
     }
 
     /// Damps the joints, whatever it does.
     pub fn damp(&mut self) {
-        self.routine.mode = Mode::Damp;
+        (self.routine.mode, self.routine.is_asked) = (Mode::Damp, false);
     }
 
     /// Forgets the supervisor's fault, plan and measurements, and damps the joints.
@@ -360,7 +367,7 @@ impl Machine {
         let is_whole = measurement.x.len() == STATE_DIM && measurement.dx.len() == STATE_DIM;
         let Measurement { time_s, x, .. } = measurement;
         let is_finite = time_s.is_finite() && x.iter().all(|value| value.is_finite());
-        if self.routine.mode == Mode::Ready && self.routine.is_asked && is_whole && is_finite {
+        if self.routine.is_asked && is_whole && is_finite {
             let start = self.start().expect("a jump was accepted");
             let start_s = self.controller.reference().expect("it has one").start_s();
             self.routine.leap(time_s, start_s, x, &start);
@@ -417,7 +424,7 @@ impl Machine {
         let status = controller.judged(status, measurement.time_s);
         command.status = status;
         if controller.supervisor.fault != Fault::None {
-            self.routine.mode = Mode::Damp;
+            (self.routine.mode, self.routine.is_asked) = (Mode::Damp, false);
             controller.damp(measurement.time_s, measurement.x, command);
         } else {
             self.write_stand(&measurement, command);
