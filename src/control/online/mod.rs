@@ -32,6 +32,7 @@ mod plan;
 pub mod problem;
 mod qp;
 mod reference;
+mod routine;
 mod settings;
 mod stage;
 mod step;
@@ -47,10 +48,11 @@ pub use error::ControlError;
 pub use estimate::InputGivenState;
 pub use lift::{ConsistentLift, LiftFailure, StanceState, foot_forces, torque_deviation};
 pub use linearise::LatentDynamics;
-pub use machine::{Machine, Mode, Timing};
+pub use machine::Machine;
 pub use plan::Plan;
 pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, sparse};
 pub use reference::{Reference, ReferenceSamples};
+pub use routine::{Mode, Timing};
 pub use settings::{
     AfterEnd, Drift, Drives, FallbackSettings, Lift, Linearisation, MissingInput, MpcSettings,
     RowSelection, Solver,
