@@ -23,8 +23,8 @@ using hardware_interface::Handle;
 using hardware_interface::LoanedCommandInterface;
 using hardware_interface::LoanedStateInterface;
 
-// Of the stub of pluginlib, in place of its loader.
-std::unique_ptr<ControllerInterface> stub_plugin();
+// By pluginlib, or by the stub in its place.
+std::shared_ptr<ControllerInterface> new_plugin();
 
 namespace
 {
@@ -80,7 +80,7 @@ std::vector<std::string> names(const char * prefix, int count)
 /// A plugin with the values that its interfaces are loaned of.
 struct Robot
 {
-    std::unique_ptr<ControllerInterface> plugin = stub_plugin();
+    std::shared_ptr<ControllerInterface> plugin = new_plugin();
     std::vector<Handle> commands, states;
     int64_t calls = 0;
 
