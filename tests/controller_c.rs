@@ -20,6 +20,8 @@ mod analysers;
 mod boards;
 #[path = "controller_c/emitted.rs"]
 mod emitted;
+#[path = "controller_c/joints.rs"]
+mod joints;
 #[path = "controller_c/legs.rs"]
 mod legs;
 #[path = "controller_c/log.rs"]

@@ -13,7 +13,7 @@ use crate::random::Random;
 use crate::tools::is_thorough;
 
 /// The model on the robot of a file, with forces in one of the frames.
-fn on_robot(name: &str, frame: WrenchFrame) -> ReducedModel {
+pub fn on_robot(name: &str, frame: WrenchFrame) -> ReducedModel {
     let path = root().join("examples/robots").join(name);
     let robot = romc::robot_file::find(&path.to_string_lossy()).expect("an example");
     let builder = shipped("go1-d4").into_builder().robot(robot);

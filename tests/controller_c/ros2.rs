@@ -1,4 +1,4 @@
-//! The generated plugin of ros2_control, built and driven on stubs of ROS.
+//! The generated plugin of ros2_control, built and driven on stubs of ROS, and by the ament and pluginlib of Debian.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use romc::codegen::Precision;
 
 use crate::emitted::Emitted;
 use crate::programs::{WARNINGS, root, shipped, succeed};
-use crate::tools::{has, has_compiler_with};
+use crate::tools::{has, has_compiler_with, is_asked_for};
 
 fn stubs() -> PathBuf {
     root().join("tests/controller_c/ros2")
@@ -28,6 +28,7 @@ fn drive(emitted: &Emitted, compiler: &str, flags: &[&str], macros: &[&str]) -> 
             .arg(format!("-DUPPER={}", name.to_ascii_uppercase()))
             .arg(format!("-DJUMP=\"{name}_jump.h\""))
             .arg(format!("-I{}", stubs().join("include").display()))
+            .arg(format!("-I{}", stubs().join("alone").display()))
             .args(["-I..", "-Isrc", "src/controller.cpp", "src/plan.cpp"])
             .arg(stubs().join("drive.cpp"))
             .args(emitted.objects("cc", macros))
@@ -85,33 +86,59 @@ fn plugin_gives_the_controllers_efforts_under_clang() {
     check_efforts("clang++", &[], &[]);
 }
 
+/// Debian's ament and pluginlib, which are those of ROS 2.
+fn has_ament() -> bool {
+    let mut probe = Command::new("dpkg-query");
+    probe.args(["-s", "ament-cmake", "pluginlib-dev"]);
+    has("cmake") && has("c++") && is_asked_for("ament_cmake and pluginlib", &mut probe)
+}
+
+/// Runs cmake on a project: finds packages in the stubs and the prefix, for what Debian's ament needs its own Python.
+fn build(project: &Path, build: &Path, prefix: &Path, definitions: &[String]) {
+    let (stubs, prefix) = (stubs(), prefix.display());
+    let mut configure = Command::new("cmake");
+    configure.arg("-S").arg(project).arg("-B").arg(build);
+    configure.arg("-DPython3_EXECUTABLE=/usr/bin/python3");
+    configure.arg(format!("-DCMAKE_PREFIX_PATH={};{prefix}", stubs.display()));
+    configure.arg(format!("-DCMAKE_INSTALL_PREFIX={prefix}"));
+    configure.arg(format!("-DCMAKE_CXX_FLAGS={}", WARNINGS.join(" ")));
+    succeed(configure.args(definitions));
+    succeed(Command::new("cmake").arg("--build").arg(build));
+}
+
 #[test]
-fn package_builds_and_installs_with_cmake_in_both_precisions() {
-    if !has("cmake") || !has("c++") {
+fn package_builds_with_ament_and_pluginlib_loads_and_drives_it() {
+    if !has_ament() {
         return;
     }
-    for precision in [Precision::Double, Precision::Single] {
+    for precision in [Precision::Single, Precision::Double] {
         let emitted = Emitted::new(&shipped("go1-d2"), precision);
+        let scratch = emitted.scratch.path();
         let package = emitted.folder().join("ros2_control");
-        let prefix = emitted.scratch.path().join("prefix");
-        let run = |arguments: &[&str]| {
-            succeed(Command::new("cmake").args(arguments).current_dir(&package));
-        };
-        let places = [
-            format!("-DCMAKE_PREFIX_PATH={}", stubs().display()),
-            format!("-DCMAKE_INSTALL_PREFIX={}", prefix.display()),
-            format!("-DCMAKE_CXX_FLAGS={}", WARNINGS.join(" ")),
+        let (built, prefix) = (scratch.join("build"), scratch.join("prefix"));
+        build(&package, &built, &prefix, &[]);
+        succeed(Command::new("cmake").arg("--install").arg(&built));
+        let index = prefix.join("share/ament_index/resource_index");
+        let listed = index.join("controller_interface__pluginlib__plugin/go1_d2_ros2_control");
+        let text = fs::read_to_string(listed).expect("installed");
+        assert_eq!(text.trim(), "share/go1_d2_ros2_control/plugin.xml");
+        // The driver has numbers in double precision.
+        if precision == Precision::Single {
+            continue;
+        }
+        let definitions = [
+            "-DNAME=go1_d2".to_owned(),
+            format!("-DPACKAGE={}", package.display()),
         ];
-        let [stubs, installed, warnings] = places.each_ref().map(String::as_str);
-        run(&["-S", ".", "-B", "build", stubs, installed, warnings]);
-        run(&["--build", "build"]);
-        run(&["--install", "build"]);
-        let description = prefix.join("share/go1_d2_ros2_control/plugin.xml");
-        let text = fs::read_to_string(description).expect("installed");
-        assert!(
-            text.contains("<library path=\"go1_d2_ros2_control\">"),
-            "{text}"
+        let driver = scratch.join("driver");
+        build(&stubs().join("loaded"), &driver, &prefix, &definitions);
+        let places = format!("{}:{}", prefix.display(), stubs().display());
+        let mut drive = Command::new(driver.join("drive"));
+        let text = Emitted::output(
+            drive
+                .arg(jump_file(scratch))
+                .env("AMENT_PREFIX_PATH", places),
         );
-        assert!(prefix.join("lib/libgo1_d2_ros2_control.so").exists());
+        println!("loaded by pluginlib: {text}");
     }
 }

@@ -78,5 +78,17 @@ int main(void)
     settings.tilt_rad = settings.clock_gap_s = (double)INFINITY;
     settings.poor_steps = 0;
     expect(settings, NULL);
+    static const char *const OFF[] = {"tilt_rad", "clock_gap_s", "poor_steps", NULL};
+    for (int i = 0; i < 4; ++i) {
+        const char *found = FN(_controller_bound_off)(&settings, i);
+        if (OFF[i] == NULL ? found != NULL : found == NULL || strcmp(found, OFF[i]) != 0) {
+            printf("off: found %s\n", found ? found : "none");
+            ++faults;
+        }
+    }
+    if (FN(_controller_bound_off)(NULL, 0) != NULL || FN(_controller_bound_off)(&settings, -1) != NULL) {
+        printf("off by default\n");
+        ++faults;
+    }
     return faults > 0;
 }

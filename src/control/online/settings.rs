@@ -180,6 +180,15 @@ impl Accepts {
         };
         is_accepted.then_some(()).ok_or(refused)
     }
+
+    /// Whether this number switches a bound of the supervisor off.
+    fn is_off(self, number: f64) -> bool {
+        match self {
+            Self::Bound => !number.is_finite(),
+            Self::Count => number == 0.0,
+            _ => false,
+        }
+    }
 }
 
 /// A setting that interfaces in C have too. In descriptions `UPPER` stands for the model's name.
@@ -345,7 +354,14 @@ macro_rules! settings {
                 vec![$($(self.$name as f64),*),*]
             }
 
-            /// The same for the controller.
+            /// Names of the bounds of the supervisor that are off.
+            pub fn off(&self) -> impl Iterator<Item = &'static str> {
+                let all = SETTINGS.iter().zip(self.numbers());
+                let off = all.filter(|(setting, number)| setting.accepts.is_off(*number));
+                off.map(|(setting, _)| setting.name)
+            }
+
+            /// Checked settings of the controller.
             pub fn to_mpc(&self) -> Result<MpcSettings, ControlError> {
                 for (setting, found) in SETTINGS.iter().zip(self.numbers()) {
                     if let Accepts::Whole(..) | Accepts::Count = setting.accepts {

@@ -162,6 +162,17 @@ impl SettingText {
         }
     }
 
+    /// The condition under which the generated C has it off, if it is a bound of the supervisor.
+    pub(in crate::deploy) fn is_off(&self) -> Option<String> {
+        let name = self.setting.name;
+        match (self.setting.accepts, self.setting.kind) {
+            (Accepts::Bound, "Real") => Some(format!("!solver_is_finite_number(chosen.{name})")),
+            (Accepts::Bound, _) => Some(format!("!is_finite_double(chosen.{name})")),
+            (Accepts::Count, _) => Some(format!("chosen.{name} == 0")),
+            _ => None,
+        }
+    }
+
     /// Whether the generated C checks it by [`Self::refused`]; other choices it checks by hand.
     pub(in crate::deploy) fn is_checked_by_table(&self) -> bool {
         !matches!(self.setting.accepts, Accepts::Whole(..))

@@ -3,11 +3,13 @@
 //! as the crate that `--emit rust` makes, a header, examples.
 
 mod control_model;
+mod joints;
 mod lock;
 
 use super::*;
 use crate::mpc::Drives;
 use control_model::{ControlModelText, SettingText};
+use joints::JointTexts;
 
 /// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
 pub(super) struct Facts<'a> {
@@ -20,7 +22,7 @@ pub(super) struct Facts<'a> {
     pub(super) state_dim: usize,
     pub(super) state_names: String,
     pub(super) input_names: String,
-    pub(super) joint_names: String,
+    pub(super) joints: JointTexts,
     pub(super) input_is: String,
     pub(super) codes: Vec<(String, i32)>,
     pub(super) texts: Vec<(i32, String)>,
@@ -57,7 +59,7 @@ impl<'a> Facts<'a> {
             state_dim: STATE_DIM,
             state_names: Robot::state_names().join(" "),
             input_names: Robot::input_names().join(" "),
-            joint_names: robot.joint_names.join(" "),
+            joints: JointTexts::new(robot),
             input_is: input_in_words(plant.input_rule(), name),
             codes: texts.iter().map(constant).collect(),
             texts,

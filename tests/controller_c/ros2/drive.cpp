@@ -23,8 +23,8 @@ using hardware_interface::Handle;
 using hardware_interface::LoanedCommandInterface;
 using hardware_interface::LoanedStateInterface;
 
-// Of the stub of pluginlib, in place of its loader.
-std::unique_ptr<ControllerInterface> stub_plugin();
+// By pluginlib, or by the stub in its place.
+std::shared_ptr<ControllerInterface> new_plugin();
 
 namespace
 {
@@ -80,14 +80,13 @@ std::vector<std::string> names(const char * prefix, int count)
 /// A plugin with the values that its interfaces are loaned of.
 struct Robot
 {
-    std::unique_ptr<ControllerInterface> plugin = stub_plugin();
+    std::shared_ptr<ControllerInterface> plugin = new_plugin();
     std::vector<Handle> commands, states;
     int64_t calls = 0;
 
     explicit Robot(const std::map<std::string, rclcpp::Value> & values = {})
     {
         auto & declared = plugin->get_node()->values;
-        declared["joints"] = names("joint", 12);
         std::vector<std::string> feet;
         for (const std::string & foot : names("foot", 4)) {
             feet.push_back(foot + "/contact");
@@ -263,6 +262,14 @@ void survive_undefined_values()
     require(robot.plugin->get_node()->last->find("not finite") != std::string::npos, "the last fallback is named");
 }
 
+/// An activation names the bounds of the supervisor that are off.
+void name_bounds_off(const std::map<std::string, rclcpp::Value> & values, const std::string & names)
+{
+    Robot robot(values);
+    require(robot.configure() == CallbackReturn::SUCCESS && robot.activate() == CallbackReturn::SUCCESS, "activation");
+    require(*robot.plugin->get_node()->last == "bounds of the supervisor that are off: " + names, names.c_str());
+}
+
 void refuse()
 {
     const auto faults = [](const char * name, const rclcpp::Value & value, const char * word) {
@@ -352,6 +359,8 @@ int main(int argc, char ** argv)
         require(consistent < 1e-6, "efforts are those of the controller in C with the consistent lift");
     }
     survive_undefined_values();
+    name_bounds_off({}, "none");
+    name_bounds_off({{"tilt_rad", HUGE_VAL}, {"poor_steps", 0.0}}, "tilt_rad poor_steps");
     refuse();
     require(argc > 1, "a jump in a file");
     load(argv[1]);

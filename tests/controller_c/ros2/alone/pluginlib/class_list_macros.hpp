@@ -3,10 +3,10 @@
 #define ROMC_STUB_PLUGINLIB
 
 #define PLUGINLIB_EXPORT_CLASS(Class, Base) \
-    std::unique_ptr<Base> stub_plugin(); \
-    std::unique_ptr<Base> stub_plugin() \
+    std::shared_ptr<Base> new_plugin(); \
+    std::shared_ptr<Base> new_plugin() \
     { \
-        return std::make_unique<Class>(); \
+        return std::make_shared<Class>(); \
     }
 
 #endif
