@@ -13,10 +13,10 @@ import numpy as np
 
 import c_controller
 from closed_loop import ROBOT, ROMC, ROOT, TRAINING, read_jump
-from followers import FIRST_SUPERVISED
+from followers import FIRST_SUPERVISED, Commanded
 from model_inputs import ModelInputs
 from perturbations import NOMINAL, perturbed_simulation
-from simulation import CONTROL_STEP_S, Push
+from simulation import Push
 
 EXAMPLE = """example:
   cargo build --release
@@ -83,34 +83,20 @@ SLOW = ("velocity of the base zero", "push of 200 N")
 HARMLESS = ("clock 0.3 s ahead", "clock 0.3 s behind", "left and right exchanged", "push of 60 N")
 
 
-class Faulty:
+class Faulty(Commanded):
     """The controller with its joint PD. From `fault_s` on its measurements are wrong."""
 
     def __init__(self, controller, fault, fault_s, rate_hz):
-        self.controller, self.fault, self.fault_s = controller, fault, fault_s
-        self.every = round(1 / (rate_hz * CONTROL_STEP_S))
-        self.steps, self.held, self.command = 0, None, None
-        self.supervised = None
+        super().__init__(controller, rate_hz)
+        self.fault, self.fault_s = fault, fault_s
+        self.held, self.supervised = None, None
         self.off_law_nm = 0.0
-
-    def torque(self, time_s, x, dx, feet):
-        """Twelve torques (N m) for a measurement."""
-        if self.steps % self.every == 0:
-            self.step(time_s, x, dx, feet)
-        self.steps += 1
-        command = self.command
-        joints, rates = np.array(command.joint_position), np.array(command.joint_velocity)
-        return (
-            np.array(command.torque)
-            + command.stiffness * (joints - x[:12])
-            + command.damping * (rates - dx[:12])
-        )
 
     def step(self, time_s, x, dx, feet):
         measured = (time_s, x, dx, feet)
         if time_s > self.fault_s - 1e-6:
             measured = self.fault(self, *measured)
-        self.command = self.controller.step(*measured)
+        super().step(*measured)
         if self.command.status >= FIRST_SUPERVISED and self.supervised is None:
             self.supervised = time_s, self.command.status
         if self.supervised and time_s > self.supervised[0] + FADED_S:

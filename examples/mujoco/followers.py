@@ -120,3 +120,32 @@ class TorquesOnly:
     def torque(self, time_s, x, dx, feet):
         """Twelve torques (N m) for a time."""
         return self.jump.torque_nm[self.jump.row_at(time_s)]
+
+
+class Commanded:
+    """The controller in C: torques of its command, and a joint PD with the command's gains, which the
+    supervisor fades."""
+
+    def __init__(self, controller, rate_hz):
+        self.controller = controller
+        self.every = round(1 / (rate_hz * CONTROL_STEP_S))
+        self.steps, self.command = 0, None
+        self.statuses = {}
+
+    def torque(self, time_s, x, dx, feet):
+        """Twelve torques (N m) for a measurement."""
+        if self.steps % self.every == 0:
+            self.step(time_s, x, dx, feet)
+        self.steps += 1
+        command = self.command
+        joints, rates = np.array(command.joint_position), np.array(command.joint_velocity)
+        return (
+            np.array(command.torque)
+            + command.stiffness * (joints - x[:12])
+            + command.damping * (rates - dx[:12])
+        )
+
+    def step(self, time_s, x, dx, feet):
+        """A new command for a measurement."""
+        self.command = self.controller.step(time_s, x, dx, feet)
+        self.statuses[self.command.status] = self.statuses.get(self.command.status, 0) + 1

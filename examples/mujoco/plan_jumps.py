@@ -9,7 +9,7 @@ import pathlib
 import subprocess
 import sys
 import tomllib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -255,11 +255,6 @@ def run(task):
     """One run; returns its Outcome."""
     arguments, models, inputs, crate, name, method, goal, condition = task
     reference, answer = reference_of(arguments, models, method.source, goal)
-    wanted = recorded().regression(goal, read_jump(start_of(goal)).x[0, 14])
-    target = assess(ROBOT, wanted.time_s, wanted.x, wanted.dx, wanted.torque_nm, wanted.feet)
-    target = type(target)(
-        **{**vars(target), "distance_m": goal.distance_m, "apex_rise_m": goal.apex_m}
-    )
     outcome = Outcome(
         name, condition.name, goal.name, goal.name.startswith("in"), False, "no plan",
         goal.distance_m, goal.apex_m, np.nan, np.nan, np.nan, np.nan,
@@ -288,13 +283,10 @@ def run(task):
     log = simulation.run(motors, reference.time_s[-1])
     if controller:
         controller.close()
-    times = np.arange(len(log.x)) * CONTROL_STEP_S
-    repeated = assess(ROBOT, times, log.x, log.dx, log.torque_nm, log.feet())
-    forwards = float(log.x[-1, 12] - log.x[0, 12])
-    repeated = type(repeated)(**{**vars(repeated), "distance_m": forwards})
-    faults = repetition_faults(target, repeated, log.other_contact.any())
+    repeated = figures_of(log)
+    faults = repetition_faults(target_of(goal), repeated, log.other_contact.any())
     outcome.success, outcome.faults = not faults, "; ".join(faults)
-    outcome.distance_error_m = forwards - goal.distance_m
+    outcome.distance_error_m = repeated.distance_m - goal.distance_m
     outcome.apex_error_m = repeated.apex_rise_m - goal.apex_m
     landed = min(in_flight[-1], len(log.x) - 1)
     outcome.pitch_error_rad = float(log.x[landed, 16] - reference.x[in_flight[-1], 16])
@@ -305,6 +297,20 @@ def run(task):
         path = arguments.out_dir / f"{goal.name}.png"
         write_strip(path, reference, log.x, in_flight[0] - margin, in_flight[-1] + margin)
     return outcome
+
+
+def target_of(goal):
+    """Figures of the jump that a goal wants."""
+    wanted = recorded().regression(goal, read_jump(start_of(goal)).x[0, 14])
+    target = assess(ROBOT, wanted.time_s, wanted.x, wanted.dx, wanted.torque_nm, wanted.feet)
+    return replace(target, distance_m=goal.distance_m, apex_rise_m=goal.apex_m)
+
+
+def figures_of(log):
+    """Figures of a run; its distance is that forwards."""
+    times = np.arange(len(log.x)) * CONTROL_STEP_S
+    figures = assess(ROBOT, times, log.x, log.dx, log.torque_nm, log.feet())
+    return replace(figures, distance_m=float(log.x[-1, 12] - log.x[0, 12]))
 
 
 def made_controller(crate, settings):
