@@ -33,6 +33,7 @@ int main(void)
     settings.effectiveness_time_s = 1.0;
     settings.drive_stiffness_nm_rad = 20.0;
     settings.drive_damping_nm_s_rad = 0.8;
+    go1_d2_controller_bound_off(Frama_C_interval(0, 1) ? &settings : 0, Frama_C_interval(-2147483647, 2147483647));
     if (go1_d2_machine_init(&machine, &settings, 0) != 0
         || go1_d2_controller_set_reference(&machine.controller, COUNT, time_s, x, dx, u, feet) != 0) {
         return 1;
