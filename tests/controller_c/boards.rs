@@ -75,7 +75,7 @@ fn cap_for_a_time_holds_on_a_cortex_m7_and_grows_with_the_time() {
     };
     let (text, has_cap) = budget(100.0);
     assert!(!has_cap && text.matches("no iteration fits").count() == 2);
-    let caps = [600.0, 1200.0].map(|most| {
+    let caps = [1000.0, 2000.0].map(|most| {
         let (text, has_cap) = budget(most);
         assert!(has_cap);
         let lines: Vec<Vec<f64>> = (text.lines())
