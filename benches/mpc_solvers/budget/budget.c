@@ -1,6 +1,6 @@
 /* Steps of a generated controller, counted: for each of them a line of how it was called (prepared, lift), its status, its
  * iterations, instructions and bytes of stack. `run.py` compiles it with a controller in which `is_endless` takes the solver's
- * tolerance away, so that every tenth step runs into the cap. On an emulated processor whose clock is the count of its
+ * tolerance away, so that an extra first step and every twentieth run into the cap. On an emulated processor whose clock is the count of its
  * instructions the program reads that clock; elsewhere callgrind counts calls of `counted`. */
 #include HEADER
 #include JUMP
@@ -12,7 +12,6 @@
 #define PASTE(a, b) PASTE_(a, b)
 #define FN(suffix) PASTE(NAME, suffix)
 #define COUNT (int)(sizeof JUMP_TIME_S / sizeof JUMP_TIME_S[0])
-#define STEPS 60
 #define PAINTED 32768
 
 int is_endless;
@@ -92,14 +91,16 @@ static int run(int is_prepared, int lift)
     settings.lift = lift;
     /* The supervisor compares, and lets pushes and misses pass. */
     settings.poor_steps = 0;
+    settings.contact_mismatch_steps = 1000000;
     settings.tilt_rad = 3;
-    settings.distance_m = settings.posture_rad = settings.velocity_mismatch = 1000;
+    settings.joint_margin_rad = settings.distance_m = settings.posture_rad = settings.velocity_mismatch = 1000;
     if (FN(_controller_init)(&controller, &settings) != 0
         || FN(_controller_set_reference_torque)(&controller, COUNT, JUMP_TIME_S, JUMP_X[0], JUMP_DX[0], JUMP_TORQUE[0],
                                                 JUMP_FEET[0]) != 0) {
         return 1;
     }
-    for (int k = 0; k < STEPS && k < COUNT; ++k) {
+    for (int step = -1; step < COUNT; ++step) {
+        const int k = step < 0 ? 0 : step;
         const REAL push = (REAL)(k / 8 % 5 - 2);
         REAL x[18], dx[18];
         memcpy(x, JUMP_X[k], sizeof x);
@@ -110,7 +111,7 @@ static int run(int is_prepared, int lift)
         if (is_prepared) {
             FN(_controller_prepare)(&controller, JUMP_TIME_S[k]);
         }
-        is_endless = lift == 0 && k % 10 == 9;
+        is_endless = lift == 0 && (step < 0 || k % 20 == 9);
         stack(1);
         const unsigned from = now();
         counted(k, x, dx);
@@ -121,12 +122,16 @@ static int run(int is_prepared, int lift)
         put_number(command.iterations, ' ');
         put_number(took, ' ');
         put_number(stack(0), '\n');
+        if (step < 0) {
+            FN(_controller_reset)(&controller);
+        }
     }
     return 0;
 }
 
 int main(void)
 {
-    put_number((long)sizeof controller, '\n');
+    put_number((long)sizeof controller, ' ');
+    put_number(COUNT + 1, '\n');
     return run(0, 0) || run(1, 0) || run(0, 1);
 }
