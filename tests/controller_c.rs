@@ -132,8 +132,11 @@ enum Rates {
     FreeAndWatched,
 }
 
-/// Kinds of faults that measurements of a supervised run have from some time on, the last of them none.
-const FAULTS: usize = 13;
+/// Kinds of faults of the measurements of a supervised run, the last of them none.
+const FAULTS: usize = 14;
+/// Samples from the beginning of one fault to that of the next, and for how many each lasts.
+const FAULT_EVERY: usize = 150;
+const FAULT_LASTS: usize = 50;
 
 /// Steps of random measurements along random variations of recorded jumps, with what the library
 /// commands, as `replay.c` reads them; how many latent inputs the estimate of the share that
@@ -154,16 +157,15 @@ fn replay_file(
         .phases()
         .iter()
         .all(|phase| phase.given_state.is_some());
+    let recordings = [1, 2, 3].map(|number| {
+        let path = format!("examples/recordings/go1/test_0{number}.csv.gz");
+        romc::recording::read(&root().join(path)).expect("a sound recording")
+    });
     for run in 0.. {
         if done >= steps {
             break;
         }
-        let path = root().join(format!(
-            "examples/recordings/go1/test_0{}.csv.gz",
-            1 + run % 3
-        ));
-        let recording = romc::recording::read(&path).expect("a sound recording");
-        let segment = &recording.segments[0];
+        let segment = &recordings[run % 3].segments[0];
         let input = segment.input(&rule).expect("inputs");
         let vary = |values: &[f64], scale: f64, random: &mut Random| -> Vec<f64> {
             let factor = 1.0 + scale * random.signed();
@@ -263,17 +265,23 @@ fn replay_file(
             push(&mut bytes, reference.u.unwrap_or_default());
             let feet = reference.feet.iter().flatten();
             bytes.extend(feet.map(|down| u8::from(*down)));
-            let (fault, from) = (run % FAULTS, first + (20 * run + 40) % 200);
+            let from = first + (20 * run + 40) % 200;
+            let mut is_latched = false;
             for &sample in &samples {
-                let fault = (is_watched && sample >= from).then_some(fault);
-                changed += usize::from(one_step(
+                let since = sample.checked_sub(from).filter(|_| is_watched);
+                let fault = since
+                    .filter(|since| since % FAULT_EVERY < FAULT_LASTS)
+                    .map(|since| (run + since / FAULT_EVERY) % FAULTS);
+                let (is_changed, status) = one_step(
                     [&mut controller, &mut trusting],
                     segment,
-                    (sample, fault),
+                    (sample, fault, is_latched),
                     roughness,
                     &mut random,
                     (&mut bytes, &mut lifts),
-                ));
+                );
+                changed += usize::from(is_changed);
+                is_latched = status.code() >= Status::Tilt.code();
             }
         }
         done += segment.len() / 5;
@@ -281,15 +289,15 @@ fn replay_file(
     (bytes, changed, lifts)
 }
 
-/// Whether both controllers command different latent inputs.
+/// Whether both controllers command different latent inputs, and the status. A latched fault is reset soon.
 fn one_step(
     [controller, trusting]: [&mut Controller; 2],
     segment: &romc::recording::Segment,
-    (sample, fault): (usize, Option<usize>),
+    (sample, fault, is_latched): (usize, Option<usize>, bool),
     roughness: f64,
     random: &mut Random,
     (bytes, lifts): (&mut Vec<u8>, &mut [usize; 2]),
-) -> bool {
+) -> (bool, Status) {
     let mut x: [f64; 18] = std::array::from_fn(|i| segment.x[(i, sample)]);
     let mut dx: [f64; 18] = std::array::from_fn(|i| segment.dx[(i, sample)]);
     for i in 0..18 {
@@ -320,9 +328,10 @@ fn one_step(
         Some(9) => feet = feet.map(|down| !down),
         Some(10) => x[4] += 0.7,
         Some(11) => feet = [true, false, false, false],
+        Some(12) => dx[sample % 18] = [1e30, -1e300, 2e6][sample % 3],
         _ => {}
     }
-    let resets = random.signed() > 0.97;
+    let resets = random.signed() > if is_latched { 0.6 } else { 0.97 };
     if resets {
         controller.reset();
         trusting.reset();
@@ -342,7 +351,8 @@ fn one_step(
         feet,
     };
     let command = controller.step(measurement);
-    let is_changed = trusting.step(measurement).u_lat != command.u_lat;
+    let is_changed = controller.settings().effectiveness.is_some()
+        && trusting.step(measurement).u_lat != command.u_lat;
     lifts[0] += usize::from(is_limited(controller, &measurement, &command));
     lifts[1] += usize::from(command.status == Status::LiftFailed);
     push(bytes, &[time_s]);
@@ -363,7 +373,7 @@ fn one_step(
             i64::from(command.iterations),
         ],
     );
-    is_changed
+    (is_changed, command.status)
 }
 
 /// Whether the consistent lift of a step needed iterations: a torque limit or a friction pyramid is active.
@@ -455,14 +465,17 @@ fn supervisor_in_c_repeats_the_library_bit_for_bit_under_faults() {
     let output = succeed(Command::new(program).arg(&file));
     let text = String::from_utf8_lossy(&output.stdout);
     println!("{text}");
-    let kinds = text.trim().rsplit(", ").next().expect("a count");
-    let kinds: usize = kinds
-        .split(' ')
-        .next()
-        .expect("a number")
-        .parse()
-        .expect("a count");
+    let counts: Vec<usize> = (text.split(|letter: char| !letter.is_ascii_digit()))
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    let [done, _, _, _, _, _, plans, doubted, damped, kinds] = counts[..] else {
+        panic!("other counts: {text}");
+    };
     assert!(kinds >= 10, "few kinds of faults: {text}");
+    assert!(
+        3 * plans > done && 5 * damped > done && 50 * doubted > done,
+        "one-sided steps: {text}"
+    );
 }
 
 #[test]

@@ -159,7 +159,11 @@ int main(int argc, char **argv)
     }
     lie_down(&r);
     measure(&r, x, dx, feet);
-    printf("No software replaces an emergency stop that cuts the power of the motors.\n\n time s  x m     height m  mode      status\n");
+    printf("No software replaces an emergency stop that cuts the power of the motors.\nbounds that are off:");
+    for (int i = 0; ROMC(controller_bound_off)(&machine.controller.settings, i) != NULL; ++i) {
+        printf(" %s", ROMC(controller_bound_off)(&machine.controller.settings, i));
+    }
+    printf("%s\n\n time s  x m     height m  mode      status\n", ROMC(controller_bound_off)(&machine.controller.settings, 0) == NULL ? " none" : "");
     double highest = 0, from = 0, to = 0;
     int mode = -1, has_jumped = 0, stands = 0;
     ROMC(machine_stand)(&machine, 0, x);

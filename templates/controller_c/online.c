@@ -36,6 +36,9 @@
 
 #define ONLINE_LARGEST (real)1.3
 
+/* Largest number of a measurement, SI: beyond it none is real, and a solver would iterate in vain. */
+#define ONLINE_LARGEST_MEASURED (real)1e6
+
 /* Largest weight of a step, in first steps. */
 #define ONLINE_LARGEST_WEIGHT (real)2.0
 
@@ -1103,12 +1106,15 @@ static inline MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_
     }
 }
 
-/* Takes the joint velocities of a measurement, if all its numbers are finite; whether they are. */
+/* Takes the joint velocities of a measurement, if no number of it is undefined or absurd; whether none is. */
 static inline MAYBE_UNUSED bool online_memory_accepts(online_memory *restrict self, double time_s, const real *x,
         const real *dx)
 {
-    const bool is_finite = online_first_undefined(x, 18) + online_first_undefined(dx, 18) == 36;
-    const bool is_accepted = is_finite && is_finite_double(time_s);
+    bool is_accepted = is_finite_double(time_s);
+    for (int i = 0; i < 18; ++i) {
+        is_accepted = is_accepted && solver_magnitude(x[i]) <= ONLINE_LARGEST_MEASURED
+                && solver_magnitude(dx[i]) <= ONLINE_LARGEST_MEASURED;
+    }
     for (int i = 0; i < 12; ++i) {
         self->joint_velocity[i] = is_accepted ? dx[i] : 0;
     }

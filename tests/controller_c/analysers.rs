@@ -93,7 +93,12 @@ fn self_tests_pass_without_the_consistent_lift() {
 fn analysers_find_nothing() {
     let emitted = Emitted::new(&shipped("go1-d2"), Precision::Double);
     let name = &emitted.name;
-    let sources = ["_controller.c", "_example.c", "_controller_selftest.c"];
+    let sources = [
+        "_controller.c",
+        "_example.c",
+        "_budget.c",
+        "_controller_selftest.c",
+    ];
     let sources = sources.map(|end| format!("{name}{end}"));
     if has("clang-tidy") {
         // Vectors of one length follow each other; indices are small (stages by rows); a solver without links, or without

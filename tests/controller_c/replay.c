@@ -1,5 +1,6 @@
 /* Replays steps from a file through a generated controller and compares every command with the file's, bit for bit.
- * usage: replay FILE; prints steps, differing ones, the most iterations and torques beyond their limits. Native byte order:
+ * usage: replay FILE; prints steps, differing ones, the most iterations, torques beyond their limits, and how many steps had
+ * a plan, a refused measurement, a latched fault. Native byte order:
  * runs until the end of the file, each of
  *   int64 samples, steps, has_u, is_next, lift, linearisation, after_end; double body_friction, effectiveness_time_s, stiffness and
  *   damping of the drives, foot_friction, lift_prior_weight, torque_rate_nm_s, swing_turn, flight_torque, is_watched;
@@ -48,6 +49,7 @@ int main(int argc, char **argv)
     static const double LIMITS[3] = {23.7, 23.7, 35.55};
     static FN(_controller) controller;
     long steps = 0, different = 0, iterations = 0, beyond = 0, active = 0, fallbacks = 0, kinds = 0;
+    long plans = 0, doubted = 0, damped = 0;
     unsigned long seen = 0;
     int64_t head[7];
     input = argc > 1 ? fopen(argv[1], "rb") : NULL;
@@ -118,6 +120,9 @@ int main(int argc, char **argv)
             different += !same;
             ++steps;
             active += command.iterations > 0;
+            plans += command.status >= 0 && command.status < 10;
+            doubted += command.status == PASTE(UPPER, _MEASUREMENT_JUMP);
+            damped += command.status >= 20;
             if (command.status >= 20) {
                 seen |= 1ul << (command.status - 20);
             }
@@ -137,8 +142,9 @@ int main(int argc, char **argv)
     for (; seen > 0; seen &= seen - 1) {
         ++kinds;
     }
-    printf("%ld steps, %ld different, %ld with iterations, at most %ld, %ld fallbacks, %ld torques beyond their limit, "
-           "%ld kinds of faults\n", steps, different, active, iterations, fallbacks, beyond, kinds);
+    printf("%ld steps, %ld different, %ld with iterations, at most %ld, %ld fallbacks, %ld torques beyond their limit; "
+           "%ld plans, %ld refused, %ld damped, %ld kinds of faults\n", steps, different, active, iterations, fallbacks, beyond,
+           plans, doubted, damped, kinds);
     fclose(input);
     return different > 0 || beyond > 0 || steps == 0;
 }

@@ -420,6 +420,29 @@ fn posture_outside_the_joint_limits_softens_the_plan() {
 }
 
 #[test]
+fn absurd_numbers_of_a_measurement_end_before_the_solver() {
+    for bounds in [unwatched().bounds, MpcSettings::default().bounds] {
+        for (value, place) in [1e30, -1e300, 2e6, f64::MAX]
+            .into_iter()
+            .flat_map(|value| (0..36).map(move |place| (value, place)))
+        {
+            let mut bench = Bench::new(MpcSettings {
+                bounds,
+                ..unwatched()
+            });
+            for sample in [100, 105, 110, 115] {
+                let command = bench.changed(sample, |x, dx| match place {
+                    0..18 => x[place] = value,
+                    _ => dx[place - 18] = value,
+                });
+                let found = (command.status, command.iterations);
+                assert_eq!(found, (Status::NotFinite, 0), "{value} at {place}");
+            }
+        }
+    }
+}
+
+#[test]
 fn huge_reference_never_leaves_the_limits_and_a_sane_one_is_followed_again() {
     for size in [1e3, 1e9, 1e30, 1e160] {
         let mut bench = Bench::new(unwatched());

@@ -152,7 +152,7 @@ const FAULTS: &[(&str, Change, &[Status])] = &[
     (
         "huge",
         |seen, _, _| seen.dx[14] = 1e200,
-        &[Status::VelocityMismatch, Status::PoorSteps],
+        &[Status::PoorSteps],
     ),
 ];
 
@@ -197,7 +197,7 @@ fn each_fault_ends_in_its_status_and_in_damping_until_a_reset() {
                     command.drives
                 );
                 for joint in 0..12 {
-                    let damped = match seen.x.iter().chain(&seen.dx).all(|v| v.is_finite()) {
+                    let damped = match seen.x.iter().chain(&seen.dx).all(|v| v.abs() <= 1e6) {
                         true if status != Status::Frozen => -seen.dx[joint],
                         _ => 0.0,
                     };

@@ -9,6 +9,9 @@ use super::settings::{AfterEnd, Drives, FallbackSettings};
 use super::supervisor::Fault;
 use crate::robot::JOINT_DIM;
 
+/// Largest number of a measurement, SI: beyond it none is real, and a solver would iterate in vain.
+const LARGEST_MEASURED: Real = 1e6;
+
 /// Makes [`Status`] of a table: code, word, and text that begins with the word.
 macro_rules! statuses {
     ($($name:ident = $code:literal, $word:literal, $text:literal;)*) => {
@@ -82,7 +85,7 @@ statuses! {
         "contact mismatch: heights of feet or the fall contradict the contacts; damping until reset";
     PoorSteps = 34, "poor_steps", "poor steps: too many steps without a good plan; damping until reset";
     NotFinite = -1, "not_finite",
-        "not finite: a number is infinite or not a number; fallback";
+        "not finite: a number is infinite, not a number or beyond 1e6; fallback";
     WrongDimension = -2, "wrong_dimension",
         "wrong dimension: the wrong number of values or too few samples; fallback";
     NoReference = -3, "no_reference", "no reference: none has been set; fallback";
@@ -220,10 +223,13 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// Takes the joint velocities of a measurement, if all its numbers are finite; whether they are.
+    /// Takes the joint velocities of a measurement, if no number of it is undefined or absurd; whether none is.
     pub(super) fn accepts(&mut self, time_s: f64, x: &[Real], dx: &[Real]) -> bool {
-        let is_finite = first_undefined(x, 18) + first_undefined(dx, 18) == 36;
-        let is_accepted = is_finite && time_s.is_finite();
+        let mut is_accepted = time_s.is_finite();
+        for i in 0..18 {
+            is_accepted =
+                is_accepted && x[i].abs() <= LARGEST_MEASURED && dx[i].abs() <= LARGEST_MEASURED;
+        }
         for i in 0..12 {
             self.joint_velocity[i] = if is_accepted { dx[i] } else { 0.0 };
         }

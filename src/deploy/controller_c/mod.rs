@@ -44,6 +44,7 @@ templates! {
     "NAME_robot.h": RobotHeader "controller_c/robot.askama",
     "NAME_log.h": LogHeader "controller_c/log.askama",
     "NAME_example.c": Example "controller_c/example.askama",
+    "NAME_budget.c": Budget "controller_c/budget.askama",
     "CMakeLists.txt": Cmake "controller_c/cmake.askama",
     "README.md": Readme "controller_c/readme.askama",
 }

@@ -9,7 +9,7 @@ use crate::mpc::{
 /// Most steps of each run of the self-test: the shipped jump to its end, where the horizon is at rest.
 const STEPS: usize = 200;
 /// How far measurements are pushed off the jump, times -2 to 2: height (m), pitch (rad), vertical velocity (m/s).
-const PUSH: [f64; 3] = [0.05, 0.15, 0.9];
+pub(super) const PUSH: [f64; 3] = [0.05, 0.15, 0.9];
 /// Largest difference of a torque, N m, by precision.
 const TOLERANCE_NM: [f64; 2] = [1e-6, 0.1];
 /// Steps of a run that may have another status, by precision: single precision moves a plan's residuals past bounds.

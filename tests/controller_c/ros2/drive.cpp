@@ -92,6 +92,7 @@ struct Robot
             feet.push_back(foot + "/contact");
         }
         declared["feet"] = feet;
+        declared["start"] = std::string("jump");
         for (const auto & [name, value] : values) {
             declared[name] = value;
         }
@@ -225,6 +226,31 @@ double follow_jump(double effectiveness_time_s, double flight_torque, const std:
     return worst;
 }
 
+/// A robot whose joints go where they are sent stands up, jumps along the recorded jump, and stands again.
+void stand_jump_stand()
+{
+    Robot robot({{"start", std::string("stand")}, {"stand_s", 0.5}, {"settle_s", 0.1}});
+    require(robot.configure() == CallbackReturn::SUCCESS && robot.activate() == CallbackReturn::SUCCESS, "activation");
+    // Ready after 0.6 s and a step; then along the jump, at rest after its end, and back to its first posture in 0.5 s.
+    constexpr std::size_t READY = 61, REST = 80, BACK = READY + COUNT + 12;
+    for (std::size_t k = 0; k < READY + COUNT + REST; ++k) {
+        robot.measure(k < READY ? 0 : k < READY + COUNT ? k - READY : COUNT - 1);
+        for (std::size_t i = 0; i < 37 && (k < READY || k >= READY + COUNT); ++i) {
+            const bool is_velocity = i < 24 ? i % 2 == 1 : i >= 28 && (i < 31 || i >= 34);
+            robot.states[i].value = is_velocity ? 0.0 : robot.states[i].value;
+        }
+        const double passed = k < BACK ? 0 : std::fmin(static_cast<double>(k - BACK) / 50, 1), share = passed * passed * (3 - 2 * passed);
+        for (std::size_t i = 0; i < 12 && k >= BACK; ++i) {
+            robot.states[2 * i].value += share * (JUMP_X[0][i] - JUMP_X[COUNT - 1][i]);
+        }
+        for (int call = 0; call < CALLS; ++call) {
+            require(robot.update() == return_type::OK, "update while the robot stands or jumps");
+        }
+    }
+    const auto [steps, fallbacks] = robot.deactivate();
+    require(steps == static_cast<long>(READY + COUNT + REST) && fallbacks == 0, "stands, jumps and stands without a fallback");
+}
+
 void survive_undefined_values()
 {
     Robot robot({{"max_fallbacks", int64_t{6}}});
@@ -286,6 +312,8 @@ void refuse()
     faults("flight_torque", 1.5, "flight_torque");
     faults("stiffness", -2.0, "stiffness");
     faults("torque_rate_nm_s", PASTE(UPPER, _TORQUE_RATES) ? -1.0 : 100.0, "torque_rate_nm_s");
+    faults("start", std::string("now"), "start: stand or jump, not `now`");
+    faults("stand_s", 0.0, "stand_s and settle_s: positive");
     faults("lift", std::string("Consistent"), "lift: plain or consistent, not `Consistent`");
     if (!PASTE(UPPER, _CONSISTENT_LIFT)) {
         faults("lift", std::string("consistent"), "lift: plain alone");
@@ -358,6 +386,7 @@ int main(int argc, char ** argv)
         std::printf("efforts of the consistent lift within %.1e N m\n", consistent);
         require(consistent < 1e-6, "efforts are those of the controller in C with the consistent lift");
     }
+    stand_jump_stand();
     survive_undefined_values();
     name_bounds_off({}, "none");
     name_bounds_off({{"tilt_rad", HUGE_VAL}, {"poor_steps", 0.0}}, "tilt_rad poor_steps");
