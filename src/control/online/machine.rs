@@ -111,9 +111,9 @@ impl Machine {
     /// Computes the command for a measurement in the robot's world, on its clock.
     pub fn step_into(&mut self, measurement: Measurement<'_>, command: &mut Command) {
         let is_whole = measurement.x.len() == STATE_DIM && measurement.dx.len() == STATE_DIM;
-        let Measurement { time_s, x, .. } = measurement;
-        let is_finite = time_s.is_finite() && x.iter().all(|value| value.is_finite());
-        if self.routine.is_asked && is_whole && is_finite {
+        let Measurement { time_s, x, dx, .. } = measurement;
+        let starts = self.routine.is_asked && is_whole;
+        if starts && self.controller.memory.accepts(time_s, x, dx) {
             let start = self.start().expect("a jump was accepted");
             let start_s = self.controller.reference().expect("it has one").start_s();
             self.routine.leap(time_s, start_s, x, &start);

@@ -15,6 +15,7 @@
     clippy::too_many_arguments,
     clippy::unnecessary_cast
 )]
+mod choices;
 mod command;
 mod conic;
 mod control_model;

@@ -1,0 +1,70 @@
+//! What the controller does in one of several ways, as [`MpcSettings`](super::MpcSettings) choose.
+
+/// How a latent input becomes joint torques, each way with its number for interfaces without enumerations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Lift {
+    /// The paper's `u = W_eᵀ u_lat`: its leading entries are the torques, which need not produce its body force.
+    Transpose = 0,
+    /// The torques whose own ground reaction forces come closest to the latent input, within torque limits and the
+    /// friction cones of the feet in contact; see [`ConsistentLift`](super::ConsistentLift).
+    Consistent = 1,
+}
+
+/// About what trajectory the dynamics are linearised, numbered as [`Lift`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Linearisation {
+    /// The reference: each stage is linearised once and reused while the horizon passes over it.
+    Reference = 0,
+    /// The last plan, shifted by one stage (real-time iteration).
+    LastPlan = 1,
+}
+
+/// What stands for the dynamics of the reference itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Drift {
+    /// The reference's own finite differences if it has an input, its own or an estimate, otherwise the model.
+    Automatic,
+    /// The reference's own finite differences: the model is trusted for deviations only.
+    Reference,
+    /// The model.
+    Model,
+}
+
+/// What stands for the input of a reference that comes without one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum MissingInput {
+    /// What the model finds behind the reference's accelerations, see `estimate`.
+    Estimate,
+    /// The mean training input of each phase: the optimisation has to find the rest.
+    Mean,
+}
+
+/// Which constraint rows a stage carries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum RowSelection {
+    /// Those that can become active, see [`StageRows::new`](super::problem::StageRows::new).
+    Needed,
+    /// All of them.
+    All,
+}
+
+/// What solves the quadratic program of a step, numbered as [`Lift`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Solver {
+    /// clarabel, for all rows and cones.
+    Clarabel = 0,
+    /// The structured [`solver`](crate::solver), for at most [`MAX_STRUCTURED_DIM`](super::structured::MAX_STRUCTURED_DIM) latent
+    /// coordinates and with friction pyramids inside the cones.
+    Riccati = 1,
+}
+
+/// What follows when the time of the reference is over, numbered as [`Lift`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum AfterEnd {
+    /// The last sample is held.
+    Hold = 0,
+    /// Torques fade into joint damping.
+    Damp = 1,
+    /// Torques and gains fade to zero.
+    Stop = 2,
+}
