@@ -352,7 +352,9 @@ fn generated_controllers_command_the_librarys_bits_and_survive_abuse() {
 /// The Python example on the shared library; told and skipped without a Python, unless required.
 fn run_python(built: &Built) {
     let script = format!(
-        "import {0}_controller as c; c.Controller.__init__.__defaults__ = (None, {1:?}); import example; example.main()",
+        "import {0}_controller as c; s = c.Library({1:?}).default_settings(); assert s.off() == []; \
+         s.tilt_rad, s.poor_steps = float('inf'), 0; assert s.off() == ['tilt_rad', 'poor_steps']; \
+         assert len(c.JOINT_NAMES) == 12; c.Controller.__init__.__defaults__ = (None, {1:?}); import example; example.main()",
         built.name,
         built.library("so")
     );
@@ -365,4 +367,13 @@ fn run_python(built: &Built) {
             .current_dir(built.folder.join("python")),
     );
     assert!(String::from_utf8_lossy(&output.stdout).contains("N m"));
+}
+
+#[test]
+fn bounds_that_are_off_are_listed() {
+    let mut settings = romc::mpc::interface::Settings::default();
+    assert_eq!(settings.off().count(), 0);
+    (settings.tilt_rad, settings.poor_steps) = (f64::INFINITY, 0);
+    let off: Vec<&str> = settings.off().collect();
+    assert_eq!(off, ["tilt_rad", "poor_steps"]);
 }
