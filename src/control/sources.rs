@@ -13,9 +13,9 @@ macro_rules! sources {
 /// Path below this crate, which is that below `src` of a generated one, and text of each file.
 pub const SOURCES: &[(&str, &str)] = sources! {
     "online":
-        choices command conic control_model controller dense effectiveness error estimate
-        horizon interface lift linearise machine mod plan problem qp reference routine settings
-        stage step structured supervisor trajectory;
+        choices command conic control_model controller dense effectiveness error estimate horizon
+        interface lift linearise machine mod plan problem qp reference routine settings stage step
+        structured supervisor trajectory;
     "solver":
         interior links lower mod point problem riccati rows scalar solve;
 };
