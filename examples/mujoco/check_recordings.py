@@ -8,8 +8,12 @@ import tempfile
 import numpy as np
 
 from assessment import assess, longest_flight, table
+from gait_assessment import assess_walk, step_faults, walk_table
+from gait_sets import GAIT_SETS, walks_of
 from jump_sets import SETS, jumps_of
 from kinematics_check import kinematics_report
+from record_gaits import DURATION_S as WALK_S
+from record_gaits import write_gait_set
 from record_jumps import MIN_FLIGHT_S, RECORDINGS, write_set
 from recording_format import read_recording, states_of
 from robot_model import RobotModel
@@ -19,7 +23,7 @@ from simulation import CONTROL_STEP_S
 EXAMPLE = """example:
   python check_recordings.py              figures and checks of ../recordings
   python check_recordings.py --reproduce  also records all sets again and compares bytes"""
-MAX_TOTAL_BYTES = 5_500_000
+MAX_TOTAL_BYTES = 12_500_000
 DURATION_S = (0.8, 1.6)
 # Two sets of one robot; the README of the second says how they differ.
 COMPARED = ("go1", "go1-other")
@@ -36,14 +40,19 @@ def main():
     arguments = parser.parse_args()
 
     faults = []
-    for name, jump_set in SETS.items():
+    for name, one_set in [*SETS.items(), *GAIT_SETS.items()]:
         folder = arguments.recordings / name
-        found, rows = check_set(folder, jump_set)
+        if name in SETS:
+            found, rows = check_set(folder, one_set)
+            text = table(rows)
+        else:
+            found, rows = check_gait_set(folder, one_set)
+            text = walk_table(rows)
         faults += found
         readme = folder / "README.md"
-        if not readme.exists() or table(rows) not in readme.read_text(encoding="utf-8"):
-            faults.append(f"{name}/README.md does not hold the table of its jumps")
-        print(f"\n{name} ({jump_set.robot}, seed {jump_set.seed})\n\n{table(rows)}")
+        if not readme.exists() or text not in readme.read_text(encoding="utf-8"):
+            faults.append(f"{name}/README.md does not hold the table of its recordings")
+        print(f"\n{name} ({one_set.robot}, seed {one_set.seed})\n\n{text}")
     if not any(fault.endswith("is missing") for fault in faults):
         text = comparison(arguments.recordings, {name: SETS[name] for name in COMPARED})
         readme = arguments.recordings / COMPARED[-1] / "README.md"
@@ -68,17 +77,11 @@ def main():
 
 
 def check_set(folder, jump_set):
-    """(faults, table rows) of one folder."""
-    expected = {f"{jump.stem}.csv.gz" for jump in jumps_of(jump_set)}
-    present = {path.name for path in folder.glob("*.csv.gz")}
-    faults = [f"{folder.name}/{name} is missing" for name in sorted(expected - present)]
-    faults += [f"{folder.name}/{name} is of no set" for name in sorted(present - expected)]
+    """(faults, table rows) of one folder of jumps."""
     robot = RobotModel(jump_set.robot)
     rows = []
-    for jump in jumps_of(jump_set):
-        path = folder / f"{jump.stem}.csv.gz"
-        if path.name not in present:
-            continue
+    faults, jumps = present_of(folder, jumps_of(jump_set))
+    for jump, path in jumps:
         columns = read_recording(path)
         states = states_of(columns)
         found = recording_faults(columns["Time"], states, robot, jump_set)
@@ -86,6 +89,35 @@ def check_set(folder, jump_set):
         x, dx, _, torque, feet = states
         rows.append((jump.stem, assess(jump_set.robot, columns["Time"], x, dx, torque, feet)))
     return faults, rows
+
+
+def check_gait_set(folder, gait_set):
+    """(faults, table rows) of one folder of walks."""
+    rows = []
+    faults, walks = present_of(folder, walks_of(gait_set))
+    for walk, path in walks:
+        robot = RobotModel(gait_set.robot, walk.floor)
+        columns = read_recording(path)
+        time_s = columns["Time"]
+        x, dx, ddx, torque, feet = states_of(columns)
+        whole = assess_walk(robot, walk, time_s, x, dx, torque, feet)
+        found = format_faults(time_s, x, dx, ddx) + joint_limit_faults(x, robot, 0.0)
+        found += step_faults(robot, x, dx, torque) + whole.faults(walk, gait_set.tracks)
+        if abs(whole.duration_s - WALK_S) > 1e-9:
+            found.append(f"lasts {whole.duration_s:.3f} s")
+        faults += [f"{folder.name}/{path.name}: {fault}" for fault in found]
+        rows.append((walk, whole))
+    return faults, rows
+
+
+def present_of(folder, recordings):
+    """Faults for files that are missing or of no set; (recording, path) of those present."""
+    paths = {recording.stem: folder / f"{recording.stem}.csv.gz" for recording in recordings}
+    expected = {path.name for path in paths.values()}
+    present = {path.name for path in folder.glob("*.csv.gz")}
+    faults = [f"{folder.name}/{name} is missing" for name in sorted(expected - present)]
+    faults += [f"{folder.name}/{name} is of no set" for name in sorted(present - expected)]
+    return faults, [(r, paths[r.stem]) for r in recordings if paths[r.stem].name in present]
 
 
 def recording_faults(time_s, states, robot, jump_set):
@@ -108,10 +140,7 @@ def recording_faults(time_s, states, robot, jump_set):
         faults.append(f"flies {whole.flight_s:.3f} s, not {shortest} to {longest} s")
     if whole.lowest_height_m < MIN_HEIGHT_M:
         faults.append(f"the trunk sinks to {whole.lowest_height_m:.3f} m")
-    slack = 5 * jump_set.noise.joint_rad if jump_set.noise else 0.0
-    low, high = robot.joint_limit_rad.T
-    if (x[:, :12] < low - slack).any() or (x[:, :12] > high + slack).any():
-        faults.append("a joint leaves its limits")
+    faults += joint_limit_faults(x, robot, 5 * jump_set.noise.joint_rad if jump_set.noise else 0.0)
     if jump_set.noise is None:
         # The physics step is a quarter of the recording's, so the mean rate is not quite the
         # trapezium's; rounding of positions adds 1e-6 m / 2 ms.
@@ -119,6 +148,12 @@ def recording_faults(time_s, states, robot, jump_set):
         if (drift > 0.3 * np.abs(np.diff(dx, axis=0)) + 0.05).any():
             faults.append("velocities are not the rates of the positions")
     return faults
+
+
+def joint_limit_faults(x, robot, slack_rad):
+    low, high = robot.joint_limit_rad.T
+    outside = (x[:, :12] < low - slack_rad).any() or (x[:, :12] > high + slack_rad).any()
+    return ["a joint leaves its limits"] if outside else []
 
 
 def format_faults(time_s, x, dx, ddx):
@@ -158,10 +193,11 @@ def compare_with_new(recordings):
     """Faults for files that the recorder does not make again byte for byte."""
     faults = []
     with tempfile.TemporaryDirectory() as temporary:
-        for name, jump_set in SETS.items():
+        for name, one_set in [*SETS.items(), *GAIT_SETS.items()]:
             folder = pathlib.Path(temporary) / name
             folder.mkdir()
-            write_set(jump_set, folder)
+            write = write_set if name in SETS else write_gait_set
+            write(one_set, folder)
             for path in sorted(folder.iterdir()):
                 old = recordings / name / path.name
                 if not old.exists() or old.read_bytes() != path.read_bytes():

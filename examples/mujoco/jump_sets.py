@@ -198,7 +198,7 @@ def jumps_of(jump_set):
     low, high = jump_set.forward_velocity
     forward = np.empty(len(stems))
     slots = np.linspace(low, high, len(stems))
-    order = _interleaved([count for _, count in jump_set.splits], random)
+    order = interleaved([count for _, count in jump_set.splits], random)
     for rank, index in enumerate(order):
         forward[index] = slots[rank]
     jumps = []
@@ -210,7 +210,7 @@ def jumps_of(jump_set):
         seed = int(random.integers(2**31))
         offset = jump_set.start_noise_rad * random.uniform(-1, 1, 12)
         push = _push(jump_set, random) if number % jump_set.push_every == 0 else None
-        jumps.append(Jump(stem, plan, seed, offset, push, _floor(jump_set.floor, random)))
+        jumps.append(Jump(stem, plan, seed, offset, push, drawn_floor(jump_set.floor, random)))
     return jumps
 
 
@@ -220,7 +220,7 @@ def recorded_floor(folder, stem):
     return next((jump.floor for jump in jumps if jump.stem == stem), Floor())
 
 
-def _interleaved(counts, random):
+def interleaved(counts, random):
     """Indices of all splits, ordered so that each split's members are spread over the ranks."""
     place = []
     index = 0
@@ -245,7 +245,7 @@ def _push(jump_set, random):
     return Push(start, start + 0.1, tuple(force), moment)
 
 
-def _floor(span, random):
+def drawn_floor(span, random):
     if span is None:
         return Floor()
     return Floor(random.uniform(*span.friction), random.uniform(*span.settling_s))

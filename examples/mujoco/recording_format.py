@@ -14,7 +14,9 @@ import numpy as np
 
 from robot_model import JOINTS, LEGS
 
-POSITION_DIGITS, VELOCITY_DIGITS, ACCELERATION_DIGITS, TORQUE_DIGITS = 6, 5, 3, 4
+# Decimals of positions, velocities, accelerations and torques.
+FINE = (6, 5, 3, 4)
+COARSE = (5, 4, 2, 3)
 
 
 def column_names():
@@ -31,9 +33,10 @@ def column_names():
     return names + [f"{leg} Foot" for leg in LEGS]
 
 
-def write_recording(path, time_s, x, dx, torque_nm, feet):
-    """Writes one jump; the same numbers give the same bytes."""
-    dx = np.round(dx, VELOCITY_DIGITS)
+def write_recording(path, time_s, x, dx, torque_nm, feet, digits=FINE):
+    """Writes one recording; the same numbers give the same bytes."""
+    position_digits, velocity_digits, acceleration_digits, torque_digits = digits
+    dx = np.round(dx, velocity_digits)
     step = np.diff(time_s)[:, None]
     ddx = np.diff(dx, axis=0) / step
     ddx = np.vstack([ddx, ddx[-1:]])
@@ -41,11 +44,11 @@ def write_recording(path, time_s, x, dx, torque_nm, feet):
     columns = [(time_s, 3)]
     for k in range(x.shape[1]):
         columns += [
-            (x[:, k], POSITION_DIGITS),
-            (dx[:, k], VELOCITY_DIGITS),
-            (ddx[:, k], ACCELERATION_DIGITS),
+            (x[:, k], position_digits),
+            (dx[:, k], velocity_digits),
+            (ddx[:, k], acceleration_digits),
         ]
-    columns += [(torque_nm[:, k], TORQUE_DIGITS) for k in range(torque_nm.shape[1])]
+    columns += [(torque_nm[:, k], torque_digits) for k in range(torque_nm.shape[1])]
     texts = [[_decimal(value, digits) for value in column] for column, digits in columns]
     texts += [[str(int(flag)) for flag in feet[:, k]] for k in range(feet.shape[1])]
 
