@@ -428,6 +428,9 @@ fn right_recordings_are_not_refused() {
         ("go1-other", "go1"),
         ("go1-noisy", "go1"),
         ("go2-asynchronous", "go2"),
+        ("go1-trot", "go1"),
+        ("go1-trot-other", "go1"),
+        ("go1-gaits", "go1"),
     ];
     let mut sets: Vec<(PathBuf, &str)> = sets.map(|(folder, robot)| (path(folder), robot)).into();
     sets.extend(outside::beside("a1").map(|folder| (folder, "a1")));

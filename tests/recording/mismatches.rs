@@ -134,9 +134,16 @@ const RIGHT: [(&str, &str, usize); 4] = [
     ("go2-asynchronous", "go2", 10),
 ];
 
+/// The same of walks.
+const WALKS: [(&str, &str, usize); 3] = [
+    ("go1-trot", "go1", 18),
+    ("go1-trot-other", "go1", 6),
+    ("go1-gaits", "go1", 6),
+];
+
 #[test]
 fn no_right_recording_has_a_note() {
-    for (folder, robot, least) in RIGHT {
+    for (folder, robot, least) in RIGHT.into_iter().chain(WALKS) {
         let robot = romc::robot_file::by_name(robot).unwrap();
         for path in jumps_in(folder, least) {
             let right = recording::read(&path).unwrap();
