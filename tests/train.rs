@@ -7,6 +7,8 @@ mod from_model;
 #[path = "train/known_system.rs"]
 mod known_system;
 mod outside;
+#[path = "train/phases.rs"]
+mod phases;
 #[path = "train/spatial_body.rs"]
 mod spatial_body;
 #[path = "train/whole_body.rs"]

@@ -1,7 +1,7 @@
 """A plan beside what a robot did: learns the shorter jumps of a folder, plans a longer one.
 
     python plan_beside_recording.py FOLDER --robot a1 --jump a1_07.csv.gz --shorter-than 0.4 \\
-        --phases contact-rear-flight
+        --phases jump-rear
 
 FOLDER holds recordings that romc reads as they are; their clocks are mended first. The plan starts
 where the jump started and gets its distance and rise; nothing else of it. Prints root mean square

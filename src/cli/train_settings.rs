@@ -4,6 +4,7 @@ use super::robot::chosen;
 use super::*;
 use crate::identify::{IdentifyError, identify};
 use crate::limits::table::{LAYER_WIDTH, of_training};
+use clap::ValueEnum as _;
 
 /// The word for actuators that stands for no file.
 const NONE: &str = "none";
@@ -84,14 +85,46 @@ impl TrainSettings {
         set(&mut options.scaling.force, self.force_scaling);
         set(&mut options.scaling.moment, self.moment_scaling);
         options.library = self.library(options.library);
-        if self.phases == Some(PhaseSet::ContactRearFlight) {
-            options.phases = PhaseRule::three_phase().with_min_samples(options.phases.min_samples);
+        let chosen = match &self.phase[..] {
+            [] => self.phases.map(PhaseSet::rule),
+            patterns => Some(PhaseRule::new(patterns.to_vec())),
+        };
+        if let Some(rule) = chosen {
+            options.phases = rule.with_min_samples(options.phases.min_samples);
         }
         options.actuators = match self.actuators() {
             NONE | IDENTIFIED => None,
             path => Some(read_actuators(Path::new(path), Some(robot))?),
         };
         Ok(options)
+    }
+
+    /// Leaves out phases of a walk that the training recordings do not have; a note for each.
+    pub(super) fn leave_out_rare_phases(
+        &self,
+        options: &mut TrainOptions,
+        training: &[Recording],
+    ) -> Result<Vec<String>> {
+        if !matches!(self.phases, Some(PhaseSet::Trot | PhaseSet::Crawl)) {
+            return Ok(Vec::new());
+        }
+        let (rule, rare) = (options.phases.clone()).without_rare(training, MIN_SAMPLES)?;
+        options.phases = rule;
+        let left_out = |(phase, samples)| {
+            format!("phase `{phase}` is left out: {samples} samples in the training recordings")
+        };
+        Ok(rare.into_iter().map(left_out).collect())
+    }
+
+    /// A note if no phases were chosen and contacts look like another motion than the default's.
+    pub(super) fn phases_note(&self, training: &[Recording]) -> Option<String> {
+        let is_default = self.phases.is_none() && self.phase.is_empty();
+        let motion = PhaseSet::of(training);
+        let name = motion.to_possible_value()?;
+        (is_default && motion != PhaseSet::Jump).then(|| {
+            let name = name.get_name();
+            format!("contacts look like those of `--phases {name}`; without it the phases are contact and flight")
+        })
     }
 
     /// Sets the actuators that are identified from the first training recordings, if the settings want those. Recordings

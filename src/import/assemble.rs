@@ -179,7 +179,7 @@ impl<'a> Assembly<'a, '_> {
         let mut phases = Vec::new();
         for rule in &self.assignment.phases {
             let xi = self.xi(&rule.name, choice)?;
-            let PhaseRule { name, feet } = rule.clone();
+            let PhasePattern { name, feet } = rule.clone();
             self.report.notes.extend(options.usual_feet(&name, &feet));
             phases.push(Phase { name, feet, xi });
         }

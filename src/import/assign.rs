@@ -22,7 +22,7 @@ impl Assigned<'_> {
 }
 
 pub(super) struct Assignment<'f> {
-    pub(super) phases: Vec<PhaseRule>,
+    pub(super) phases: Vec<PhasePattern>,
     pub(super) used: Vec<Assigned<'f>>,
     pub(super) unused: Vec<&'f TensorInfo>,
 }
@@ -176,7 +176,7 @@ fn phases(
     tensors: &TensorFile<'_>,
     options: &ImportOptions,
     used: &[Assigned<'_>],
-) -> Read<Vec<PhaseRule>> {
+) -> Read<Vec<PhasePattern>> {
     let mut rules = options.phases.clone();
     // Sorted by name: as `any` takes every pattern with a foot down, the order of the two known phases is free.
     for assigned in used {
@@ -186,7 +186,7 @@ fn phases(
             let found = format!("the coefficients {}", assigned.info.describe());
             let feet = options.feet_of(&tensors.file, name, &found)?;
             let name = name.clone();
-            rules.push(PhaseRule { name, feet });
+            rules.push(PhasePattern { name, feet });
         }
     }
     let xi = |phase: &str| Role::Xi(phase.to_owned());

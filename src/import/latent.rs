@@ -35,7 +35,7 @@ pub(super) fn parts(
     };
     let (mut phases, mut report) = (Vec::new(), ImportReport::default());
     for ((rule, section), columns) in ordered.into_iter().zip(&separated) {
-        let PhaseRule { name, feet } = rule;
+        let PhasePattern { name, feet } = rule;
         report.notes.extend(options.usual_feet(&name, &feet));
         for (equation, coefficients) in section.equations.iter().zip(columns) {
             report.equations.push(ReadEquation {
@@ -99,7 +99,7 @@ fn phases_in_order<'s>(
     file: &str,
     sections: &'s Sections,
     options: &ImportOptions,
-) -> Read<Vec<(PhaseRule, &'s Section)>> {
+) -> Read<Vec<(PhasePattern, &'s Section)>> {
     let mut ordered = Vec::new();
     let by_order = options.phases.len() == sections.sections.len();
     for (place, section) in sections.sections.iter().enumerate() {
@@ -115,9 +115,9 @@ fn phases_in_order<'s>(
         };
         let found = format!("equations (line {})", section.line);
         let feet = options.feet_of(file, &name, &found)?;
-        ordered.push((PhaseRule { name, feet }, section));
+        ordered.push((PhasePattern { name, feet }, section));
     }
-    for PhaseRule { name, .. } in &options.phases {
+    for PhasePattern { name, .. } in &options.phases {
         if ordered.iter().all(|(rule, _)| rule.name != *name) {
             let found = format!("{name}, which {file} has no equations for");
             let expected = format!("`[{name}]` in the file");

@@ -32,7 +32,7 @@ mod units;
 
 pub(crate) use latex::variables::{NameError, SymbolNames};
 pub(crate) use library::read_terms;
-pub use options::{Format, ImportOptions, PhaseRule, WeightVectors, XiLayout, parse_standard};
+pub use options::{Format, ImportOptions, WeightVectors, XiLayout, parse_standard};
 pub(crate) use role::Mapping;
 pub(crate) use run::{Chosen, import, read_equations};
 pub use run::{ImportReport, Imported, import_from_bytes, import_tensors};
@@ -59,6 +59,7 @@ use crate::model::{
     Library, LibraryChoice, LibraryOrder, MAX_LATENT_DIM, ModelError, Phase, ReducedModel,
     ScaleFactors, Scaling, StandardLibrary, StateMap,
 };
+use crate::robot::PhasePattern;
 use crate::symbolic::{ExprId, ExprPool, Function, Node, ParseErrorKind};
 
 /// A fault and its place: the file, a tensor with its use, a character of a text, or an option.

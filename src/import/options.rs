@@ -5,7 +5,7 @@ use clap::ValueEnum;
 
 use super::*;
 use crate::files::magic::OtherFormat;
-use crate::robot::{Actuators, ContactFlags, Robot, WrenchFrame};
+use crate::robot::{Actuators, Robot, WrenchFrame};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
@@ -124,48 +124,6 @@ pub(super) fn standard_text(standard: StandardLibrary) -> String {
     format!("degree={}{}", standard.degree, words.concat())
 }
 
-/// `--phase NAME=FEET`: a phase and the foot patterns that select it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PhaseRule {
-    pub name: String,
-    pub feet: FeetRule,
-}
-
-impl FromStr for PhaseRule {
-    type Err = ImportError;
-
-    fn from_str(text: &str) -> Read<Self> {
-        let refused = || {
-            let expected = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr \
-                            rl, such as rear=0011,0001";
-            ImportError::option("--phase", format!("{text:?}"), expected)
-        };
-        let (name, feet) = text.split_once('=').ok_or_else(refused)?;
-        let pattern = |text: &str| parse_pattern(text.trim()).ok_or_else(refused);
-        let feet = match feet.trim() {
-            "any" => FeetRule::Any,
-            "none" => FeetRule::None,
-            "always" => FeetRule::always(),
-            patterns => {
-                FeetRule::Patterns(patterns.split(',').map(pattern).collect::<Result<_, _>>()?)
-            }
-        };
-        let name = name.trim().to_owned();
-        match name.is_empty() {
-            true => Err(refused()),
-            false => Ok(PhaseRule { name, feet }),
-        }
-    }
-}
-
-fn parse_pattern(text: &str) -> Option<ContactFlags> {
-    let flags = text.chars().map(|c| match c {
-        '0' | '1' => Some(c == '1'),
-        _ => None,
-    });
-    flags.collect::<Option<Vec<bool>>>()?.try_into().ok()
-}
-
 /// Options of an import; only the name is always needed.
 #[derive(Clone, Debug, Default)]
 pub struct ImportOptions {
@@ -188,7 +146,7 @@ pub struct ImportOptions {
     /// Number of latent coordinates: needed if shapes leave it open, else checked.
     pub latent_dim: Option<usize>,
     /// The phases in the order in which they are tried; `contact` and `flight` are known.
-    pub phases: Vec<PhaseRule>,
+    pub phases: Vec<PhasePattern>,
     /// Scale factors; needed with an encoder or decoder, unless tensors have them.
     pub scaling: Option<Scaling>,
     /// Factors of the inputs, where tensors have those of the states alone.

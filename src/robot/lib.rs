@@ -42,3 +42,6 @@ pub use wrench::FeetRule;
 #[cfg(feature = "serde")]
 mod serialised;
 pub mod sources;
+
+mod phase;
+pub use phase::PhasePattern;

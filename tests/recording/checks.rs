@@ -363,6 +363,31 @@ mod phases {
                 "10x1111 2x0111 30x0011 1x0010 20x0000",
                 &["0 Launch 0..12", "1 Launch 12..43", "2 Flight 43..63"],
             ),
+            // a trot: feet that leave or land late belong to their pair or, briefly, to the span before
+            (
+                PhaseRule::trot().with_min_samples(3),
+                "6x1111 8x1001 1x0001 5x0000 2x0111 7x0110 4x0111 9x1001",
+                &[
+                    "2 Launch 0..6",
+                    "0 Launch 6..15",
+                    "3 Flight 15..22",
+                    "1 Landing 22..29",
+                    "2 Landing 29..33",
+                    "0 Landing 33..42",
+                ],
+            ),
+            // a crawl: one foot after the other
+            (
+                PhaseRule::crawl(),
+                "5x1111 6x0111 3x1111 6x1110 2x1001",
+                &[
+                    "4 Launch 0..5",
+                    "0 Launch 5..11",
+                    "4 Launch 11..14",
+                    "3 Launch 14..20",
+                    "4 Launch 20..22",
+                ],
+            ),
             // exact patterns give transitions to the side with more feet
             (
                 exact,

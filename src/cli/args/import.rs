@@ -75,7 +75,7 @@ pub(crate) struct ImportArguments {
     /// When a phase holds: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be repeated,
     /// the first match wins; contact=any, flight=none and always=always are known
     #[arg(long, value_name = "NAME=FEET")]
-    pub phase: Vec<PhaseRule>,
+    pub phase: Vec<PhasePattern>,
     /// Scaled value = factor times SI value: one number or one per coordinate, separated by commas
     #[arg(long, value_name = "FACTOR", value_delimiter = ',', value_parser = real(&SCALING))]
     pub scaling: Vec<f64>,

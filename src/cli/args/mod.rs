@@ -21,10 +21,8 @@ use value::{RobotParser, choice, count, finite, overwrite, real, wrench_frame};
 use crate::codegen::{Precision, SineCosine, Units};
 use crate::deploy::Target;
 use crate::files::Overwrite;
-use crate::import::{
-    Format, ImportError, Mapping, PhaseRule, WeightVectors, XiLayout, parse_standard,
-};
+use crate::import::{Format, ImportError, Mapping, WeightVectors, XiLayout, parse_standard};
 use crate::model::{Activation, CoordinateOrder, LibraryOrder, StandardLibrary};
 use crate::mpc::{LIFTS, Lift, SOLVERS, Solver};
-use crate::robot::{STATE_DIM, WrenchFrame};
+use crate::robot::{ContactFlags, PhasePattern, STATE_DIM, WrenchFrame};
 use crate::simplify::Tolerance;

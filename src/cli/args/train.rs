@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::*;
 use crate::limits::table;
 use crate::recording::preprocess::SavitzkyGolay;
-use crate::recording::{Accelerations, SmoothedRows};
+use crate::recording::{Accelerations, PhaseRule, Recording, SmoothedRows};
 use crate::study::Shard;
 use crate::train::{
     BodyEquations, BodyRows, Coordinates, Integrator, Method, MirrorImages, RecipePart, Split,
@@ -56,10 +56,55 @@ impl From<Finite> for f64 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum PhaseSet {
-    /// Any foot down, no foot down
-    ContactFlight,
-    /// A front foot down, only rear feet down, no foot down
-    ContactRearFlight,
+    /// contact (any foot down) and flight
+    #[value(alias = "contact-flight")]
+    #[serde(alias = "contact-flight")]
+    Jump,
+    /// contact (a front foot down), rear (only rear feet down) and flight
+    #[value(alias = "contact-rear-flight")]
+    #[serde(alias = "contact-rear-flight")]
+    JumpRear,
+    /// fr_rl and fl_rr (a diagonal pair, or one foot of it), all (any other contact) and flight
+    Trot,
+    /// fr_up, fl_up, rr_up and rl_up (one foot in the air) and all (any other contact)
+    Crawl,
+    /// As jump
+    Pronk,
+}
+
+/// Least share of the samples with a diagonal pair alone, or with three feet, in which a trot or a crawl shows, and with
+/// rear feet alone, in which a jump that leaves the ground with the front feet first does.
+const GAIT_SHARE: f64 = 0.3;
+const REAR_SHARE: f64 = 0.1;
+
+impl PhaseSet {
+    /// The motion that the contacts of recordings look like.
+    pub(crate) fn of(recordings: &[Recording]) -> Self {
+        let segments = recordings.iter().flat_map(|recording| &recording.segments);
+        let feet: Vec<ContactFlags> = segments.flat_map(|segment| segment.feet.clone()).collect();
+        let share = |of: fn(ContactFlags) -> bool| {
+            let count = feet.iter().filter(|down| of(**down)).count();
+            count as f64 / feet.len().max(1) as f64
+        };
+        if share(|[fr, fl, rr, rl]| fr == rl && fl == rr && fr != fl) >= GAIT_SHARE {
+            Self::Trot
+        } else if share(|feet| feet.iter().filter(|down| **down).count() == 3) >= GAIT_SHARE {
+            Self::Crawl
+        } else if share(|[fr, fl, rr, rl]| !fr && !fl && (rr || rl)) >= REAR_SHARE {
+            Self::JumpRear
+        } else {
+            Self::Jump
+        }
+    }
+
+    pub(crate) fn rule(self) -> PhaseRule {
+        match self {
+            Self::Jump | Self::Pronk => PhaseRule::two_phase(),
+            Self::JumpRear => PhaseRule::three_phase(),
+            Self::Trot => PhaseRule::trot(),
+            Self::Crawl => PhaseRule::crawl(),
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -185,9 +230,13 @@ pub(crate) struct TrainSettings {
     /// without the rotors' inertia as a loss in flight [default: ground, with --paper body]
     #[arg(long, value_name = "FRAME", value_parser = wrench_frame)]
     pub wrench_frame: Option<WrenchFrame>,
-    /// Phases of the model
+    /// Phases of the model, by the usual ones of a motion (jump unless given)
     #[arg(long, value_enum)]
     pub phases: Option<PhaseSet>,
+    /// Phases of the model, one by one: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
+    /// repeated, the first match wins
+    #[arg(long, value_name = "NAME=FEET", conflicts_with = "phases")]
+    pub phase: Vec<PhasePattern>,
     /// Leave out physically implausible samples (`romc inspect` lists them)
     #[arg(long)]
     pub leave_out_implausible: bool,

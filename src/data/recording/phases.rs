@@ -2,17 +2,12 @@
 //! wins, as in the model file. With the paper's two phases, samples with one to three feet down count as contact and so
 //! join the launch or the landing they border (section IV-C4). Three phases describe an asynchronous jump.
 
+pub use crate::robot::PhasePattern;
+
 use super::*;
 
 /// Fewest samples of a span: fewer are chatter of contact and join the span before them.
 pub const CHATTER_SAMPLES: usize = 5;
-
-/// A phase by its name, and the feet that select it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PhasePattern {
-    pub name: String,
-    pub feet: FeetRule,
-}
 
 /// How samples are assigned to phases.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -65,6 +60,14 @@ impl PhaseRule {
         Self::new(patterns.map(pattern).into())
     }
 
+    fn read<const N: usize>(patterns: [&str; N]) -> Self {
+        Self::new(
+            patterns
+                .map(|text| text.parse().expect("a known pattern"))
+                .into(),
+        )
+    }
+
     /// The asynchronous jump: `contact` (a front foot is down), `rear` (only rear feet), `flight` (none).
     pub fn three_phase() -> Self {
         let all = (0..16).map(|bits: u8| std::array::from_fn(|foot| bits & (1 << foot) != 0));
@@ -77,10 +80,49 @@ impl PhaseRule {
         ])
     }
 
+    /// A trot: `fr_rl` and `fl_rr`, the diagonal pairs or one foot of them, `all` for every other contact, and `flight`.
+    pub fn trot() -> Self {
+        let pairs = ["fr_rl=1001,1000,0001", "fl_rr=0110,0100,0010"];
+        Self::read([pairs[0], pairs[1], "all=any", "flight=none"])
+    }
+
+    /// A crawl: a phase for each foot in the air, and `all` for every other contact.
+    pub fn crawl() -> Self {
+        let up = ["fr_up=0111", "fl_up=1011", "rr_up=1101", "rl_up=1110"];
+        Self::read([up[0], up[1], up[2], up[3], "all=any"])
+    }
+
     /// The rule with spans under `min_samples` joined to the span before them.
     pub fn with_min_samples(mut self, min_samples: usize) -> Self {
         self.min_samples = min_samples;
         self
+    }
+
+    /// The rule without phases of fewer samples than these in recordings, and those phases with their samples.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if a segment matches no phase.
+    pub fn without_rare(
+        mut self,
+        recordings: &[Recording],
+        least: usize,
+    ) -> Outcome<(Self, Vec<(String, usize)>)> {
+        let mut counts = vec![0; self.patterns.len()];
+        for segment in recordings.iter().flat_map(|each| &each.segments) {
+            for span in self.spans(segment)? {
+                counts[span.phase] += span.range.len();
+            }
+        }
+        let mut rare = Vec::new();
+        let mut counts = counts.into_iter();
+        self.patterns.retain(|pattern| {
+            let count = counts.next().unwrap_or(0);
+            if count < least {
+                rare.push((pattern.name.clone(), count));
+            }
+            count >= least
+        });
+        Ok((self, rare))
     }
 
     pub fn names(&self) -> Vec<String> {
