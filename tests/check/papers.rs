@@ -5,7 +5,8 @@ use std::path::Path;
 
 use romc::artifact;
 use romc::check::{CheckOptions, Side, Verdict, compare};
-use romc::import::{Format, ImportOptions, PhaseRule, import_from_bytes};
+use romc::import::{Format, ImportOptions, import_from_bytes};
+use romc::robot::PhasePattern;
 
 const PAPERS: [&str; 5] = [
     "cases.tex",
@@ -56,7 +57,7 @@ fn papers_are_imported_as_the_shipped_model() {
         let text = paper(name);
         let rule = |phase: &str, feet: &str| {
             format!("{phase}={feet}")
-                .parse::<PhaseRule>()
+                .parse::<PhasePattern>()
                 .expect("a rule")
         };
         let options = ImportOptions {

@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use romc::artifact;
 use romc::import::*;
 use romc::model::{LibraryChoice, LibraryOrder, ReducedModel};
+use romc::robot::PhasePattern;
 use safetensors::tensor::{Dtype, TensorView};
 use serde_json::Value;
 use zip::write::SimpleFileOptions;
@@ -158,7 +159,7 @@ pub fn model(path: &str) -> ReducedModel {
 
 /// All that tensors do not carry about a model.
 pub fn options_of(model: &ReducedModel) -> ImportOptions {
-    let phases = model.phases().iter().map(|phase| PhaseRule {
+    let phases = model.phases().iter().map(|phase| PhasePattern {
         name: phase.name.clone(),
         feet: phase.feet.clone(),
     });

@@ -6,6 +6,7 @@ use romc::files::Place;
 use romc::import::role::Role;
 use romc::import::*;
 use romc::model::{FeetRule, LibraryChoice, StandardLibrary};
+use romc::robot::PhasePattern;
 use zip::CompressionMethod;
 
 use super::store::{Number, Order, Stored, npz, zip};
@@ -160,12 +161,12 @@ fn options_are_read_from_their_texts_or_refused() {
     for text in "|inputs|degree=1,degree=2|degree=-1|degree=1,cosines".split('|') {
         assert!(parse_standard(text).is_err(), "{text}");
     }
-    let rear: PhaseRule = "rear=0011, 0001".parse().expect("two patterns");
+    let rear: PhasePattern = "rear=0011, 0001".parse().expect("two patterns");
     assert_eq!(rear.feet.to_string(), "0011,0001");
-    let contact: PhaseRule = "contact=any".parse().expect("a rule");
+    let contact: PhasePattern = "contact=any".parse().expect("a rule");
     assert_eq!(contact.feet, FeetRule::Any);
     for text in "|contact|=any|rear=|rear=001|rear=00112|rear=002x".split('|') {
-        assert!(text.parse::<PhaseRule>().is_err(), "{text}");
+        assert!(text.parse::<PhasePattern>().is_err(), "{text}");
     }
     let mapping: Mapping = "xi.contact=a=b/c:0".parse().expect("a part and a tensor");
     assert_eq!(mapping.role, Role::Xi("contact".to_owned()));
