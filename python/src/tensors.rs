@@ -7,9 +7,9 @@ use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use romc::Error;
 use romc::cli::{Compared, import_compared};
-use romc::import::{ImportOptions, Tensor, parse_standard};
+use romc::import::{ImportError, ImportOptions, Tensor, parse_standard};
 use romc::model::LibraryChoice;
-use romc::robot::{Actuators, Robot};
+use romc::robot::{Actuators, PhasePattern, Robot};
 use romc::robot_file::{ActuatorsEntry, RobotFileError, find, leg_moments, read_actuators};
 
 use crate::errors::{choice, python_error, wrench_frame};
@@ -87,9 +87,13 @@ impl Losses {
     }
 }
 
+fn not_a_phase(text: &str) -> ImportError {
+    ImportError::option("--phase", format!("{text:?}"), PhasePattern::EXPECTED)
+}
+
 impl ImportArguments {
     fn options(&self, py: Python<'_>) -> PyResult<ImportOptions> {
-        let refused = |error: romc::import::ImportError| python_error(py, error);
+        let refused = |error: ImportError| python_error(py, error);
         let library = match (&self.terms, &self.library) {
             (Some(terms), _) => Some(LibraryChoice::Terms(terms.clone())),
             (None, Some(shorthand)) => {
@@ -112,7 +116,8 @@ impl ImportArguments {
                 .map(|name| choice(py, "library_order", name))
                 .transpose()?,
             latent_dim: self.latent_dim,
-            phases: (phases.map(|text| text.parse().map_err(refused))).collect::<PyResult<_>>()?,
+            phases: (phases.map(|text| text.parse().map_err(|_| refused(not_a_phase(text)))))
+                .collect::<PyResult<_>>()?,
             mapping: (map.map(|text| text.parse().map_err(refused))).collect::<PyResult<_>>()?,
             weights: (self.weights.as_deref())
                 .map(|name| choice(py, "weights", name))

@@ -19,6 +19,12 @@ pub struct PhasePattern {
     pub feet: FeetRule,
 }
 
+impl PhasePattern {
+    /// What a pattern is written as, in words.
+    pub const EXPECTED: &str = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr rl, \
+                                such as rear=0011,0001";
+}
+
 impl fmt::Display for PhasePattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}", self.name, self.feet)
@@ -45,12 +51,7 @@ impl FromStr for PhasePattern {
 
     /// Reads `NAME=any`, `NAME=none`, `NAME=always`, or a name with foot patterns.
     fn from_str(text: &str) -> Result<Self, String> {
-        let refused = || {
-            format!(
-                "found {text:?}, expected NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order \
-                 fr fl rr rl, such as rear=0011,0001"
-            )
-        };
+        let refused = || format!("found {text:?}, expected {}", Self::EXPECTED);
         let (name, feet) = text.split_once('=').ok_or_else(refused)?;
         let pattern = |text: &str| flags(text.trim()).ok_or_else(refused);
         let feet = match feet.trim() {
