@@ -30,9 +30,7 @@ pub(super) fn run(arguments: &TrainArguments) -> Result<Answer> {
     let command = command_line(arguments, &settings, method, &options);
     let origin = origin(arguments, command, &recorded);
 
-    let rare = settings.leave_out_rare_phases(&mut options, training)?;
-    let other = settings.phases_note(training);
-    rare.iter().chain(&other).for_each(|text| note(text));
+    settings.check_phases(&mut options, training)?;
 
     let bar = spinner("training");
     let mut listener = |progress: Progress| match progress {

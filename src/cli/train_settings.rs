@@ -85,11 +85,7 @@ impl TrainSettings {
         set(&mut options.scaling.force, self.force_scaling);
         set(&mut options.scaling.moment, self.moment_scaling);
         options.library = self.library(options.library);
-        let chosen = match &self.phase[..] {
-            [] => self.phases.map(PhaseSet::rule),
-            patterns => Some(PhaseRule::new(patterns.to_vec())),
-        };
-        if let Some(rule) = chosen {
+        if let Some(rule) = self.phase_rule() {
             options.phases = rule.with_min_samples(options.phases.min_samples);
         }
         options.actuators = match self.actuators() {
@@ -99,32 +95,41 @@ impl TrainSettings {
         Ok(options)
     }
 
-    /// Leaves out phases of a walk that the training recordings do not have; a note for each.
-    pub(super) fn leave_out_rare_phases(
+    /// Leaves out phases of a walk that the training recordings do not have, with a note for each. Another is printed if no
+    /// phases were chosen and contacts look like another motion than a jump.
+    pub(super) fn check_phases(
         &self,
         options: &mut TrainOptions,
         training: &[Recording],
-    ) -> Result<Vec<String>> {
-        if !matches!(self.phases, Some(PhaseSet::Trot | PhaseSet::Crawl)) {
-            return Ok(Vec::new());
+    ) -> Result<()> {
+        if let Some(PhaseSet::Trot | PhaseSet::Crawl) = self.phases {
+            let (rule, rare) = (options.phases.clone()).without_rare(training, MIN_SAMPLES)?;
+            options.phases = rule;
+            for (phase, samples) in rare {
+                note(&format!(
+                    "phase `{phase}` is left out: {samples} samples in the training recordings"
+                ));
+            }
         }
-        let (rule, rare) = (options.phases.clone()).without_rare(training, MIN_SAMPLES)?;
-        options.phases = rule;
-        let left_out = |(phase, samples)| {
-            format!("phase `{phase}` is left out: {samples} samples in the training recordings")
-        };
-        Ok(rare.into_iter().map(left_out).collect())
+        let motion = PhaseSet::of(training);
+        let is_default = self.phases.is_none() && self.phase.is_empty();
+        if let Some(name) = motion.to_possible_value()
+            && is_default
+            && motion != PhaseSet::Jump
+        {
+            let name = name.get_name();
+            note(&format!(
+                "contacts look like those of `--phases {name}`; without it the phases are contact and flight"
+            ));
+        }
+        Ok(())
     }
 
-    /// A note if no phases were chosen and contacts look like another motion than the default's.
-    pub(super) fn phases_note(&self, training: &[Recording]) -> Option<String> {
-        let is_default = self.phases.is_none() && self.phase.is_empty();
-        let motion = PhaseSet::of(training);
-        let name = motion.to_possible_value()?;
-        (is_default && motion != PhaseSet::Jump).then(|| {
-            let name = name.get_name();
-            format!("contacts look like those of `--phases {name}`; without it the phases are contact and flight")
-        })
+    fn phase_rule(&self) -> Option<PhaseRule> {
+        match &self.phase[..] {
+            [] => self.phases.map(PhaseSet::rule),
+            patterns => Some(PhaseRule::new(patterns.to_vec())),
+        }
     }
 
     /// Sets the actuators that are identified from the first training recordings, if the settings want those. Recordings
