@@ -112,7 +112,7 @@ impl TrainSettings {
             }
         }
         let motion = PhaseSet::of(training);
-        let is_default = self.phases.is_none() && self.phase.is_empty();
+        let is_default = self.phases.is_none() && self.phase.is_none();
         if let Some(name) = motion.to_possible_value()
             && is_default
             && motion != PhaseSet::Jump
@@ -126,10 +126,8 @@ impl TrainSettings {
     }
 
     fn phase_rule(&self) -> Option<PhaseRule> {
-        match &self.phase[..] {
-            [] => self.phases.map(PhaseSet::rule),
-            patterns => Some(PhaseRule::new(patterns.to_vec())),
-        }
+        let patterns = self.phase.clone().map(PhaseRule::new);
+        patterns.or(self.phases.map(PhaseSet::rule))
     }
 
     /// Sets the actuators that are identified from the first training recordings, if the settings want those. Recordings
@@ -251,6 +249,11 @@ impl TrainSettings {
                 None => format!(" --{name} {}", number.as_f64().unwrap_or(f64::NAN)),
             },
             Value::String(text) => format!(" --{name} {}", quoted_text(&text)),
+            Value::Array(patterns) if name == "phase" => {
+                let patterns = patterns.iter().filter_map(Value::as_str);
+                let flags = patterns.map(|text| format!(" --phase {}", quoted_text(text)));
+                flags.collect()
+            }
             Value::Array(values) if values.is_empty() => format!(" --{name} linear"),
             Value::Array(values) => {
                 let values: Vec<String> = values.iter().map(Value::to_string).collect();
@@ -361,6 +364,8 @@ impl TrainSettings {
         let has_parts = self.first("degree trigonometric").is_some();
         let fault = if self.terms.is_some() && has_parts {
             "`terms` stands beside `degree` or `trigonometric`, expected one or the other"
+        } else if self.phase.is_some() && self.phases.is_some() {
+            "`phase` stands beside `phases`, expected one or the other"
         } else if self.activation == Some(Activation::Linear) {
             "`activation` is linear, expected elu, tanh, sigmoid, relu, gelu, silu or softplus"
         } else {

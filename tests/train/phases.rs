@@ -30,6 +30,13 @@ fn trained(folder: &str, first: &str, flags: &[&str]) -> (Vec<String>, String) {
     }
     let text = std::fs::read_to_string(&output).expect("a model");
     let model: Value = serde_json::from_str(&text).expect("JSON");
+    let command = model["provenance"]["command"].as_str().expect("a command");
+    for flag in flags
+        .iter()
+        .filter_map(|flag| flag.strip_prefix("--phase="))
+    {
+        assert!(command.contains(&format!(" --phase {flag}")), "{command}");
+    }
     let phases = model["phases"].as_array().expect("phases").iter();
     let text = |phase: &Value| {
         let name = phase["name"].as_str().expect("a name");

@@ -236,7 +236,7 @@ pub(crate) struct TrainSettings {
     /// Phases of the model, one by one: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
     /// repeated, the first match wins
     #[arg(long, value_name = "NAME=FEET", conflicts_with = "phases")]
-    pub phase: Vec<PhasePattern>,
+    pub phase: Option<Vec<PhasePattern>>,
     /// Leave out physically implausible samples (`romc inspect` lists them)
     #[arg(long)]
     pub leave_out_implausible: bool,
