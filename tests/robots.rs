@@ -708,7 +708,7 @@ fn generated_controllers_hold_all_sources_of_the_robot_but_those_of_its_files() 
                 .into_owned()
         })
         .filter(|name| name.ends_with(".rs"))
-        .filter(|name| !["sources.rs", "serialised.rs"].contains(&name.as_str()))
+        .filter(|name| !["sources.rs", "serialised.rs", "phase.rs"].contains(&name.as_str()))
         .collect();
     found.sort();
     let held = romc::robot::sources::SOURCES.iter();

@@ -137,7 +137,7 @@ const ELSEWHERE: &str = "json help version force output out-dir \
     actuators sample-time inputs-from unchecked name description \
     train: from validation test split config latent-dim method robot paper seed seeds epochs encoder-layers \
     decoder-layers activation lift-weight body-weight bptt-weight bptt-window bptt-stride bptt-decay \
-    bptt-integrator slack refinements growth body body-equations mirror-images leave-out no-rotation degree trigonometric terms actuators wrench-frame phases \
+    bptt-integrator slack refinements growth body body-equations mirror-images leave-out no-rotation degree trigonometric terms actuators wrench-frame phases phase \
     leave-out-implausible accelerations smooth smooth-rows moving-average mask-std mask-input-share coordinates state-scaling \
     torque-scaling force-scaling moment-scaling name clock columns \
     study: validation latent-dims seeds method paper robot config lambda shard merge";
