@@ -10,6 +10,7 @@ use romc::robot::ContactFlags;
 use crate::emitted::Emitted;
 use crate::programs::{root, shipped, succeed};
 use crate::random::Random;
+use crate::tools::thorough_or;
 use crate::{push, push_counts};
 
 const STEP_S: f64 = 0.01;
@@ -341,7 +342,7 @@ fn state_machine_in_c_repeats_the_library_bit_for_bit() {
     let mut random = Random::new(7);
     let mut bytes = Vec::new();
     let mut counts = [0; 6];
-    for run in 0..30 {
+    for run in 0..thorough_or(30, 12) {
         let mut robot = Robot::new(bytes);
         robot.still(Request::New);
         for step in 0..900 {
@@ -374,7 +375,7 @@ fn state_machine_in_c_repeats_the_library_bit_for_bit() {
         }
         bytes = robot.bytes;
     }
-    assert!(counts.iter().all(|count| *count > 300), "{counts:?}");
+    assert!(counts.iter().all(|count| *count > 100), "{counts:?}");
     let emitted = Emitted::with_library_sines(&shipped("go1-d4"));
     let replay = root().join("tests/controller_c/machine.c");
     let program = emitted.program("cc", &["-Wfloat-equal"], replay.to_str().expect("UTF-8"));

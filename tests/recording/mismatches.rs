@@ -145,7 +145,10 @@ const WALKS: [(&str, &str, usize); 3] = [
 fn no_right_recording_has_a_note() {
     for (folder, robot, least) in RIGHT.into_iter().chain(WALKS) {
         let robot = romc::robot_file::by_name(robot).unwrap();
-        for path in jumps_in(folder, least) {
+        for path in jumps_in(folder, least)
+            .into_iter()
+            .step_by(thorough_or(1, 3))
+        {
             let right = recording::read(&path).unwrap();
             assert_eq!(notes(&right, robot), [""; 0], "{}", path.display());
         }
