@@ -237,6 +237,20 @@ fn drive_and_compare(model: &ReducedModel, built: &Built) {
     }
 }
 
+/// A file that the list of sources lacks would leave a crate that does not compile.
+#[test]
+fn generated_controllers_hold_all_sources_of_the_controller_and_its_solver() {
+    let files = emitted(&shipped("go1-d4"));
+    for folder in ["online", "solver"] {
+        let entries = fs::read_dir(root().join("src/control").join(folder)).expect("sources");
+        let names = entries.map(|entry| entry.expect("an entry").file_name());
+        for name in names.map(|name| name.to_string_lossy().into_owned()) {
+            let path = format!("go1_d4-controller/src/{folder}/{name}");
+            assert!(files.iter().any(|file| file.path == path), "no {path}");
+        }
+    }
+}
+
 #[test]
 fn emission_is_the_same_twice_and_names_its_origin_in_every_source() {
     let model = shipped("go1-d4");

@@ -5,10 +5,8 @@ Every run follows a plan of plan_jumps.py from the first measurement on with one
 
 import argparse
 import collections
-import concurrent.futures
 import csv
 import pathlib
-import sys
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -18,6 +16,7 @@ from assessment import repetition_faults
 from closed_loop import named_number, read_jump
 from followers import Commanded, Jump, Replay
 from model_inputs import ModelInputs
+from parallel import results_of
 from perturbations import NOMINAL, perturbed_simulation
 from plan_jumps import (
     ROBOT,
@@ -42,7 +41,7 @@ plans the 18 goals that plan_jumps.py draws from the seed, and jumps each with e
 Prints one row per fault and size, means with the largest in brackets: errors of landing and apex
 against the goal, how far the landing moved from that on exact measurements, the error of pitch where
 the plan touches down, and the fallbacks and faults that the controller reported, with the number of
-runs. Writes them to accuracy.csv, what is printed to table.md, and one row per run to runs.csv."""
+runs. Writes them to accuracy.csv, the printed tables to table.md, and one row per run to runs.csv."""
 FIRST_FALLBACK = 10
 HARMLESS_CM = 1.0
 QUICK_GOALS = ("in00", "in01", "out00")
@@ -151,12 +150,7 @@ def main():
         for size in signed_sizes(fault, arguments.quick)
         for plan in planned_jumps
     ]
-    outcomes = []
-    with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
-        for outcome in pool.map(run, tasks):
-            outcomes.append(outcome)
-            print(f"\r{len(outcomes)} of {len(tasks)} runs", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+    outcomes = results_of(run, tasks, arguments.jobs)
     rows = table(outcomes)
     text = markdown(rows)
     print(text)

@@ -1,7 +1,6 @@
 """Drives a simulated Go1 with the latent controller, over recorded jumps and perturbations."""
 
 import argparse
-import concurrent.futures
 import csv
 import functools
 import json
@@ -20,6 +19,7 @@ from film_strip import render
 from followers import FIRST_SUPERVISED, Jump, LatentMpc, Replay, TorquesOnly, WithoutFeedback
 from jump_sets import recorded_floor
 from model_inputs import ModelInputs
+from parallel import results_of
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
 from recording_format import read_recording, states_of
 from robot_model import RobotModel
@@ -120,12 +120,7 @@ def main():
         for jump in jumps
         for draw in range(arguments.draws)
     ]
-    outcomes = []
-    with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
-        for outcome, _ in pool.map(run, tasks):
-            outcomes.append(outcome)
-            print(f"\r{len(outcomes)} of {len(tasks)} runs", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+    outcomes = [outcome for outcome, _ in results_of(run, tasks, arguments.jobs)]
     missed = missed_aims(outcomes, TRAINING.name, len(models))
     report = summary(outcomes, perturbations, {m.name: m.gains for m in models}, missed)
     text = table(report)

@@ -1,7 +1,6 @@
 """Plans jumps that nobody recorded and lets a simulated Go1 jump them, beside what needs no plan."""
 
 import argparse
-import concurrent.futures
 import csv
 import functools
 import json
@@ -19,10 +18,10 @@ from assessment import assess, longest_flight, repetition_faults
 from closed_loop import named_number, read_jump, write_strip
 from followers import LatentMpc, Replay
 from model_inputs import ModelInputs
+from parallel import results_of
 from perturbations import NOMINAL, PERTURBATIONS, Motors, perturbed_simulation
 from primitives import Goal, Recorded
-from recording_format import read_recording, states_of
-from robot_model import Floor, RobotModel
+from robot_model import Floor
 from simulation import CONTROL_STEP_S
 from uninformed import write_uninformed
 
@@ -123,12 +122,7 @@ def main():
         if not arguments.nominal or condition is NOMINAL
         for goal in goals
     ]
-    outcomes = []
-    with concurrent.futures.ProcessPoolExecutor(arguments.jobs) as pool:
-        for outcome in pool.map(run, tasks):
-            outcomes.append(outcome)
-            print(f"\r{len(outcomes)} of {len(tasks)} runs", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+    outcomes = results_of(run, tasks, arguments.jobs)
     text = table(outcomes)
     rows = [asdict(outcome) for outcome in outcomes]
     print(json.dumps(rows, indent=1) if arguments.json else text)

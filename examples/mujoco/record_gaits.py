@@ -1,13 +1,10 @@
 """Records simulated walks of a quadruped as CSV, for training and testing reduced-order models."""
 
-import argparse
-import dataclasses
-import pathlib
 import sys
 
 from gait_assessment import assess_walk, walk_table
 from gait_sets import GAIT_SETS, STANDING_S, drawn_walk, stems_of
-from record_jumps import RECORDINGS, refuse_foreign_files
+from record_jumps import chosen_set, refuse_foreign_files
 from recording_format import COARSE, write_recording
 from robot_model import RobotModel
 from simulation import Simulation
@@ -33,15 +30,9 @@ def record(robot, walk):
 
 
 def main():
-    arguments = parse_arguments()
-    gait_set = GAIT_SETS[arguments.set]
-    folder = arguments.out_dir or RECORDINGS / arguments.set
-    if arguments.seed is not None:
-        if arguments.out_dir is None:
-            raise SystemExit("--seed draws other walks than the repository has: give an --out-dir")
-        gait_set = dataclasses.replace(gait_set, seed=arguments.seed)
+    gait_set, folder, force = chosen_set(GAIT_SETS, "walks", __doc__, EXAMPLE)
     ours = {f"{stem}.csv.gz" for stem in stems_of(gait_set)}
-    refuse_foreign_files(folder, ours, arguments.force)
+    refuse_foreign_files(folder, ours, force)
     folder.mkdir(parents=True, exist_ok=True)
     print(walk_table(write_gait_set(gait_set, folder)))
 
@@ -67,21 +58,6 @@ def write_walk(gait_set, index, folder):
             return walk, whole
         print(f"{walk.stem}: refused: {'; '.join(faults)}", file=sys.stderr)
     raise SystemExit(f"{walk.stem}: {MOST_DRAWS} draws are refused")
-
-
-def parse_arguments():
-    parser = argparse.ArgumentParser(
-        description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--set", required=True, choices=GAIT_SETS, help="which data set to record")
-    parser.add_argument(
-        "--out-dir", type=pathlib.Path, help="folder to write (default: ../recordings/SET)"
-    )
-    parser.add_argument("--seed", type=int, help="draw other walks of the set (needs --out-dir)")
-    parser.add_argument(
-        "--force", action="store_true", help="write even into a folder that holds other files"
-    )
-    return parser.parse_args()
 
 
 if __name__ == "__main__":

@@ -37,15 +37,9 @@ def record(jump_set, jump):
 
 
 def main():
-    arguments = parse_arguments()
-    jump_set = SETS[arguments.set]
-    folder = arguments.out_dir or RECORDINGS / arguments.set
-    if arguments.seed is not None:
-        if arguments.out_dir is None:
-            raise SystemExit("--seed draws other jumps than the repository has: give an --out-dir")
-        jump_set = dataclasses.replace(jump_set, seed=arguments.seed)
+    jump_set, folder, force = chosen_set(SETS, "jumps", __doc__, EXAMPLE)
     ours = {f"{jump.stem}.csv.gz" for jump in jumps_of(jump_set)}
-    refuse_foreign_files(folder, ours, arguments.force)
+    refuse_foreign_files(folder, ours, force)
     folder.mkdir(parents=True, exist_ok=True)
     print(table(write_set(jump_set, folder)))
 
@@ -76,19 +70,26 @@ def refuse_failed_jump(name, whole, log):
         raise SystemExit(f"{name}: {'; '.join(faults)}")
 
 
-def parse_arguments():
+def chosen_set(sets, motions, description, example):
+    """The set that the command line asks for, the folder to write, and whether files of others may be there."""
     parser = argparse.ArgumentParser(
-        description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=description, epilog=example, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--set", required=True, choices=SETS, help="which data set to record")
+    parser.add_argument("--set", required=True, choices=sets, help="which data set to record")
     parser.add_argument(
         "--out-dir", type=pathlib.Path, help="folder to write (default: ../recordings/SET)"
     )
-    parser.add_argument("--seed", type=int, help="draw other jumps of the set (needs --out-dir)")
+    parser.add_argument("--seed", type=int, help=f"draw other {motions} of the set (needs --out-dir)")
     parser.add_argument(
         "--force", action="store_true", help="write even into a folder that holds other files"
     )
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    chosen, folder = sets[arguments.set], arguments.out_dir or RECORDINGS / arguments.set
+    if arguments.seed is not None:
+        if arguments.out_dir is None:
+            raise SystemExit(f"--seed draws other {motions} than the repository has: give an --out-dir")
+        chosen = dataclasses.replace(chosen, seed=arguments.seed)
+    return chosen, folder, arguments.force
 
 
 def refuse_foreign_files(folder, ours, force):

@@ -50,6 +50,7 @@ fn trained(arguments: &StudyArguments) -> Result<Store> {
     let [training, validation] = [training, validation].map(|set| &set.recordings[..]);
     let mut base = settings.options(1, String::new(), robot)?;
     settings.identify(&mut base, &recorded, robot)?;
+    settings.check_phases(&mut base, training)?;
     settings.wrench_frame = Some(base.wrench_frame);
     settings.actuators = Some(settings.actuators().to_owned());
     let plan = plan(arguments, &settings, training, validation);

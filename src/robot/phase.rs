@@ -20,7 +20,7 @@ pub struct PhasePattern {
 }
 
 impl PhasePattern {
-    /// What a pattern is written as, in words.
+    /// The accepted forms of a pattern, in words.
     pub const EXPECTED: &str = "NAME=any, NAME=none, NAME=always, or NAME= and foot patterns in the order fr fl rr rl, \
                                 such as rear=0011,0001";
 }
@@ -46,7 +46,7 @@ impl TryFrom<String> for PhasePattern {
 }
 
 impl FromStr for PhasePattern {
-    /// What was found and what is expected.
+    /// The text found and the forms expected.
     type Err = String;
 
     /// Reads `NAME=any`, `NAME=none`, `NAME=always`, or a name with foot patterns.

@@ -92,10 +92,10 @@ typedef struct {
     double settle_s;
 } online_timing;
 
-/* What the state machine does, each with its number for interfaces without enumerations. */
+/* Modes of the state machine, each with its number for interfaces without enumerations. */
 typedef enum { ONLINE_DAMP, ONLINE_STAND_UP, ONLINE_READY, ONLINE_JUMP, ONLINE_LAND, ONLINE_RECOVER } online_mode;
 
-/* Mode of the state machine with what its transitions need, and the frame of the reference. */
+/* Mode of the state machine, memory of its transitions, and frame of the reference. */
 typedef struct {
     online_mode mode;
     /* Whether a jump was requested. */

@@ -224,7 +224,11 @@ fn robot_stands_up_jumps_where_it_stands_lands_and_stands_again() {
     // Knees hold the weight: four feet that press down by a quarter each.
     let knees: f64 = (0..4).map(|leg| robot.command.torque_nm[3 * leg + 2]).sum();
     assert!((8.0..40.0).contains(&knees), "{knees} N m");
-    assert!(!robot.still(Request::Stand) || robot.machine.mode() == Mode::Recover);
+    assert!(
+        robot.still(Request::Stand),
+        "moves to the start of another reference"
+    );
+    assert_eq!(robot.machine.mode(), Mode::Recover);
     robot.until(Mode::Ready);
     for _ in 0..2 {
         assert!(robot.still(Request::Jump));

@@ -31,7 +31,7 @@ def run(command, folder):
 
 
 def counts_by_callgrind(program, folder):
-    """Instructions of each call of `counted`, and what the program prints."""
+    """Instructions of each call of `counted`, and the program's output."""
     dump = folder / f"{program.name}.callgrind"
     text = run(["valgrind", "-q", "--tool=callgrind", f"--callgrind-out-file={dump}", "--toggle-collect=counted",
                 "--dump-after=counted", program], folder)

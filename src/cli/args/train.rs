@@ -230,7 +230,7 @@ pub(crate) struct TrainSettings {
     /// without the rotors' inertia as a loss in flight [default: ground, with --paper body]
     #[arg(long, value_name = "FRAME", value_parser = wrench_frame)]
     pub wrench_frame: Option<WrenchFrame>,
-    /// Phases of the model, by the usual ones of a motion (jump unless given)
+    /// Phases of the model, by the name of a motion [default: jump]
     #[arg(long, value_enum)]
     pub phases: Option<PhaseSet>,
     /// Phases of the model, one by one: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be

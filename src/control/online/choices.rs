@@ -1,4 +1,4 @@
-//! What the controller does in one of several ways, as [`MpcSettings`](super::MpcSettings) choose.
+//! Settings of [`MpcSettings`](super::MpcSettings) that choose between methods.
 
 /// How a latent input becomes joint torques, each way with its number for interfaces without enumerations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -222,7 +222,7 @@ impl Controller {
         self.forget();
     }
 
-    /// Clears what a step without a plan leaves as it is, and gives the gains.
+    /// Resets the fields that a step without a plan does not set, and sets the gains.
     pub(super) fn begin(&self, command: &mut Command) {
         command.iterations = 0;
         command.slack = 0.0;

@@ -9,6 +9,7 @@ use super::command::{Command, Source, Status};
 use super::controller::{Controller, Measurement};
 use super::error::ControlError;
 use super::routine::{Mode, Routine, Timing, write_support};
+use super::settings::Accepts;
 use super::step::watched;
 use super::supervisor::Fault;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, STATE_DIM};
@@ -25,14 +26,7 @@ impl Machine {
     /// A state machine in [`Mode::Damp`] around a controller; an error names a time that is not positive.
     pub fn new(controller: Controller, timing: Timing) -> Result<Self, ControlError> {
         for (name, found) in [("stand_s", timing.stand_s), ("settle_s", timing.settle_s)] {
-            if !(found.is_finite() && found > 0.0) {
-                let expected = "a positive number";
-                return Err(ControlError::Setting {
-                    name,
-                    found,
-                    expected,
-                });
-            }
+            Accepts::Positive.check(name, found)?;
         }
         Ok(Self {
             controller,
@@ -41,7 +35,7 @@ impl Machine {
         })
     }
 
-    /// What it does.
+    /// The present mode.
     pub fn mode(&self) -> Mode {
         self.routine.mode
     }
@@ -90,7 +84,7 @@ impl Machine {
         self.routine.is_asked
     }
 
-    /// Damps the joints, whatever it does.
+    /// Damps the joints, in any mode.
     pub fn damp(&mut self) {
         (self.routine.mode, self.routine.is_asked) = (Mode::Damp, false);
     }
@@ -179,7 +173,7 @@ impl Machine {
         (self.controller.memory).keep_time(measurement.time_s, step_s);
     }
 
-    /// What a measurement of a robot that moves to the stand, or holds it, is.
+    /// Status of a measurement of a robot that moves to the stand or holds it.
     fn stand_status(&mut self, measurement: &Measurement<'_>) -> Status {
         let (controller, routine) = (&mut self.controller, &mut self.routine);
         let &Measurement { time_s, x, dx, .. } = measurement;

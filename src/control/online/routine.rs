@@ -1,4 +1,4 @@
-//! What the state machine remembers and when it goes from one mode to the next, in plain numbers: C is made of it.
+//! Memory and transitions of the state machine in plain numbers: C is made of it.
 //!
 //! In: times, states, contacts. Out: the next [`Mode`], the posture of a stand, a state in the frame of the reference. Read
 //! [`Routine`] first, `machine` for its use.
@@ -14,7 +14,7 @@ const LATEST: f64 = 2.0;
 /// Angle over which the height of a foot is differentiated, rad.
 const SMALL_TURN: Real = 1e-3;
 
-/// What the state machine does, each with its number for interfaces without enumerations.
+/// Modes of the state machine, each with its number for interfaces without enumerations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mode {
     /// The joints are damped: before a start, after a fault, or as requested.
@@ -50,7 +50,7 @@ impl Default for Timing {
     }
 }
 
-/// Mode of the state machine with what its transitions need, and the frame of the reference.
+/// Mode of the state machine, memory of its transitions, and frame of the reference.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Routine {
     pub mode: Mode,

@@ -90,7 +90,7 @@ pub enum Accepts {
 }
 
 impl Accepts {
-    fn check(self, name: &'static str, found: f64) -> Result<(), ControlError> {
+    pub(super) fn check(self, name: &'static str, found: f64) -> Result<(), ControlError> {
         let is_positive = found.is_finite() && found > 0.0;
         let (is_accepted, expected) = match self {
             Self::Whole(least, most, expected) => {

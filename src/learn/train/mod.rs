@@ -20,6 +20,7 @@ mod jumps;
 mod knowledge;
 mod latent;
 mod metrics;
+mod momentum;
 mod options;
 mod progress;
 mod random;
