@@ -394,6 +394,7 @@ fn is_limited(
         feet: measurement.feet,
         phase,
         losses_nm: command.losses_nm,
+        near_nm: None,
     };
     let mut lift = ConsistentLift::new(controller.plant(), settings).expect("a sound program");
     let torque = lift.lift(controller.plant(), &command.u_lat, &stance);

@@ -53,7 +53,7 @@ use crate::deploy::{self, EmitOptions, PlannedJump, Target};
 use crate::equations::Equations;
 use crate::evaluate::{
     Assessment, ControlMetrics, Horizon, Invariance, LAMBDA, ReferenceInput, RoundTrip,
-    along_recording, control_metrics, usual_settings, verdict, verdict_by_default,
+    StrideGrowth, along_recording, control_metrics, usual_settings, verdict, verdict_by_default,
 };
 use crate::files::size::read_toml;
 use crate::files::{
@@ -90,8 +90,9 @@ use crate::simplify::{
 };
 use crate::study::{CellId, FOLDS, Shard, Spread, Store, Summary, cell_table};
 use crate::train::{
-    Coordinates, MIN_SAMPLES, MapOptions, Method, Monitor, Origin, Progress, Recordings,
-    ScaleOptions, SetMetrics, TrainError, TrainOptions, TrainReport, Trained, assess, sha256,
+    BodyEquations, BodyRows, Coordinates, MIN_SAMPLES, MapOptions, Method, Monitor, Origin,
+    Progress, Recordings, ScaleOptions, SetMetrics, TrainError, TrainOptions, TrainReport, Trained,
+    assess, sha256,
 };
 use crate::typeset::words::counted;
 use crate::typeset::{Cell, NumberStyle, PrintOptions, Rounding, SymbolTable, Table, significant};

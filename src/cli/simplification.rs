@@ -209,7 +209,7 @@ pub(super) fn ladder(
     let domain = Domain::around(model, &samples, MARGIN)?;
     let basis = RolloutBasis {
         domain: &domain,
-        segments: assessment.runs.iter().map(|run| run.segment).collect(),
+        segments: assessment.runs.iter().map(|run| &*run.segment).collect(),
         latent,
         restart_every_s: assessment.restart_every_s,
     };

@@ -81,6 +81,7 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>, horizons: &[H
     let constants = baselines.map(|of| format!("{}: {}", of.name, of.template.constants()));
     text += &lines("  ", constants);
     text += &format!("\n{}\n", dynamics_table(model, assessment));
+    text += &lines("", assessment.stride.as_ref().map(StrideGrowth::words));
     let mean_square = assessment.decoder_mean_square().map(significant);
     let mean_square = mean_square.map(|value| format!("{value} (scaled units)"));
     text += &lines("decoder mean square: ", mean_square);
@@ -112,7 +113,7 @@ fn trajectory_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Result
             .chain(assessment.names.iter().cloned().flat_map(thrice)),
     );
     for (index, run) in assessment.runs.iter().enumerate() {
-        let (segment, latent) = (run.segment, &run.latent);
+        let (segment, latent) = (&*run.segment, &run.latent);
         let [full, restarted] =
             [&run.full, &run.restarted].map(|rollout| rollout.states(latent.time_s.len()));
         for (sample, states) in full.iter().zip(&restarted).enumerate() {

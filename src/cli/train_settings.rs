@@ -66,11 +66,19 @@ impl TrainSettings {
         set(&mut encoder.coordinates, self.coordinates);
         encoder.rotate &= !self.no_rotation;
         encoder.mirror_images = self.mirror_images;
-        if let Some(body) = &self.body {
-            options.set_body(body.clone());
+        let body = self
+            .body
+            .clone()
+            .or_else(|| self.walks(&options).then(BodyRows::all));
+        if let Some(body) = body {
+            options.set_body(body);
         }
         set(&mut options.regression.leave_out, self.leave_out.clone());
-        set(&mut options.regression.body_equations, self.body_equations);
+        let shared = self.walks(&options).then_some(BodyEquations::AllPhases);
+        set(
+            &mut options.regression.body_equations,
+            self.body_equations.or(shared),
+        );
         set(&mut options.regression.slack, self.slack);
         set(&mut options.regression.refinements, self.refinements);
         let growth = self.growth.map(|rate| Some(f64::from(rate)));
@@ -93,6 +101,13 @@ impl TrainSettings {
             path => Some(read_actuators(Path::new(path), Some(robot))?),
         };
         Ok(options)
+    }
+
+    /// Whether phases are those of a walk, and there are latent coordinates enough for all of the body.
+    fn walks(&self, options: &TrainOptions) -> bool {
+        let is_walk = matches!(self.phases, Some(PhaseSet::Trot | PhaseSet::Crawl));
+        let body = BodyRows::all();
+        is_walk && body.fits(options.latent_dim) && options.coordinates() == Coordinates::Named
     }
 
     /// Leaves out phases of a walk that the training recordings do not have, with a note for each. Another is printed if no

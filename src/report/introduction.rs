@@ -206,7 +206,7 @@ fn commands(content: &Content<'_>) -> Option<String> {
 fn recordings(content: &Content<'_>) -> Result<Table> {
     let rows = Jump::all(content)?.into_iter().map(|jump| {
         let rms = jump.body_rms_m();
-        (jump.place.words, jump.run.segment, rms)
+        (jump.place.words, &*jump.run.segment, rms)
     });
     let names = &content.assessment.names;
     let [x, z] = ["body.x", "body.z"].map(|body| names.iter().position(|name| name == body));

@@ -85,7 +85,7 @@ impl<'a> Jump<'a> {
     /// As a strip and as an animation; none without a robot.
     pub(crate) fn motion(&self, plan: Option<&Segment>) -> Option<(Figure, Film)> {
         let robot = self.model.robot().ok()?;
-        let segment = self.run.segment;
+        let segment = &*self.run.segment;
         let predicted = Motion {
             role: Role::Full,
             words: "model, whole jump".to_owned(),
@@ -129,7 +129,7 @@ impl<'a> Jump<'a> {
     }
 
     fn flights(&self) -> Vec<(f64, f64)> {
-        let Segment { time_s, feet, .. } = self.run.segment;
+        let Segment { time_s, feet, .. } = &*self.run.segment;
         let in_air = |sample: usize| !feet[sample].contains(&true);
         let spans = stretches(0..feet.len(), |a, b| in_air(a) == in_air(b)).into_iter();
         let flights = spans.filter(|span| in_air(span.start));

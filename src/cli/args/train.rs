@@ -265,10 +265,11 @@ pub(crate) struct TrainSettings {
     pub coordinates: Option<Coordinates>,
     /// Body coordinates whose momentum is a coordinate of its own, by flights or else by forces: a list with x and z of x,
     /// y, z, roll, pitch and yaw, or all. With y, roll or yaw left and right may differ [default: x,z; from 5 coordinates
-    /// on x,z,pitch]
+    /// on x,z,pitch; with --phases trot or crawl from 6 on all]
     #[arg(long, value_name = "LIST")]
     pub body: Option<BodyRows>,
-    /// Whether equations of these coordinates are one for all phases [default: per-phase]
+    /// Whether equations of these coordinates are one for all phases [default: per-phase, with --phases trot or crawl
+    /// all-phases]
     #[arg(long, value_enum)]
     pub body_equations: Option<BodyEquations>,
     /// Whether mirror images of the training recordings count as recordings, legs exchanged [default: added with y, roll

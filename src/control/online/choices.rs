@@ -58,6 +58,15 @@ pub enum Solver {
     Riccati = 1,
 }
 
+/// Where the legs of a command come from, numbered as [`Lift`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Legs {
+    /// Decoded from the latent state: for models that represent the legs.
+    Decoded = 0,
+    /// Those of the reference: joint targets, the losses along them, and the torques that the consistent lift stays near.
+    Reference = 1,
+}
+
 /// What follows when the time of the reference is over, numbered as [`Lift`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum AfterEnd {

@@ -199,14 +199,30 @@ impl ControlModel {
         [start, end]: [&[f64]; 2],
         step_s: f64,
     ) -> [f64; JOINT_DIM] {
-        let Some(actuators) = self.input_rule.actuators() else {
+        if self.input_rule.actuators().is_none() {
             return [0.0; JOINT_DIM];
-        };
-        let is_grounded = self.phases[phase].is_grounded;
+        }
         let [before, after] = [start, end].map(|state| {
             let (z, dz) = state.split_at(self.latent_dim());
             self.decode_velocities(z, dz)
         });
+        let middle = (0..self.latent_dim()).map(|i| 0.5 * (start[i] + end[i]));
+        let x = self.decode(&middle.collect::<Vec<f64>>());
+        self.losses_between((phase, feet), &x, [&before, &after], step_s)
+    }
+
+    /// The same at a state of the robot, between two of its rates.
+    pub(super) fn losses_between(
+        &self,
+        (phase, feet): (usize, ContactFlags),
+        x: &[f64; STATE_DIM],
+        [before, after]: [&[f64; STATE_DIM]; 2],
+        step_s: f64,
+    ) -> [f64; JOINT_DIM] {
+        let Some(actuators) = self.input_rule.actuators() else {
+            return [0.0; JOINT_DIM];
+        };
+        let is_grounded = self.phases[phase].is_grounded;
         let limit = self.robot().torque_limit_nm();
         let armature = if self.input_rule.inertia_is_loss(is_grounded) {
             actuators.armature
@@ -217,11 +233,9 @@ impl ControlModel {
         let mut losses =
             std::array::from_fn(|i| planned_loss(&of(i), before[i], after[i], step_s, limit[i]));
         if is_grounded && self.input_rule.legs().is_some() {
-            let middle = (0..self.latent_dim()).map(|i| 0.5 * (start[i] + end[i]));
-            let x = self.decode(&middle.collect::<Vec<f64>>());
             let dx = std::array::from_fn(|i| 0.5 * (before[i] + after[i]));
             let ddx = std::array::from_fn(|i| (after[i] - before[i]) / step_s);
-            let own = self.input_rule.leg_torques([&x, &dx, &ddx], feet);
+            let own = self.input_rule.leg_torques([x, &dx, &ddx], feet);
             losses
                 .iter_mut()
                 .zip(own)

@@ -155,7 +155,7 @@ impl Controller {
 
     /// Takes a new trajectory and sets up the solver for the rows near it; a plan for an earlier one is forgotten.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), ControlError> {
-        let mut reference = Reference::new(&self.plant, samples)?;
+        let mut reference = Reference::new(&self.plant, samples, &self.settings)?;
         if self.plant.is_nonlinear() {
             self.plant.take_statistics_at(&mean_state(samples.x));
         }

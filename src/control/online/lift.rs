@@ -9,7 +9,7 @@
 //!
 //! `τ` are the torques at the links and `τ + ℓ` the command, with the losses `ℓ`, never beyond the limits. `G(q, c)` maps
 //! torques to force and moment of the feet in contact, in the frame of the model's inputs; `m` and `S` are mean and
-//! covariance of the training torques in the phase, `R` turns the body frame upright.
+//! covariance of the training torques in the phase, or `m` the torques of the reference; `R` turns the body frame upright.
 //!
 //! Torques are written by the standard deviations of the training's, `τ = m + C y` with `C Cᵀ = S`, and with `A = M C /
 //! √w` and `r = (u_lat − M m) / √w` the program becomes
@@ -60,6 +60,8 @@ pub struct StanceState {
     pub phase: usize,
     /// Losses of the joints, N m, at most the torque limits; zero in a model without actuators.
     pub losses_nm: [f64; JOINT_DIM],
+    /// Torques at the links that the consistent lift stays near, N m; none for the mean of the training's in the phase.
+    pub near_nm: Option<[f64; JOINT_DIM]>,
 }
 
 impl StanceState {
@@ -71,6 +73,7 @@ impl StanceState {
             feet,
             phase,
             losses_nm: [0.0; JOINT_DIM],
+            near_nm: None,
         }
     }
 }
@@ -167,7 +170,8 @@ impl ConsistentLift {
         let wrench = wrench.map_err(|_| LiftFailure::SingularLeg)?.transpose();
         let deviation = self.deviation[stance.phase].ok_or(BROKEN)?;
         let deviation = deviation.as_flattened();
-        let mean = plant.phases()[stance.phase].torque_mean.as_slice();
+        let near = stance.near_nm.as_ref().map(<[f64; JOINT_DIM]>::as_slice);
+        let mean = near.unwrap_or(plant.phases()[stance.phase].torque_mean.as_slice());
         let (d, weight) = (u_lat.len(), self.prior_weight);
         let (projection, scaled_map) = (&self.projection, &mut self.scaled_map);
         let (wrench, mut y) = (wrench.as_slice(), [0.0; JOINT_DIM]);

@@ -55,8 +55,8 @@ pub use qp::{Cone, ConeProgram, QpSettings, QpSolver, SolverProfile, sparse};
 pub use reference::{Reference, ReferenceSamples};
 pub use routine::{Mode, Timing};
 pub use settings::{
-    AfterEnd, Drift, Drives, FallbackSettings, Lift, Linearisation, MissingInput, MpcSettings,
-    RowSelection, Solver,
+    AfterEnd, Drift, Drives, FallbackSettings, Legs, Lift, Linearisation, MissingInput,
+    MpcSettings, RowSelection, Solver,
 };
 pub use supervisor::Bounds;
 pub use trajectory::NO_PHASE;

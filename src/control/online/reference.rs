@@ -3,8 +3,11 @@
 use super::control_model::ControlModel;
 use super::dense::first_undefined;
 use super::error::ControlError;
-use super::trajectory::{Instant, Trajectory, write_between, write_still};
-use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
+use super::settings::MpcSettings;
+use super::trajectory::{EARLY_S, Instant, Trajectory, write_between, write_still};
+use crate::robot::{BODY_X, ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
+
+const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5]; // x, y, yaw
 
 /// A trajectory in SI units as its user has it: samples one after the other.
 #[derive(Debug, Clone, Copy)]
@@ -36,8 +39,12 @@ pub struct Reference {
     pub(super) input: Option<Vec<f64>>,
     /// Phase of each sample's feet.
     phase: Vec<usize>,
-    /// Robot states, 18 per sample.
+    feet: Vec<ContactFlags>,
+    /// Robot states and their rates, 18 per sample.
     x: Vec<f64>,
+    dx: Vec<f64>,
+    /// Torques at the links, 12 per sample, N m, if the trajectory has an input of its own.
+    torque_nm: Option<Vec<f64>>,
     deviation: Vec<f64>,
 }
 
@@ -46,6 +53,7 @@ impl Reference {
     pub(crate) fn new(
         plant: &ControlModel,
         samples: ReferenceSamples<'_>,
+        settings: &MpcSettings,
     ) -> Result<Self, ControlError> {
         check(plant, &samples)?;
         let d = plant.latent_dim();
@@ -64,13 +72,24 @@ impl Reference {
             input: samples.u.map(|u| project_all(plant, samples.x, u)),
             time_s: samples.time_s.to_vec(),
             phase: samples.feet.iter().map(phase).collect(),
+            feet: samples.feet.to_vec(),
             x: samples.x.to_vec(),
+            dx: samples.dx.to_vec(),
+            torque_nm: samples.u.map(|u| {
+                let rows = u.chunks_exact(STATE_DIM);
+                rows.flat_map(|u| &u[..JOINT_DIM]).copied().collect()
+            }),
         };
         let [lower, upper] = plant.joint_limits();
         let decoder = plant.decoder.rows(0, JOINT_DIM).transpose();
         let (mut still, mut deviation) = (vec![0.0; 2 * d], vec![0.0; 2 * d]);
         write_still(decoder.as_slice(), &lower, &upper, d, &mut still);
         reference.write_deviations(&still, &mut deviation);
+        let place = PLACE.map(|row| plant.encoder.column(row));
+        let place: Vec<f64> = (0..d).flat_map(|k| place.map(|of| of[k])).collect();
+        let [place_m, heading_rad] =
+            [settings.place_scale_m, settings.heading_scale_rad].map(Option::unwrap_or_default);
+        reference.write_place_scales(&place, place_m, heading_rad, &mut deviation);
         reference.deviation = deviation;
         Ok(reference)
     }
@@ -88,11 +107,36 @@ impl Reference {
 
     /// The robot's state at a time, between samples on the line from one to the next.
     pub(super) fn robot_state_at(&self, time_s: f64) -> [f64; STATE_DIM] {
+        self.between(&self.x, time_s)
+    }
+
+    /// Its rate, zero before the first sample and after the last.
+    pub(super) fn robot_rate_at(&self, time_s: f64) -> [f64; STATE_DIM] {
+        match time_s < self.start_s() || self.is_over(time_s) {
+            true => [0.0; STATE_DIM],
+            false => self.between(&self.dx, time_s),
+        }
+    }
+
+    /// Of measured feet on the ground those that are there in the trajectory now or soon. One that should swing but still drags
+    /// is not to carry.
+    pub(super) fn carrying(&self, time_s: f64, measured: ContactFlags) -> ContactFlags {
+        let [now, soon] =
+            [time_s, time_s + EARLY_S].map(|time_s| self.feet[self.locate(time_s).sample]);
+        std::array::from_fn(|foot| measured[foot] && (now[foot] || soon[foot]))
+    }
+
+    /// The torques at the links, N m, if they are known.
+    pub(super) fn torque_at(&self, time_s: f64) -> Option<[f64; JOINT_DIM]> {
+        Some(self.between(self.torque_nm.as_ref()?, time_s))
+    }
+
+    fn between<const N: usize>(&self, values: &[f64], time_s: f64) -> [f64; N] {
         let Instant { sample, share } = self.locate(time_s);
-        let earlier = row(&self.x, sample);
-        let later = row(&self.x, (sample + 1).min(self.time_s.len() - 1));
-        let mut state = [0.0; STATE_DIM];
-        write_between(earlier, later, share, &mut state);
+        let later = (sample + 1).min(self.time_s.len() - 1);
+        let [earlier, later] = [sample, later].map(|sample| &values[sample * N..][..N]);
+        let mut state = [0.0; N];
+        write_between(earlier, later, share, N, &mut state);
         state
     }
 

@@ -2,7 +2,7 @@
 //! Rust and C, their checks, the headers, the Python binding and the parameters of ROS are made.
 
 pub use super::choices::{
-    AfterEnd, Drift, Lift, Linearisation, MissingInput, RowSelection, Solver,
+    AfterEnd, Drift, Legs, Lift, Linearisation, MissingInput, RowSelection, Solver,
 };
 use super::error::ControlError;
 use super::qp::QpSettings;
@@ -197,6 +197,8 @@ in_c! {
         [number] => [Self::Clarabel, Self::Riccati][number as usize];
     QpSettings, 1: (value, _none) [f64::from(value.max_iterations)],
         [number] => Self { max_iterations: number as u32, ..Self::default() };
+    Legs, 1: (value, _none) [f64::from(value as u8)],
+        [number] => [Self::Decoded, Self::Reference][number as usize];
     AfterEnd, 1: (value, _none) [f64::from(value as u8)],
         [number] => [Self::Hold, Self::Damp, Self::Stop][number as usize];
 }
@@ -397,6 +399,14 @@ settings! {
         flight_torque: f64 = 1.0 => flight_torque: Real, Accepts::Share,
             "share of the torques that acts in flight, 0 to 1; 0 leaves the legs to the joint PD",
             in_ros "share of the feed-forward torques that acts in flight, 0 to 1; 0 leaves the legs to the PD";
+        /// Of a walk the deviation over the reference grows with the path.
+        place_scale_m: Option<f64> = None => place_scale_m: Real, Accepts::Optional,
+            "scale of deviations in x and y, m; 0 takes their standard deviation over the reference";
+        heading_scale_rad: Option<f64> = None => heading_scale_rad: Real, Accepts::Optional,
+            "the same in yaw, rad";
+        legs: Legs = Legs::Decoded => legs: i32, Accepts::Whole(0, 1, "0 (decoded) or 1 (reference)"),
+            "joint targets, losses and prior torques: UPPER_LEGS_DECODED (default) or _OF_REFERENCE",
+            in_c "joint targets, losses and prior torques: UPPER_LEGS_DECODED or _OF_REFERENCE";
         after_end: AfterEnd = AfterEnd::Hold => after_end: i32, Accepts::Whole(0, 2, "0 (hold), 1 (damp) or 2 (stop)"),
             "after the reference: UPPER_HOLD (default), _DAMP or _STOP", in_c "after the reference: UPPER_HOLD, _DAMP or _STOP";
         /// Chosen so that no right recording, plan or simulated jump of the repository comes near; see `docs/control.md`.

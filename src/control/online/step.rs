@@ -6,7 +6,7 @@ use super::command::{Command, Source, Status};
 use super::control_model::{ControlModel, violation};
 use super::controller::{Controller, Measurement, SOFTENED_FROM, foot_height};
 use super::lift::StanceState;
-use super::settings::AfterEnd;
+use super::settings::{AfterEnd, Legs};
 use super::stage::unscale;
 use super::supervisor::{Bounds, Fault, Supervisor};
 use super::trajectory::{NO_PHASE, Trajectory};
@@ -58,7 +58,12 @@ impl Controller {
         let (plan, fallback) = (&self.plan, &self.settings.fallback);
         let (states, most) = (&plan.states, fallback.jump_deviations);
         let is_jump = (plan.time).is_jump(time_s, states, horizon, measured, deviation, d, most);
-        if self.memory.refuses(is_jump, fallback.jump_patience) {
+        // Every touchdown of a walk is a jump of velocities; the supervisor still watches for leaps.
+        let patience = match self.settings.legs {
+            Legs::Decoded => fallback.jump_patience,
+            Legs::Reference => 0,
+        };
+        if self.memory.refuses(is_jump, patience) {
             return Err(Status::MeasurementJump);
         }
         if let Some(time_constant_s) = self.settings.effectiveness {
@@ -112,7 +117,13 @@ impl Controller {
         let is_grounded = self.plant.phases()[phase].is_grounded;
         let first = &self.horizon.stages[0].model;
         self.effectiveness.begin(first, is_grounded);
-        self.stance = Some(StanceState::at(measurement.x, measurement.feet, phase));
+        let feet = match (&self.reference, self.settings.legs) {
+            (Some(reference), Legs::Reference) => {
+                reference.carrying(measurement.time_s, measurement.feet)
+            }
+            _ => measurement.feet,
+        };
+        self.stance = Some(StanceState::at(measurement.x, feet, phase));
         if !self.write_plan(0, measurement.time_s, command) {
             return Status::LiftFailed;
         }
@@ -142,7 +153,11 @@ impl Controller {
             *input /= self.effectiveness.share.estimate;
         }
         command.phase = Some(plan.time.phase);
-        let mut joints = self.plant.decode_joints(z);
+        let of_reference = self.settings.legs == Legs::Reference;
+        let mut joints = match of_reference {
+            true => joints_of(&reference.robot_state_at(time_s)),
+            false => self.plant.decode_joints(z),
+        };
         let in_flight = !self.plant.phases()[plan.time.phase].is_grounded;
         if in_flight && self.settings.swing_turn > 0.0 {
             let error = stance.attitude_rad[1] - reference.attitude_at(time_s)[1];
@@ -150,11 +165,21 @@ impl Controller {
             self.plant.robot().turn_legs(turn_rad, &mut joints);
         }
         let [lower, upper] = self.plant.joint_limits();
-        command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
-        let (ends, phase) = ([plan.start(stage), plan.end(stage)], plan.time.phase);
-        stance.losses_nm = self
-            .plant
-            .planned_losses((phase, stance.feet), ends, step_s);
+        let at = (plan.time.phase, stance.feet);
+        if of_reference {
+            command.joint_velocity_rad_s = joints_of(&reference.robot_rate_at(time_s));
+            let start_s = plan.time.stage_s(stage);
+            let [before, after] =
+                [start_s, start_s + step_s].map(|time_s| reference.robot_rate_at(time_s));
+            let x = reference.robot_state_at(start_s + 0.5 * step_s);
+            let rates = [&before, &after];
+            stance.losses_nm = self.plant.losses_between(at, &x, rates, step_s);
+            stance.near_nm = reference.torque_at(now_s + 0.5 * held_s);
+        } else {
+            command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
+            let ends = [plan.start(stage), plan.end(stage)];
+            stance.losses_nm = self.plant.planned_losses(at, ends, step_s);
+        }
         let stance = *stance;
         let Ok(torque) = self.lift(&command.u_lat, &stance) else {
             return false;
@@ -187,6 +212,10 @@ impl Controller {
         let force = SVector::<f64, 6>::from_fn(|axis, _| lifted[JOINT_DIM + axis]);
         (force.norm() > SMALL_FORCE_N).then(|| (force - produced).norm() / force.norm())
     }
+}
+
+fn joints_of(state: &[f64; STATE_DIM]) -> [f64; JOINT_DIM] {
+    std::array::from_fn(|joint| state[joint])
 }
 
 /// Whether the supervisor lets a measurement pass, beside the state that the robot should have.

@@ -16,7 +16,10 @@ pub const LINK_TOLERANCE: f64 = 1e-12;
 /// How soft the rows of such a program are within a step, see [`Links`].
 pub const LINK_SOFTNESS: f64 = 1e-8;
 /// Most latent coordinates that the solver is compiled for.
-pub const MAX_STRUCTURED_DIM: usize = 8;
+pub const MAX_STRUCTURED_DIM: usize = 18;
+/// The dimensions that it is compiled for, with wide vectors or rows that link stages; with narrow vectors the fewer.
+const DIMENSIONS: [usize; 6] = [2, 4, 6, 8, 12, 18];
+const FEWER_DIMENSIONS: [usize; 4] = [4, 8, 12, 18];
 
 /// The solver of a horizon, or of a lift where there are no states; refused above [`MAX_STRUCTURED_DIM`] coordinates.
 /// Dimensions between those compiled are filled up with inputs and states that nothing moves: same bits.
@@ -36,8 +39,12 @@ pub(super) fn structured(
     };
     // Programs with links, which are rare, do with narrow vectors; of these fewer dimensions are compiled.
     let is_wide = has_avx2() && !is_linked;
-    let multiple = if is_wide || is_linked { 2 } else { 4 };
-    let inputs = shape.inputs.next_multiple_of(multiple);
+    let compiled = match is_wide || is_linked {
+        true => &DIMENSIONS[..],
+        false => &FEWER_DIMENSIONS,
+    };
+    let fits = compiled.iter().find(|inputs| **inputs >= shape.inputs);
+    let inputs = fits.copied().unwrap_or(usize::MAX);
     macro_rules! of_dimension {
         ($(($wide:literal, $linked:literal): $(($nx:literal, $nu:literal))*;)*) => {
             match (is_wide, is_linked, is_lift, inputs) {
@@ -52,9 +59,9 @@ pub(super) fn structured(
         };
     }
     of_dimension! {
-        (true, false): (4, 2) (8, 4) (12, 6) (16, 8) (1, 12);
-        (false, false): (8, 4) (16, 8) (1, 12);
-        (false, true): (4, 2) (8, 4) (12, 6) (16, 8);
+        (true, false): (4, 2) (8, 4) (12, 6) (16, 8) (24, 12) (36, 18) (1, 12);
+        (false, false): (8, 4) (16, 8) (24, 12) (36, 18) (1, 12);
+        (false, true): (4, 2) (8, 4) (12, 6) (16, 8) (24, 12) (36, 18);
     }
 }
 

@@ -19,6 +19,8 @@ const STILL_TIME_S: Real = 0.1;
 const STATE_REACH: Real = 4.0;
 /// Share of a stage from which on a command counts as held for all of it.
 const WHOLE_STAGE: f64 = 0.75;
+/// By how much feet may touch down too early, s.
+pub(super) const EARLY_S: f64 = 0.04;
 /// Phase of feet that select none.
 pub const NO_PHASE: usize = 255;
 
@@ -215,6 +217,27 @@ pub(super) trait Trajectory {
         }
     }
 
+    /// Takes other scales for latent coordinates along x, y and yaw, if they are given: `place` has for each coordinate how
+    /// far it moves with each of the three (`3 d`), SI.
+    fn write_place_scales(
+        &self,
+        place: &[Real],
+        place_m: Real,
+        heading_rad: Real,
+        deviation: &mut [Real],
+    ) {
+        for i in 0..self.latent_dim() {
+            let path = place[3 * i].abs() + place[3 * i + 1].abs();
+            let turn = place[3 * i + 2].abs();
+            if place_m > 0.0 && path > 0.0 {
+                deviation[i] = place_m * path;
+            }
+            if heading_rad > 0.0 && turn > 0.0 && path <= 0.0 {
+                deviation[i] = heading_rad * turn;
+            }
+        }
+    }
+
     /// Whether a state within `STATE_REACH` standard deviations of some state of the trajectory reaches `row · z =
     /// bound`.
     fn comes_near(&self, row: &[Real], bound: Real, deviation: &[Real]) -> bool {
@@ -326,9 +349,15 @@ pub(super) trait Trajectory {
     }
 }
 
-/// Writes what is between two states of the robot.
-pub(super) fn write_between(earlier: &[Real], later: &[Real], share: Real, state: &mut [Real]) {
-    for i in 0..18 {
+/// Writes what is between two states of the robot, or what else changes along a straight line.
+pub(super) fn write_between(
+    earlier: &[Real],
+    later: &[Real],
+    share: Real,
+    count: usize,
+    state: &mut [Real],
+) {
+    for i in 0..count {
         state[i] = earlier[i] + share * (later[i] - earlier[i]);
     }
 }

@@ -41,6 +41,7 @@ mod delays;
 mod error;
 mod files;
 mod foreign;
+mod heading;
 mod lines;
 mod phases;
 mod reader;
@@ -59,6 +60,7 @@ pub use foreign::{
     guess::{Guess, guess},
     map::ColumnMap,
 };
+pub use heading::stride_s;
 pub use phases::{CHATTER_SAMPLES, PhasePattern, PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Column, Reader, Reading, ReadingNotes, read, read_from_bytes};
 pub use segment::{Recording, Segment, between, stretches};

@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use super::aslip::AslipRollout;
 use super::coordinates::LiftSums;
 use super::*;
@@ -5,7 +7,8 @@ use crate::recording::mismatch::notes;
 
 #[derive(Debug, Clone)]
 pub struct SegmentRun<'a> {
-    pub segment: &'a Segment,
+    /// The recorded one, or a piece of it in the axes of its heading ([`Segment::by_heading`]).
+    pub segment: Cow<'a, Segment>,
     pub latent: LatentSegment,
     pub full: Rollout,
     pub restarted: Rollout,
@@ -18,6 +21,8 @@ pub struct Assessment<'a> {
     pub names: Vec<String>,
     pub units: Vec<String>,
     pub restart_every_s: f64,
+    /// The motions as they are recorded.
+    pub recorded: Vec<&'a Segment>,
     pub runs: Vec<SegmentRun<'a>>,
     pub full: CoordinateSums,
     pub restarted: CoordinateSums,
@@ -28,6 +33,8 @@ pub struct Assessment<'a> {
     pub decoded: CoordinateSums,
     pub baselines: Vec<Baseline>,
     pub linearised: Vec<Option<LinearisedPhase>>,
+    /// Of walks.
+    pub stride: Option<StrideGrowth>,
     pub lift: LiftSums,
     pub active_terms: usize,
     pub remarks: Vec<String>,
@@ -47,9 +54,16 @@ impl<'a> Assessment<'a> {
         recordings: &'a [Recording],
         restart_every_s: f64,
     ) -> Result<Self> {
-        let segments: Vec<&Segment> = (recordings.iter())
+        let recorded: Vec<&Segment> = (recordings.iter())
             .flat_map(|recording| &recording.segments)
             .collect();
+        let pieces: Vec<Vec<Cow<'a, Segment>>> = recorded
+            .iter()
+            .map(|segment| segment.by_heading())
+            .collect();
+        let cut = pieces.iter().filter(|pieces| pieces.len() > 1).count();
+        let pieces: Vec<Cow<'a, Segment>> = pieces.into_iter().flatten().collect();
+        let segments: Vec<&Segment> = pieces.iter().map(|piece| &**piece).collect();
         let compiled = CompiledModel::new(model)?;
         let (names, units) = match model.state() {
             Some(state) => (state.names.clone(), state.units.clone()),
@@ -57,11 +71,19 @@ impl<'a> Assessment<'a> {
         };
         let full = CoordinateSums::new(model)?;
         let rule = model.input_rule()?;
+        let mut remarks = remarks(model, recordings)?;
+        if cut > 0 {
+            remarks.push(format!(
+                "{cut} of {} motions turn by more than 0.25 rad: they are cut into pieces, each in the axes of its heading",
+                recorded.len()
+            ));
+        }
         let mut assessment = Self {
             names,
             units,
             restart_every_s,
             runs: Vec::with_capacity(segments.len()),
+            recorded,
             restarted: full.clone(),
             constant_velocity: [full.clone(), full.clone()],
             decoded: full.clone(),
@@ -69,12 +91,14 @@ impl<'a> Assessment<'a> {
             pointwise: PointwiseSums::new(model),
             baselines: Baseline::all(&rule, &segments)?,
             linearised: Vec::new(),
+            stride: None,
             lift: LiftSums::default(),
             active_terms: model.phases().iter().map(|p| p.active_count()).sum(),
-            remarks: remarks(model, recordings)?,
+            remarks,
         };
         let restart = Restart::Every(restart_every_s);
-        for segment in segments {
+        for piece in &pieces {
+            let segment = &**piece;
             let latent = LatentSegment::encode(model, segment)?;
             let full = rollout(&compiled, &latent, Restart::Never);
             let restarted = rollout(&compiled, &latent, restart);
@@ -90,7 +114,7 @@ impl<'a> Assessment<'a> {
             let baselines = assessment.baselines.iter_mut();
             let baselines = baselines.map(|baseline| baseline.add(&rule, segment, restart));
             assessment.runs.push(SegmentRun {
-                segment,
+                segment: piece.clone(),
                 full,
                 restarted,
                 baselines: baselines.collect::<Result<_, _>>()?,
@@ -98,7 +122,9 @@ impl<'a> Assessment<'a> {
             });
         }
         let latent: Vec<&LatentSegment> = assessment.runs.iter().map(|run| &run.latent).collect();
-        assessment.linearised = linearise_phases(&compiled, &latent);
+        let linearised = linearise_phases(&compiled, &latent);
+        assessment.stride = StrideGrowth::of(model, &linearised, &latent);
+        assessment.linearised = linearised;
         Ok(assessment)
     }
 

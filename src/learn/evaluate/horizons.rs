@@ -1,6 +1,7 @@
 //! Prediction errors of all coordinates over several horizons, compared with baselines: a constant velocity, a robot at
-//! rest, the mean training jump, and a rigid body.
+//! rest, the mean training jump, a rigid body, and of walks a linear inverted pendulum.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::coordinates::coasted;
@@ -8,35 +9,89 @@ use super::*;
 
 /// Times between restarts, s.
 const RESTARTS_S: [f64; 3] = [0.1, 0.2, 0.3];
+const LONG_S: f64 = 2.0; // of walks
 const MODEL: &str = "model";
 const CONSTANT_VELOCITY: &str = "constant velocity";
 const AT_REST: &str = "at rest";
 const MEAN_JUMP: &str = "mean training jump";
 const RIGID_BODY: &str = "rigid body";
+const PENDULUM: &str = "pendulum";
 
-impl Horizon {
-    /// Predictions with restarts every 0.1, 0.2 and 0.3 s, all samples; and from each take-off, the sample of the
-    /// touchdown only.
-    pub fn all(model: &ReducedModel, assessment: &Assessment<'_>) -> Result<Vec<Self>> {
+/// A motion with its latent samples, and the accelerations that baselines give the body.
+struct Motion<'a> {
+    segment: Cow<'a, Segment>,
+    latent: Cow<'a, LatentSegment>,
+    rigid_body: Option<DMatrix<f64>>, // 6 x n
+    pendulum: Option<Pendulum>,
+}
+
+impl<'a> Horizon {
+    /// Predictions with restarts every 0.1, 0.2 and 0.3 s, all samples; of walks also over a stride and 2 s, each from the axes
+    /// of the heading at its start; and from each take-off, the sample of the touchdown only.
+    pub fn all(model: &ReducedModel, assessment: &'a Assessment<'_>) -> Result<Vec<Self>> {
         let compiled = CompiledModel::new(model)?;
-        let segments: Vec<&Segment> = assessment.runs.iter().map(|run| run.segment).collect();
+        let segments: Vec<&Segment> = assessment.runs.iter().map(|run| &*run.segment).collect();
         let baselines = Baselines {
             mean_jump: MeanJump::of(model)?,
             rigid_body: RigidBody::of(model, &segments)?,
         };
+        let stride_s = stride_s(assessment.recorded.iter().copied());
         let names = [MODEL, CONSTANT_VELOCITY, AT_REST].into_iter();
         let names = names.chain(baselines.mean_jump.as_ref().map(|_| MEAN_JUMP));
         let names = names.chain(baselines.rigid_body.as_ref().map(|_| RIGID_BODY));
+        let names = names.chain(stride_s.map(|_| PENDULUM));
         let sums = CoordinateSums::new(model)?;
         let predictors: Vec<_> = names.map(|name| (name, sums.clone())).collect();
+        let motion = |segment: Cow<'a, Segment>, latent: Cow<'a, LatentSegment>| {
+            let pendulum = stride_s
+                .map(|_| Pendulum::of(model, &segment))
+                .transpose()?;
+            Ok(Motion {
+                rigid_body: (baselines.rigid_body.as_ref())
+                    .map(|body| body.accelerations(&segment))
+                    .transpose()?,
+                pendulum,
+                segment,
+                latent,
+            })
+        };
+        let runs = assessment
+            .runs
+            .iter()
+            .map(|run| motion(Cow::Borrowed(&*run.segment), Cow::Borrowed(&run.latent)));
+        let runs: Vec<Motion<'_>> = runs.collect::<Result<_>>()?;
+        let mut horizons = Vec::new();
         let restarts = RESTARTS_S.map(|time_s| (format!("{time_s} s"), Restart::Every(time_s)));
-        let flights = ("take-off to touchdown".to_owned(), Restart::Never);
-        let all = restarts.into_iter().chain([flights]);
-        all.map(|(name, restart)| {
+        for (name, restart) in restarts {
+            horizons.push((name, restart, None));
+        }
+        for (name, time_s) in stride_s.into_iter().flat_map(|stride_s| {
+            [
+                (format!("stride, {stride_s:.2} s"), stride_s),
+                (format!("{LONG_S} s"), LONG_S),
+            ]
+        }) {
+            let mut long = Vec::new();
+            for segment in assessment.recorded.iter().copied() {
+                for window in restart_windows(&segment.time_s, Restart::Every(time_s)) {
+                    let lasts_s = segment.time_s[window.end - 1] - segment.time_s[window.start];
+                    if lasts_s < 0.95 * time_s {
+                        continue;
+                    }
+                    let own = segment.slice(window).in_its_heading();
+                    let latent = LatentSegment::encode(model, &own)?;
+                    long.push(motion(Cow::Owned(own), Cow::Owned(latent))?);
+                }
+            }
+            horizons.push((name, Restart::Every(f64::INFINITY), Some(long)));
+        }
+        horizons.push(("take-off to touchdown".to_owned(), Restart::Never, None));
+        let all = horizons.into_iter();
+        all.map(|(name, restart, motions)| {
             let predictors = predictors.clone();
             let mut horizon = Self { name, predictors };
-            for (run, place) in assessment.runs.iter().zip(0..) {
-                horizon.add(model, &compiled, (run, place), &baselines, restart)?;
+            for motion in motions.as_ref().unwrap_or(&runs) {
+                horizon.add(model, &compiled, motion, &baselines, restart)?;
             }
             Ok(horizon)
         })
@@ -47,11 +102,11 @@ impl Horizon {
         &mut self,
         model: &ReducedModel,
         compiled: &CompiledModel,
-        (run, place): (&SegmentRun<'_>, usize),
+        motion: &Motion<'_>,
         baselines: &Baselines,
         restart: Restart,
     ) -> Result<()> {
-        let (segment, latent) = (run.segment, &run.latent);
+        let (segment, latent) = (&*motion.segment, &*motion.latent);
         let flights = flights(segment)?;
         let is_flight = restart == Restart::Never;
         let windows = match is_flight {
@@ -78,9 +133,20 @@ impl Horizon {
                             from + after - before
                         })
                     }
+                    PENDULUM => {
+                        let pendulum = motion.pendulum.as_ref();
+                        let moved = pendulum.map(|of| of.moved(segment, start..sample));
+                        for (row, moved) in [BODY_X, BODY_X + 1]
+                            .into_iter()
+                            .zip(moved.into_iter().flatten())
+                        {
+                            sums.add_one(segment, sample, phase, (row, moved));
+                        }
+                        None
+                    }
                     _ => {
-                        let body = baselines.rigid_body.as_ref();
-                        let moved = body.map(|body| body.moved(segment, place, start..sample));
+                        let moved = (motion.rigid_body.as_ref())
+                            .map(|by| moved_by(segment, by, start..sample));
                         for (row, moved) in BODY.into_iter().zip(moved.into_iter().flatten()) {
                             sums.add_one(segment, sample, phase, (row, moved));
                         }
@@ -165,7 +231,8 @@ const BODY: [usize; BODY_DIM] = [
 /// `ddx = F_x / m` and likewise `y`, `ddz = F_z / m - g`, `ddpitch = M_y / I_y` and likewise roll and yaw, with `1 / m` and
 /// `1 / I` by least squares of the recorded accelerations.
 struct RigidBody {
-    accelerations: Vec<DMatrix<f64>>, // of every segment, 6 x n
+    by: [f64; 4], // 1 / m, then 1 / I of roll, pitch and yaw
+    rule: InputRule,
 }
 
 impl RigidBody {
@@ -173,10 +240,8 @@ impl RigidBody {
     fn of(model: &ReducedModel, segments: &[&Segment]) -> Result<Option<Self>> {
         let rule = model.input_rule()?;
         let rule = InputRule::new(rule.robot(), rule.actuators().cloned(), WrenchFrame::Ground);
-        let mut loads = Vec::new();
         // Load times acceleration and load squared; of the mass, then of the inertias.
         let mut sums = [[0.0; 2]; 4];
-        let inertia = |i: usize| i.saturating_sub(2);
         for segment in segments {
             let load = segment.input(&rule)?.rows(JOINT_DIM, BODY_DIM).into_owned();
             for (sample, load) in load.column_iter().enumerate() {
@@ -187,34 +252,96 @@ impl RigidBody {
                     of[1] += load[i] * load[i];
                 }
             }
-            loads.push(load);
         }
         if sums.iter().any(|of| of[1] <= 0.0) {
             return Ok(None);
         }
         let by = sums.map(|of| of[0] / of[1]);
-        let accelerations = loads.into_iter().map(|mut load| {
-            for (i, mut row) in load.row_iter_mut().enumerate() {
-                row *= by[inertia(i)];
-            }
-            load.row_mut(2).add_scalar_mut(-GRAVITY_M_S2);
-            load
-        });
-        let accelerations = accelerations.collect();
-        Ok(Some(Self { accelerations }))
+        Ok(Some(Self { by, rule }))
     }
 
-    /// Where a body is after the samples of a range, from its state at the first.
-    fn moved(&self, segment: &Segment, place: usize, range: Range<usize>) -> [f64; BODY_DIM] {
-        let accelerations = &self.accelerations[place];
-        std::array::from_fn(|i| {
-            let state = |m: &DMatrix<f64>| m[(BODY[i], range.start)];
+    /// Of the body, 6 x n.
+    fn accelerations(&self, segment: &Segment) -> Result<DMatrix<f64>> {
+        let mut load = (segment.input(&self.rule)?.rows(JOINT_DIM, BODY_DIM)).into_owned();
+        for (i, mut row) in load.row_iter_mut().enumerate() {
+            row *= self.by[inertia(i)];
+        }
+        load.row_mut(2).add_scalar_mut(-GRAVITY_M_S2);
+        Ok(load)
+    }
+}
+
+fn inertia(row: usize) -> usize {
+    row.saturating_sub(2)
+}
+
+/// Where a body with these accelerations (6 x n) is after the samples of a range, from its state at the first.
+fn moved_by(
+    segment: &Segment,
+    accelerations: &DMatrix<f64>,
+    range: Range<usize>,
+) -> [f64; BODY_DIM] {
+    std::array::from_fn(|i| {
+        let state = |m: &DMatrix<f64>| m[(BODY[i], range.start)];
+        let (mut position, mut velocity) = (state(&segment.x), state(&segment.dx));
+        for sample in range.clone() {
+            let h = segment.time_s[sample + 1] - segment.time_s[sample];
+            let [before, after] = [sample, sample + 1].map(|k| accelerations[(i, k)]);
+            position += h * velocity + h * h * (2.0 * before + after) / 6.0;
+            velocity += 0.5 * h * (before + after);
+        }
+        position
+    })
+}
+
+/// A linear inverted pendulum over the middle `p` of the feet on the ground: `ddx = (g / h) (x - p_x)` and likewise `y`, with
+/// the mean height `h` of the body over its feet (Kajita et al. 2001); without a foot on the ground `ddx = 0`.
+struct Pendulum {
+    middle: Vec<Option<[f64; 2]>>,
+    rate_per_s2: f64, // g / h
+}
+
+impl Pendulum {
+    fn of(model: &ReducedModel, segment: &Segment) -> Result<Self> {
+        let robot = model.robot()?;
+        let (mut height, mut stances) = (0.0, 0.0);
+        let middle = (0..segment.len()).map(|sample| {
+            let x = segment.state(sample);
+            let down: Vec<_> = Leg::down(segment.feet[sample])
+                .map(|leg| robot.foot_in_world(leg, &x))
+                .collect();
+            let count = down.len() as f64;
+            let mean = |axis: usize| down.iter().map(|foot| foot[axis]).sum::<f64>() / count;
+            (!down.is_empty()).then(|| {
+                height += x[BODY_Z] - mean(2);
+                stances += 1.0;
+                [mean(0), mean(1)]
+            })
+        });
+        let middle = middle.collect();
+        let height: f64 = height / f64::max(stances, 1.0);
+        let rate_per_s2 = if height > 0.0 {
+            GRAVITY_M_S2 / height
+        } else {
+            0.0
+        };
+        Ok(Self {
+            middle,
+            rate_per_s2,
+        })
+    }
+
+    /// x and y after the samples of a range, from the state at the first: semi-implicit steps.
+    fn moved(&self, segment: &Segment, range: Range<usize>) -> [f64; 2] {
+        std::array::from_fn(|axis| {
+            let state = |m: &DMatrix<f64>| m[(BODY_X + axis, range.start)];
             let (mut position, mut velocity) = (state(&segment.x), state(&segment.dx));
             for sample in range.clone() {
                 let h = segment.time_s[sample + 1] - segment.time_s[sample];
-                let [before, after] = [sample, sample + 1].map(|k| accelerations[(i, k)]);
-                position += h * velocity + h * h * (2.0 * before + after) / 6.0;
-                velocity += 0.5 * h * (before + after);
+                if let Some(middle) = self.middle[sample] {
+                    velocity += h * self.rate_per_s2 * (position - middle[axis]);
+                }
+                position += h * velocity;
             }
             position
         })

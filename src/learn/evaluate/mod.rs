@@ -17,6 +17,7 @@ mod horizons;
 mod invariance;
 mod prediction;
 mod round_trip;
+mod stride;
 mod verdict;
 
 pub use along_recording::{ReferenceInput, Run, StepRow, along_recording};
@@ -31,6 +32,8 @@ pub use invariance::Invariance;
 pub use prediction::{LinearisedPhase, PredictionError, eigenvalues};
 pub(crate) use prediction::{linearise_phases, state_matrix};
 pub use round_trip::RoundTrip;
+pub use stride::StrideGrowth;
+pub(crate) use stride::{transition, usual_stride};
 pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
 
 use coordinates::Mean;
@@ -49,7 +52,8 @@ use crate::mpc::{
     Solver, StanceState, Status, foot_forces,
 };
 use crate::recording::{
-    CHATTER_SAMPLES, PhaseRule, Recording, RecordingError, Segment, Stance, between,
+    CHATTER_SAMPLES, PhaseRule, Recording, RecordingError, Segment, Stance, between, stretches,
+    stride_s,
 };
 use crate::robot::{
     BODY_DIM, BODY_X, BODY_Z, ContactFlags, GRAVITY_M_S2, InputRule, JOINT_DIM, Leg, Robot,

@@ -143,6 +143,8 @@ const RANK_THRESHOLD: f64 = 0.01;
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearisedPhase {
     pub samples: usize,
+    /// `d ddz / d (z, dz)`, `d x 2d`.
+    pub rates: DMatrix<f64>,
     /// Eigenvalues of `A = [0 I; d ddz/dz  d ddz/d dz]`, in 1/s, by falling real part.
     pub eigenvalues: Vec<Complex<f64>>,
     /// Singular values of the input gain `B = d ddz / d u_lat`, falling.
@@ -204,13 +206,15 @@ fn linearise_phase(
     if jacobian.iter().any(|value| !value.is_finite()) {
         return None;
     }
-    let mut eigenvalues = eigenvalues(state_matrix(&jacobian.columns(0, 2 * d).into_owned()))?;
+    let rates = jacobian.columns(0, 2 * d).into_owned();
+    let mut eigenvalues = eigenvalues(state_matrix(&rates))?;
     eigenvalues.sort_by(|a, b| b.re.total_cmp(&a.re).then(b.im.total_cmp(&a.im)));
     let gain = jacobian.columns(2 * d, d).into_owned();
     let mut input_singular_values: Vec<f64> = gain.singular_values().iter().copied().collect();
     input_singular_values.sort_by(|a, b| b.total_cmp(a));
     Some(LinearisedPhase {
         samples,
+        rates,
         eigenvalues,
         input_singular_values,
     })

@@ -204,6 +204,7 @@ pub fn words_of_setting(name: &str) -> Vec<&'static str> {
         "lift" => LIFTS.map(|(word, ..)| word).to_vec(),
         "solver" => SOLVERS.map(|(word, ..)| word).to_vec(),
         "linearisation" => vec!["reference", "last_plan"],
+        "legs" => vec!["decoded", "reference"],
         "after_end" => vec!["hold", "damp", "stop"],
         _ => Vec::new(),
     }

@@ -2,14 +2,16 @@
 
 use super::*;
 
+pub(super) const Y: usize = BODY_X + 1;
+pub(super) const ROLL: usize = JOINT_DIM + 3;
 pub(super) const PITCH: usize = JOINT_DIM + 4;
 /// In the order of their rows: those in the plane of a symmetric motion, then those that change sign in a mirror image.
 const NAMED: [(&str, usize); 6] = [
     ("x", BODY_X),
     ("z", BODY_Z),
     ("pitch", PITCH),
-    ("y", JOINT_DIM + 1),
-    ("roll", JOINT_DIM + 3),
+    ("y", Y),
+    ("roll", ROLL),
     ("yaw", JOINT_DIM + 5),
 ];
 const IN_PLANE: usize = 3;
@@ -35,6 +37,17 @@ impl BodyRows {
         Self {
             coordinates: NAMED[..count].iter().map(|(_, of)| *of).collect(),
         }
+    }
+
+    /// All six.
+    pub fn all() -> Self {
+        let coordinates = NAMED.iter().map(|(_, of)| *of).collect();
+        Self { coordinates }
+    }
+
+    /// Whether a model of this many latent coordinates has room for these rows.
+    pub fn fits(&self, latent_dim: usize) -> bool {
+        self.coordinates.len() <= latent_dim
     }
 
     /// Whether a row changes sign in a mirror image: there is more than the motion in the plane.

@@ -111,7 +111,9 @@ impl Dataset {
             rule: rule.clone(),
         };
         for segment in recordings.iter().flat_map(|recording| &recording.segments) {
-            dataset.jumps.push(dataset.jump(segment)?);
+            for piece in segment.by_heading() {
+                dataset.jumps.push(dataset.jump(&piece)?);
+            }
         }
         Ok(dataset)
     }
@@ -120,11 +122,13 @@ impl Dataset {
     pub(super) fn add_mirror_images(&mut self, recordings: &[Recording]) -> Result<()> {
         let robot = self.rule.robot();
         for segment in recordings.iter().flat_map(|recording| &recording.segments) {
-            let image = self.jump(&segment.mirrored(robot))?;
-            self.jumps.push(Jump {
-                is_image: true,
-                ..image
-            });
+            for piece in segment.by_heading() {
+                let image = self.jump(&piece.mirrored(robot))?;
+                self.jumps.push(Jump {
+                    is_image: true,
+                    ..image
+                });
+            }
         }
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use super::body::PITCH;
 use super::momentum::momentum_rows;
+use super::pairing::paired_joints;
 use super::recipe::RecipePart;
 use super::*;
 use crate::model::complement;
@@ -52,7 +53,8 @@ impl Frame {
     /// With [`Coordinates::Named`] the first rows are the momentum of the coordinates in `body`. With pitch among them and
     /// four or more rows beside, the next four are foot positions relative to the centre of mass. The others combine
     /// `active` coordinates. In the plane these are mirror-symmetric sums of joints, and pitch where it has no row. With
-    /// a row that changes sign in a mirror image also differences of left and right, and all of the body without a row.
+    /// a row that changes sign in a mirror image the sums of the legs that move alike ([`paired_joints`]) if these are enough, else
+    /// all joints, and all of the body without a row.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],
@@ -73,7 +75,9 @@ impl Frame {
         let mut held: Vec<DVector<f64>> =
             momentum.column_iter().map(|row| row.into_owned()).collect();
         let mut legs = Vec::new();
-        if has_leg_rows(body, latent_dim) && options.has(RecipePart::LegRows) {
+        let standing =
+            options.has(RecipePart::LegRows) && options.body_equations == BodyEquations::PerPhase;
+        if standing && has_leg_rows(body, latent_dim) {
             for (row, leg) in leg_rows(training, &momentum, options, robot) {
                 held.push(row);
                 legs.push(leg);
@@ -88,9 +92,18 @@ impl Frame {
             .iter()
             .filter(|i| !rows.contains(i) && active.contains(i));
         let mut free: Vec<_> = others.map(|&i| unit(i)).collect();
-        free.extend(joints_of_pairs(active, robot, 1.0));
-        if spatial {
-            free.extend(joints_of_pairs(active, robot, -1.0));
+        let paired = match spatial {
+            true => paired_joints(training, active),
+            false => None,
+        };
+        match paired.filter(|paired| rows.len() + legs.len() + paired.len() >= latent_dim) {
+            Some(paired) => free.extend(paired),
+            None => {
+                free.extend(joints_of_pairs(active, robot, 1.0));
+                if spatial {
+                    free.extend(joints_of_pairs(active, robot, -1.0));
+                }
+            }
         }
         let free = DMatrix::from_fn(STATE_DIM, free.len(), |row, k| free[k][row]);
         Self {
@@ -215,7 +228,7 @@ fn mirrored([right, left]: [Leg; 2], joint: usize, robot: &Robot, parity: f64) -
     (unit(right) + unit(left) * (parity * robot.mirror_sign(left))) * 0.5
 }
 
-fn joint_of(leg: Leg, joint: usize) -> usize {
+pub(super) fn joint_of(leg: Leg, joint: usize) -> usize {
     LEG_JOINT_DIM * leg.index() + joint
 }
 
@@ -357,7 +370,7 @@ fn standardised_fit(regressors: &DMatrix<f64>, target: &DVector<f64>) -> DVector
     factor.solve(&(rows * target)).component_div(&scales)
 }
 
-fn unit(index: usize) -> DVector<f64> {
+pub(super) fn unit(index: usize) -> DVector<f64> {
     DVector::from_fn(STATE_DIM, |i, _| if i == index { 1.0 } else { 0.0 })
 }
 

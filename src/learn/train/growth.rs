@@ -6,7 +6,7 @@
 use nalgebra::Complex;
 
 use super::*;
-use crate::evaluate::{eigenvalues, state_matrix};
+use crate::evaluate::{eigenvalues, state_matrix, transition, usual_stride};
 
 const STEPS: usize = 30; // of least change, before coefficients are scaled down instead
 const HALVINGS: usize = 100; // after which nothing is left that could grow
@@ -17,7 +17,7 @@ const DIFFERENCE: f64 = 1e-6; // of the quotients, relative to the largest value
 pub(super) struct Growth {
     bound_per_s: f64,            // infinite without a bound
     slopes: Vec<DMatrix<f64>>,   // a phase: d theta / d (z, dz) at its mean state
-    sequence: Vec<(usize, f64)>, // phases and their durations in s
+    sequence: Vec<(usize, f64)>, // phases and their durations in s, of a walk one stride
 }
 
 /// An eigenvalue that grows too fast, and how its rate changes with the lower half of every phase's `A`.
@@ -109,7 +109,8 @@ impl Growth {
     /// `e^(A T)` of each phase of the sequence.
     fn transitions(&self, lower: &[DMatrix<f64>]) -> Vec<DMatrix<f64>> {
         let each = self.sequence.iter();
-        each.map(|&step| transition(lower, step)).collect()
+        each.map(|&(phase, duration_s)| transition(&lower[phase], duration_s))
+            .collect()
     }
 
     /// Those of the phases, and of the sequence once every phase keeps the bound.
@@ -125,7 +126,7 @@ impl Growth {
                 let mut transitions = transitions.clone();
                 for (transition, &step) in transitions.iter_mut().zip(&self.sequence) {
                     if step.0 == phase {
-                        *transition = self::transition(changed, step);
+                        *transition = self::transition(&changed[step.0], step.1);
                     }
                 }
                 of_sequence(&transitions)
@@ -214,10 +215,6 @@ impl Growth {
     }
 }
 
-fn transition(lower: &[DMatrix<f64>], (phase, duration_s): (usize, f64)) -> DMatrix<f64> {
-    (state_matrix(&lower[phase]) * duration_s).exp()
-}
-
 /// The eigenvalues of a phase; an infinite one if they cannot be computed.
 fn of_phase(lower: &DMatrix<f64>) -> Vec<Complex<f64>> {
     eigenvalues(state_matrix(lower)).unwrap_or_else(|| vec![f64::INFINITY.into()])
@@ -254,7 +251,21 @@ fn slopes_at(mean: &[f64], features: &Features) -> DMatrix<f64> {
     })
 }
 
+/// The stride of a walk; else the most frequent order of the phases of a whole motion, with their mean durations.
 fn usual_sequence(dataset: &Dataset) -> Vec<(usize, f64)> {
+    let motions = dataset.jumps.iter().map(|motion| {
+        let duration_s = |span: &Range<usize>| {
+            let end = span.end.min(motion.samples() - 1);
+            motion.time_s[end] - motion.time_s[span.start]
+        };
+        let spans = motion.spans.iter();
+        spans
+            .map(|(phase, span)| (*phase, duration_s(span)))
+            .collect()
+    });
+    if let Some(stride) = usual_stride(&motions.collect::<Vec<_>>()) {
+        return stride;
+    }
     let mut orders: BTreeMap<Vec<usize>, (usize, Vec<f64>)> = BTreeMap::new();
     for jump in &dataset.jumps {
         let order = jump.spans.iter().map(|(phase, _)| *phase).collect();

@@ -1,11 +1,12 @@
 //! What is known of the latent dynamics before a regression, in the coordinates of a [`Frame`].
 
+use super::body::Y;
 use super::frame::{LegRow, TURN};
+use super::momentum::loads_on;
 use super::recipe::RecipePart::{self, *};
-use super::weak_form::{FLIGHT_WINDOW, flight_samples, windowed_samples};
+use super::weak_form::{FLIGHT_WINDOW, flight_samples, samples_of_all_phases, windowed_samples};
 use super::*;
 
-const Y: usize = BODY_X + 1;
 const HEIGHT: usize = 1; // the momentum row upwards
 const STANDING_DAMPING_PER_S: f64 = 70.0; // of feet that slip
 const STANDING_STIFFNESS_PER_S2: f64 = 400.0; // of the ground
@@ -20,6 +21,7 @@ pub(super) struct Knowledge {
     pub kept: DMatrix<bool>,    // free, and stay whatever they explain
     pub braking: DMatrix<bool>, // free, and at most 0 once refined
     shared: Vec<Vec<usize>>,    // terms of each momentum column that is the same in all phases
+    affine: Range<usize>,       // columns of the joints beside such columns
     standing: Vec<Standing>,    // equations of the legs, if they stand in this phase
     swinging: Range<usize>,     // columns of the legs, if this phase is flight
     left_out: Vec<RecipePart>,
@@ -82,6 +84,7 @@ impl Knowledge {
             kept: DMatrix::from_element(library_dim, latent_dim, false),
             braking: DMatrix::from_element(library_dim, latent_dim, false),
             shared: Vec::new(),
+            affine: 0..0,
             standing: Vec::new(),
             swinging: 0..0,
             left_out: Vec::new(),
@@ -118,22 +121,14 @@ impl Knowledge {
         fitted
     }
 
-    pub(super) fn shares_body(&self) -> bool {
-        !self.shared.is_empty()
-    }
-
-    /// With the momentum columns of [`Self::share_body`] known: ridge regression over the samples of all phases that share
-    /// them, `theta` (`n x library_dim`) and `target` (`n x latent_dim`) of each.
-    pub(super) fn with_shared_body(&self, samples: &[&(DMatrix<f64>, DMatrix<f64>)]) -> Self {
+    /// With the momentum columns of [`Self::share_body`] known: ridge regression over windows of all motions, whatever the
+    /// phases in them.
+    pub(super) fn with_shared_body(&self, set: EncodedSet<'_>, features: &Features) -> Self {
         let mut fitted = self.clone();
-        if !self.shares_body() {
+        if self.shared.is_empty() {
             return fitted;
         }
-        let stacked = |of: fn(&(DMatrix<f64>, DMatrix<f64>)) -> &DMatrix<f64>| {
-            let rows = samples.iter().flat_map(|each| of(each).row_iter());
-            DMatrix::from_rows(&rows.collect::<Vec<_>>())
-        };
-        let (theta, target) = (stacked(|(theta, _)| theta), stacked(|(_, target)| target));
+        let (theta, target) = samples_of_all_phases(set, features);
         let (p, d) = self.known.shape();
         let regression = Regression::new(&theta, &target, Self::nothing(p, d));
         for (column, terms) in self.shared.iter().enumerate() {
@@ -144,24 +139,49 @@ impl Knowledge {
         fitted
     }
 
-    /// The momentum columns become known, the same in all phases with feet on the ground: a constant upwards and of pitch,
-    /// forces and moments. Contact is in these, so that one equation holds in every phase; in flight it is free fall.
+    /// The momentum columns become known, the same in all phases with feet on the ground: forces and moments, a constant
+    /// upwards and of pitch, the own velocity of `x` and `y`. Contact is in the forces, so that one equation holds in every
+    /// phase; in flight it is free fall.
     fn share_body(&mut self, features: &Features, frame: &Frame) {
-        let inputs = 2 * features.latent_dim;
+        let d = features.latent_dim;
         for (k, &coordinate) in frame.body.iter().enumerate() {
-            let load = |v: &usize| frame.body.get(v.wrapping_sub(inputs));
-            let suits = |v: &usize| {
-                let is_like = |&of: &usize| is_lateral(of) == is_lateral(coordinate);
-                *v == HEIGHT || load(v).is_some_and(is_like)
+            let loads: Vec<usize> = loads_on(coordinate).collect();
+            let is_load = |v: usize| {
+                let load = v.checked_sub(2 * d).and_then(|load| frame.body.get(load));
+                load.is_some_and(|of| loads.contains(of))
             };
-            let terms = features.variables().filter(|(term, variables)| {
-                let is_own = k > 0 || variables[..] == [inputs];
-                self.free[(*term, k)] && variables.iter().all(suits) && is_own
-            });
+            let suits = |variables: &[usize]| match *variables {
+                [] => !is_lateral(coordinate) && coordinate != BODY_X,
+                [v] => is_load(v) || v == d + k && [BODY_X, Y].contains(&coordinate),
+                _ => false,
+            };
+            let terms = (features.variables()).filter(|(_, variables)| suits(variables));
             self.shared.push(terms.map(|(term, _)| term).collect());
             self.free.column_mut(k).fill(false);
             self.kept.column_mut(k).fill(false);
         }
+    }
+
+    /// The equations of the joints are affine with all terms, and stay as the regression has them.
+    fn move_joints(&mut self, features: &Features, frame: &Frame) {
+        self.affine = frame.body.len()..features.latent_dim;
+        for k in self.affine.clone() {
+            for (term, is_affine) in features.affine.iter().enumerate() {
+                self.free[(term, k)] &= is_affine;
+                self.kept[(term, k)] = self.free[(term, k)];
+            }
+        }
+    }
+
+    /// Whether joints swing and stand in turn: their equations are affine in each phase.
+    pub(super) fn has_swings(&self) -> bool {
+        !self.affine.is_empty()
+    }
+
+    /// Whether refinement leaves a column as the regression has it.
+    pub(super) fn is_settled(&self, column: usize) -> bool {
+        let stands = self.has(UnrefinedLegs) && self.standing(column).is_some();
+        stands || self.affine.contains(&column)
     }
 
     pub(super) fn standing(&self, column: usize) -> Option<&Standing> {
@@ -216,8 +236,11 @@ impl Knowledge {
                 knowledge.stand(features, frame);
             }
             knowledge.push_sideways(features, frame);
-            if options.body_equations == BodyEquations::AllPhases && phase.feet != FeetRule::None {
-                knowledge.share_body(features, frame);
+            if options.body_equations == BodyEquations::AllPhases {
+                if phase.feet != FeetRule::None {
+                    knowledge.share_body(features, frame);
+                }
+                knowledge.move_joints(features, frame);
             }
             let inputs = (0..d).map(|k| (2 * d + k, k, KeptInputs));
             for (variable, k, part) in inputs.chain((0..2).map(|k| (d + k, k, KeptVelocities))) {

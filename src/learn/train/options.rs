@@ -96,7 +96,8 @@ pub enum Transfer {
 pub struct EncoderOptions {
     /// Weight of the lift loss, the input energy that the latent input cannot carry, against the reconstruction error.
     pub lift_weight: f64,
-    /// Weight of the three body positions in the reconstruction error; the other coordinates have 1.
+    /// Weight of the three body positions in the reconstruction error, of all body coordinates where `body` has lateral ones;
+    /// the others have 1.
     pub body_weight: f64,
     /// Coordinates with a smaller standard deviation (rad or m) are masked unless they are actuated.
     pub least_std: f64,
@@ -406,7 +407,9 @@ impl RegressionOptions {
 
 impl EncoderOptions {
     pub(super) fn coordinate_weights(&self) -> DVector<f64> {
-        DVector::from_fn(STATE_DIM, |i, _| match (BODY_X..=BODY_Z).contains(&i) {
+        let spatial = self.body.as_ref().is_some_and(BodyRows::is_spatial);
+        let heavy = if spatial { STATE_DIM } else { BODY_Z + 1 };
+        DVector::from_fn(STATE_DIM, |i, _| match (BODY_X..heavy).contains(&i) {
             true => self.body_weight,
             false => 1.0,
         })

@@ -4,7 +4,6 @@
 //! Stork, Second order derivatives for network pruning, NIPS 1992).
 
 use super::knowledge::brake;
-use super::recipe::RecipePart;
 use super::rollout::CoefficientIndex;
 use super::*;
 
@@ -44,9 +43,7 @@ impl FreeCoefficients {
         for (phase, (xi, knowledge)) in xi.iter().zip(knowledge).enumerate() {
             let active = (0..xi.len()).filter(|&i| xi[i] != 0.0 && knowledge.free[i]);
             let places = active.map(|i| xi.vector_to_matrix_index(i));
-            let places = places.filter(|(_, column)| {
-                !knowledge.has(RecipePart::UnrefinedLegs) || knowledge.standing(*column).is_none()
-            });
+            let places = places.filter(|(_, column)| !knowledge.is_settled(*column));
             (free.indices).extend(places.map(|(term, column)| (phase, term, column)));
         }
         free.scales = free.values(xi).abs();
@@ -69,6 +66,7 @@ impl FreeCoefficients {
 
 pub(super) struct Refiner<'a> {
     pub knowledge: &'a [Knowledge],
+    pub mirror: &'a Mirror,
     pub growth: &'a Growth,
     pub training: &'a Judge<'a>,
     pub judge: &'a Judge<'a>,

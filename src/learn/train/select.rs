@@ -10,6 +10,7 @@ use super::*;
 
 /// Windows (samples) over which the dynamics are integrated before regression; 0 means the accelerations.
 const WINDOWS: [usize; 3] = [0, 25, 50];
+const SHORT_WINDOWS: [usize; 3] = [0, 10, 25]; // of joints that swing within a step
 const RIDGES: [f64; 3] = [1e-4, 1e-3, 1e-2]; // on the normalised columns
 /// Prunings; eliminations share the walk that drops terms one by one.
 const PRUNINGS: [Pruning; 10] = [
@@ -48,28 +49,29 @@ pub struct Choice {
 /// If cancelled, the search ends as soon as a candidate is stable.
 pub(super) fn select(
     set: EncodedSet<'_>,
-    knowledge: &[Knowledge],
+    (knowledge, mirror): (&[Knowledge], &Mirror),
     judge: &Judge<'_>,
     options: &RegressionOptions,
     monitor: &mut Monitor<'_>,
 ) -> Result<(Vec<Xi>, Choice, usize)> {
     let features = judge.features;
-    let regressions = &WINDOWS.map(|window| {
+    let lengths = match knowledge.iter().any(Knowledge::has_swings) {
+        true => SHORT_WINDOWS,
+        false => WINDOWS,
+    };
+    let regressions = &lengths.map(|window| {
         let phases = 0..knowledge.len();
-        let samples: Vec<_> = phases
-            .map(|phase| windowed_samples(set, features, phase, window))
-            .collect();
-        let sharing = knowledge.iter().zip(&samples);
-        let sharing = sharing.filter(|(knowledge, _)| knowledge.shares_body());
-        let sharing: Vec<_> = sharing.map(|(_, samples)| samples).collect();
-        let of_phase = |(knowledge, (theta, ddz)): (&Knowledge, &(Xi, Xi))| {
-            Regression::new(theta, ddz, knowledge.with_shared_body(&sharing))
+        let of_phase = |(phase, knowledge): (usize, &Knowledge)| {
+            let (theta, ddz) = windowed_samples(set, features, phase, window);
+            Regression::new(&theta, &ddz, knowledge.clone())
         };
-        knowledge.iter().zip(&samples).map(of_phase).collect()
+        let each = phases.zip(knowledge).map(of_phase).collect();
+        (window, each)
     });
     let growth = &Growth::of_jumps(options.growth_per_s, set, features);
     let refiner = Refiner {
         knowledge,
+        mirror,
         growth,
         training: judge,
         judge,
@@ -98,7 +100,7 @@ pub(super) fn select(
     };
     let mut refined = Vec::new();
     for mut trial in starts(tried, limit) {
-        trial.hold(growth);
+        trial.hold(growth, mirror);
         trial.score_by(&relative);
         if options.has(RecipePart::Sweep) {
             refiner.sweep(&mut trial, limit, monitor);
@@ -107,6 +109,7 @@ pub(super) fn select(
         refined.push(trial);
     }
     let mut chosen = sparsest(refined, &refiner, options, monitor)?;
+    mirror.copy(&mut chosen.now.xi);
     chosen.score_by(judge);
     let choice = Choice {
         window: chosen.window,
@@ -158,13 +161,14 @@ impl Trial<'_> {
     }
 
     /// Changes the coefficients until their growth keeps the bound, the least as the normal equations weigh it.
-    fn hold(&mut self, growth: &Growth) {
+    fn hold(&mut self, growth: &Growth, mirror: &Mirror) {
         let before = self.now.xi.clone();
         growth.hold(&mut self.now.xi, |gradient| {
             let each = self.regressions.iter().zip(&before).zip(gradient);
             each.map(|((regression, xi), gradient)| regression.change(xi, gradient, self.ridge))
                 .collect()
         });
+        mirror.copy(&mut self.now.xi);
     }
 
     fn places(
@@ -183,7 +187,7 @@ impl Trial<'_> {
     }
 }
 
-type Regressions = [Vec<Regression>]; // of every phase, for each of the windows
+type Regressions = [(usize, Vec<Regression>)]; // of every phase, for each of the windows
 
 impl Refiner<'_> {
     /// All combinations; where there are terms to choose that are not affine also those without them, and the best of these
@@ -229,7 +233,7 @@ impl Refiner<'_> {
         };
         let prunings: Vec<_> = PRUNINGS.into_iter().filter(is_tried).collect();
         monitor.stage("fitting the dynamics");
-        for (window, regressions) in WINDOWS.into_iter().zip(regressions) {
+        for &(window, ref regressions) in regressions {
             for ridge in RIDGES {
                 if monitor.cancelled() && enough(&tried) {
                     return tried;
@@ -238,7 +242,8 @@ impl Refiner<'_> {
                 let fits = each.map(|regression| regression.fit_each(ridge, &prunings, allowed));
                 let fits: Vec<Vec<Xi>> = fits.collect();
                 for (number, pruning) in prunings.iter().copied().enumerate() {
-                    let xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
+                    let mut xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
+                    self.mirror.copy(&mut xi);
                     if tried.iter().any(|trial: &Trial<'_>| trial.now.xi == xi) {
                         continue;
                     }
@@ -251,7 +256,7 @@ impl Refiner<'_> {
                         pruning,
                     };
                     if !trial.is_stable() {
-                        trial.hold(self.growth);
+                        trial.hold(self.growth, self.mirror);
                         trial.score_by(self.judge);
                     }
                     let (active, score) = (trial.now.active(), trial.now.score);

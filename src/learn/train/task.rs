@@ -331,16 +331,23 @@ impl Task<'_> {
         };
         let judge = Judge::new(features, maps.judged_set(self), long);
         let mut knowledge = self.knowledge.clone();
+        let mut mirror = Mirror::default();
         if self.frame.is_spatial() {
             let parity = parities(&maps.weights, self.robot);
-            knowledge = (knowledge.iter())
-                .map(|known| known.with_parity(features, &parity))
-                .collect();
+            mirror = Mirror::of(&self.training.phases, features, &parity);
+            for (phase, known) in knowledge.iter_mut().enumerate() {
+                if mirror.is_own_image(phase) {
+                    *known = known.with_parity(features, &parity);
+                }
+            }
         }
         let knowledge = knowledge.iter().enumerate();
-        let knowledge = knowledge.map(|(phase, known)| known.with_flights(set, features, phase));
-        let knowledge: Vec<Knowledge> = knowledge.collect();
-        let (xi, choice, candidates) = select(set, &knowledge, &judge, options, monitor)?;
+        let knowledge = knowledge.map(|(phase, known)| {
+            let known = known.with_flights(set, features, phase);
+            known.with_shared_body(set, features)
+        });
+        let known = (&knowledge.collect::<Vec<_>>()[..], &mirror);
+        let (xi, choice, candidates) = select(set, known, &judge, options, monitor)?;
         Ok(Fitted {
             maps,
             xi,

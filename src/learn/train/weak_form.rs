@@ -4,6 +4,7 @@ use super::*;
 
 const STRIDE: usize = 5; // samples between the starts of two windows
 pub(super) const FLIGHT_WINDOW: usize = 50; // samples
+const MOTION_WINDOW: usize = 50;
 const WHOLE_FLIGHTS: f64 = 10.0; // weight of the errors of whole flights against those of windows
 const LARGEST: f64 = 1e150; // magnitude of a term: sums of its squares stay finite
 
@@ -51,14 +52,32 @@ pub(super) fn windowed_samples(
     phase: usize,
     window: usize,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    let (p, d) = (features.library_dim(), features.latent_dim);
     if window == 0 {
         let (variables, target) = set.regression_samples(phase);
         let theta = features.evaluate(&variables, &mut FeatureValues::default());
         return (theta, target);
     }
+    windows_of(set, features, set.dataset.spans(Some(phase)), window)
+}
+
+/// The same of whole motions, with windows of [`MOTION_WINDOW`] samples whatever the phases in them.
+pub(super) fn samples_of_all_phases(
+    set: EncodedSet<'_>,
+    features: &Features,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let motions = set.dataset.jumps.iter().enumerate();
+    let motions = motions.map(|(index, motion)| (index, 0..motion.samples()));
+    windows_of(set, features, motions, MOTION_WINDOW)
+}
+
+fn windows_of(
+    set: EncodedSet<'_>,
+    features: &Features,
+    spans: impl Iterator<Item = (usize, Range<usize>)>,
+    window: usize,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (p, d) = (features.library_dim(), features.latent_dim);
     let (mut theta_rows, mut target_rows) = (Vec::new(), Vec::new());
-    let spans = set.dataset.spans(Some(phase));
     for (jump, range) in spans.filter(|(_, range)| range.len() > 4) {
         let time_s = &set.dataset.jumps[jump].time_s[range.clone()];
         let latent = &set.latent[jump];
