@@ -421,7 +421,7 @@ fn file_beyond_the_size_bound_is_refused() {
 #[test]
 fn unknown_or_missing_schema_is_refused_before_anything_else() {
     for (schema, found) in [
-        (json!("romc-model/3"), "\"romc-model/3\""),
+        (json!("romc-model/4"), "\"romc-model/4\""),
         (json!(1), "1"),
         (Value::Null, "none"),
     ] {
@@ -430,7 +430,7 @@ fn unknown_or_missing_schema_is_refused_before_anything_else() {
             value["key_of_the_future"] = json!(true);
         });
         let expected = format!(
-            "file.json: `schema`: found {found}, expected \"romc-model/1\" or \"romc-model/2\""
+            "file.json: `schema`: found {found}, expected \"romc-model/1\", \"romc-model/2\" or \"romc-model/3\""
         );
         assert_eq!(error.to_string(), expected);
     }

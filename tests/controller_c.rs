@@ -10,7 +10,7 @@ use romc::deploy::{EmitError, EmitOptions, Target, emit};
 use romc::equations::Equations;
 use romc::model::ReducedModel;
 use romc::mpc::{
-    AfterEnd, Bounds, ConsistentLift, Controller, Drives, Lift, Linearisation, Measurement,
+    AfterEnd, Bounds, ConsistentLift, Controller, Drives, Legs, Lift, Linearisation, Measurement,
     MissingInput, MpcSettings, ReferenceSamples, Solver, StanceState, Status,
 };
 
@@ -198,6 +198,9 @@ fn replay_file(
             swing_turn: [1.0, 0.0, 0.5][run / 3 % 3],
             flight_torque: [1.0, 0.3, 0.0][run / 2 % 3],
             after_end: [AfterEnd::Hold, AfterEnd::Damp, AfterEnd::Stop][run % 3],
+            legs: [Legs::Decoded, Legs::Reference][usize::from(run % 7 > 4)],
+            place_scale_m: (run % 4 > 1).then_some(0.03),
+            heading_scale_rad: (run % 6 > 2).then_some(0.05),
             bounds: [Bounds::OFF, MpcSettings::default().bounds][usize::from(is_watched)],
             torque_rate_nm_s: match rates {
                 Rates::Free | Rates::FreeAndWatched => None,
@@ -257,6 +260,9 @@ fn replay_file(
                     settings.swing_turn,
                     settings.flight_torque,
                     f64::from(u8::from(is_watched)),
+                    f64::from(settings.legs as u8),
+                    settings.place_scale_m.unwrap_or(0.0),
+                    settings.heading_scale_rad.unwrap_or(0.0),
                 ],
             );
             push(&mut bytes, reference.time_s);
@@ -383,9 +389,12 @@ fn is_limited(
     command: &romc::mpc::Command,
 ) -> bool {
     let settings = controller.settings();
-    let (Lift::Consistent, Some(phase), true) =
-        (settings.lift, command.phase, command.status.has_plan())
-    else {
+    let (Lift::Consistent, Legs::Decoded, Some(phase), true) = (
+        settings.lift,
+        settings.legs,
+        command.phase,
+        command.status.has_plan(),
+    ) else {
         return false;
     };
     let stance = StanceState {

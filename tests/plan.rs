@@ -5,6 +5,8 @@
 mod command_line;
 #[path = "plan/planned.rs"]
 mod planned;
+#[path = "plan/walks.rs"]
+mod walks;
 
 use std::fs;
 use std::path::Path;

@@ -11,6 +11,8 @@ mod outside;
 mod phases;
 #[path = "train/spatial_body.rs"]
 mod spatial_body;
+#[path = "train/walks.rs"]
+mod walks;
 #[path = "train/whole_body.rs"]
 mod whole_body;
 

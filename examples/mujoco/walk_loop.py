@@ -4,6 +4,7 @@ import argparse
 import functools
 import json
 import pathlib
+import sys
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -51,6 +52,8 @@ PERTURBATIONS = (
 )
 MOST_TILT_RAD = 0.35
 END_SHARE, END_M = 0.15, 0.1
+# Least shares of the runs that succeed.
+AIMS = {"MPC": 0.94, "MPC, no recorded input": 0.88}
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,7 @@ class Outcome:
     end_error_m: float
     largest_tilt_rad: float
     statuses: dict
+    fell: bool = False
 
 
 def main():
@@ -108,6 +112,16 @@ def main():
     text = json.dumps([asdict(outcome) for outcome in outcomes], indent=1)
     (arguments.out_dir / "walk_loop.json").write_text(text + "\n", encoding="utf-8")
     print(text if arguments.json else table(outcomes, chosen, len(walks)))
+    missed = [follower for follower, share in AIMS.items() if success_share(outcomes, follower) < share]
+    for follower in missed:
+        print(f"MISSED {follower}: {AIMS[follower]:.0%} of the runs", file=sys.stderr)
+    sys.exit(1 if missed else 0)
+
+
+def success_share(outcomes, follower):
+    """Share of a follower's runs that succeed; 1 without any."""
+    own = [outcome.success for outcome in outcomes if outcome.follower == follower]
+    return float(np.mean(own)) if own else 1.0
 
 
 def parse_arguments():
@@ -176,9 +190,15 @@ class OnPath(Commanded):
 
 def run(task):
     """One closed-loop run; returns its Outcome."""
+    return driven(task)[1]
+
+
+def driven(task):
+    """One closed-loop run; returns its log and its Outcome."""
     name, (crate, uninformed_crate, inputs), settings, perturbation, recording = task
     driver, walk = FOLLOWERS[name], read_walk(recording)
-    simulation = perturbed_simulation(ROBOT, perturbation, walk.floor, walk.x[0], walk.dx[0], 1.0)
+    start = (walk.x[0], walk.dx[0])
+    simulation = perturbed_simulation(ROBOT, perturbation, walk.floor, *start, 1.0)
     if perturbation.short == "push":
         across = walk.x[len(walk.x) // 2, 17] + 0.5 * np.pi
         force = (PUSH_N * np.cos(across), PUSH_N * np.sin(across), 0.0)
@@ -199,7 +219,7 @@ def run(task):
     outcome.statuses = {str(s): n for s, n in getattr(follower, "statuses", {}).items()}
     if controller:
         controller.close()
-    return outcome
+    return log, outcome
 
 
 def with_settings(chosen, settings):
@@ -219,11 +239,13 @@ def judged(name, perturbation, walk, log):
         faults.append("something other than the feet touches the floor")
     if tilt_rad > MOST_TILT_RAD:
         faults.append(f"roll or pitch reaches {tilt_rad:.2f} rad")
+    fell = bool(faults)
     if end_error_m > max(END_SHARE * way_m, END_M):
         faults.append(f"ends {end_error_m:.2f} m off")
     walk_name = f"{walk.folder}/{walk.name}"
+    text = "; ".join(faults)
     return Outcome(
-        name, perturbation.name, walk_name, not faults, "; ".join(faults), end_error_m, tilt_rad, {}
+        name, perturbation.name, walk_name, not faults, text, end_error_m, tilt_rad, {}, fell
     )
 
 

@@ -1,8 +1,8 @@
-//! `romc plan`: a jump that nobody recorded, as a recording.
+//! `romc plan`: a jump or a walk that nobody recorded, as a recording.
 
 use super::convert::write_recording;
 use super::*;
-use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict};
+use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict, WalkGoal, WalkPlan};
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     let inputs = Inputs::reading(&arguments.reading)
@@ -14,9 +14,31 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     inputs.check_output(output, Format::RECORDING, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let robot = model.robot()?;
+    let of_controller = match arguments.speed {
+        Some(_) => plan_settings::of_walks(robot),
+        None => plan_settings::of_jumps(robot),
+    };
     let settings_path = output.map(plan_settings::path_for);
-    let settings_path = settings_path.filter(|path| !plan_settings::is_there(path, robot));
+    let settings_path = settings_path.filter(|path| !plan_settings::is_there(path, &of_controller));
     inputs.check_output(settings_path.as_deref(), Format::TOML, arguments.force)?;
+    if let (Some(speed_m_s), Some(path)) = (arguments.speed, output) {
+        let goal = WalkGoal {
+            speed_m_s,
+            yaw_rate_rad_s: arguments.yaw_rate,
+            duration_s: arguments.duration,
+        };
+        let planned = plan::walk(&model, &goal)?;
+        trusted(&planned.verdict, arguments.force)?;
+        let mut answer = walk_answer(arguments, &goal, &planned);
+        write_plan(
+            path,
+            planned.motion,
+            &of_controller,
+            arguments.force,
+            &mut answer,
+        )?;
+        return Ok(answer);
+    }
     let settings = arguments.settings.as_deref();
     let settings = settings.map(|path| read_settings(path, PlanSettings::check));
     let settings = settings.transpose()?.unwrap_or_default();
@@ -37,33 +59,90 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     let planned = plan::plan(&model, &goal, &settings);
     bar.finish_and_clear();
     let planned = planned?;
-    match &planned.verdict {
-        Verdict::Refused(reasons) if arguments.force == Overwrite::Refuse => {
-            return Err(Error::Distrusted(reasons.join("; ")));
-        }
-        Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
-            (reasons.iter()).for_each(|reason| eprintln!("warning: {}", printable(reason)));
-        }
-        Verdict::Trusted => {}
-    }
+    trusted(&planned.verdict, arguments.force)?;
     let mut answer = answer(arguments, &planned);
     // Figures first: a folder that is refused leaves no plan behind.
     let drawn = || Ok(plan_figures(&planned, model.robot()?));
     inputs.write_figures(figures, drawn, arguments.force, &mut answer)?;
     if let Some(path) = output {
-        let (settings, text) = (plan_settings::path_for(path), plan_settings::text(robot));
-        write_recording(path, vec![planned.motion.clone()], None, arguments.force)?;
-        if !plan_settings::is_there(&settings, robot) {
-            write_file(&settings, text.as_bytes(), arguments.force)?;
-        }
-        let [path, settings] = [path, &settings].map(|path| path.display().to_string());
-        let _ = writeln!(
-            answer.text,
-            "\nthe plan: {path}\nsettings of its controller: {settings}"
-        );
-        answer.json["settings"] = json!(settings);
+        let motion = planned.motion.clone();
+        write_plan(path, motion, &of_controller, arguments.force, &mut answer)?;
     }
     Ok(answer)
+}
+
+/// Refuses a plan that is not to be trusted unless it is forced, and warns of what is beyond the recordings.
+fn trusted(verdict: &Verdict, force: Overwrite) -> Result<()> {
+    match verdict {
+        Verdict::Refused(reasons) if force == Overwrite::Refuse => {
+            Err(Error::Distrusted(reasons.join("; ")))
+        }
+        Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
+            (reasons.iter()).for_each(|reason| eprintln!("warning: {}", printable(reason)));
+            Ok(())
+        }
+        Verdict::Trusted => Ok(()),
+    }
+}
+
+fn write_plan(
+    path: &Path,
+    motion: Segment,
+    of_controller: &MpcSettings,
+    force: Overwrite,
+    answer: &mut Answer,
+) -> Result<()> {
+    let (settings, text) = (
+        plan_settings::path_for(path),
+        plan_settings::text(of_controller),
+    );
+    write_recording(path, vec![motion], None, force)?;
+    if !plan_settings::is_there(&settings, of_controller) {
+        write_file(&settings, text.as_bytes(), force)?;
+    }
+    let [path, settings] = [path, &settings].map(|path| path.display().to_string());
+    let _ = writeln!(
+        answer.text,
+        "\nthe plan: {path}\nsettings of its controller: {settings}"
+    );
+    answer.json["settings"] = json!(settings);
+    Ok(())
+}
+
+fn walk_answer(arguments: &PlanArguments, goal: &WalkGoal, planned: &WalkPlan) -> Answer {
+    let model = arguments.model.display().to_string();
+    let WalkGoal {
+        speed_m_s,
+        yaw_rate_rad_s,
+        duration_s,
+    } = *goal;
+    let WalkPlan {
+        stride_s,
+        duty,
+        height_m,
+        ref verdict,
+        ..
+    } = *planned;
+    let word = verdict.word();
+    let mut text = format!(
+        "{model}: a walk of {speed_m_s} m/s that turns by {yaw_rate_rad_s} rad/s for {duration_s} s: {word}\n\n\
+         a stride of {stride_s:.3} s, of which each foot stands {:.0} %, with the body at {height_m:.3} m\n",
+        100.0 * duty
+    );
+    text += &lines(&format!("{word}: "), verdict.reasons());
+    let json = json!({
+        "model": model,
+        "speed_m_s": speed_m_s,
+        "yaw_rate_rad_s": yaw_rate_rad_s,
+        "duration_s": duration_s,
+        "stride_s": stride_s,
+        "duty": duty,
+        "height_m": height_m,
+        "status": word,
+        "reasons": verdict.reasons(),
+        "output": shown(&arguments.output),
+    });
+    Answer::new(text, json)
 }
 
 fn goal(arguments: &PlanArguments, robot: &'static Robot) -> Result<Goal> {

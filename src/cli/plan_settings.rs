@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::mpc::interface::{SETTINGS, Settings};
+use crate::mpc::{Bounds, Legs};
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
 pub(super) fn path_for(plan: &Path) -> PathBuf {
@@ -46,7 +47,7 @@ pub(super) fn read_for(recording: &Path) -> Result<MpcSettings> {
 }
 
 /// Inputs count less than along a recorded jump, which brings the apex nearer. How much of them arrives is estimated.
-fn of_plans(robot: &Robot) -> MpcSettings {
+pub(super) fn of_jumps(robot: &Robot) -> MpcSettings {
     MpcSettings {
         input_weight: 8.0,
         effectiveness: Some(1.0),
@@ -55,10 +56,30 @@ fn of_plans(robot: &Robot) -> MpcSettings {
     }
 }
 
-/// The file for a plan of a robot: settings that differ from the usual ones, joint PD, torques in flight.
-pub(super) fn text(robot: &Robot) -> String {
-    let both = [of_plans(robot), MpcSettings::default()];
-    let [own, usual] = both.map(|settings| Settings::from(&settings).numbers());
+/// Along a walk the legs are those of the plan, and deviations count by lengths that do not grow with the way.
+pub(super) fn of_walks(robot: &Robot) -> MpcSettings {
+    let usual = MpcSettings::default();
+    MpcSettings {
+        lift: Lift::Consistent,
+        legs: Legs::Reference,
+        input_weight: 2.0,
+        terminal_weight: 100.0,
+        velocity_weight: 0.02,
+        place_scale_m: Some(0.03),
+        heading_scale_rad: Some(0.05),
+        bounds: Bounds {
+            poor_steps: 250,
+            ..usual.bounds
+        },
+        drives: Drives::of(robot),
+        ..usual
+    }
+}
+
+/// The file of settings for a plan: those that differ from the usual ones, joint PD, torques in flight.
+pub(super) fn text(settings: &MpcSettings) -> String {
+    let both = [settings, &MpcSettings::default()];
+    let [own, usual] = both.map(|settings| Settings::from(settings).numbers());
     let mut text = "# Settings of the controller for the plan of the same name. `romc mpc` and `romc compile --plan`\n\
                     # read them.\n"
         .to_owned();
@@ -71,6 +92,6 @@ pub(super) fn text(robot: &Robot) -> String {
 }
 
 /// Whether a file has this text already, as after a plan of the same name in another format.
-pub(super) fn is_there(path: &Path, robot: &Robot) -> bool {
-    std::fs::read(path).is_ok_and(|found| found == text(robot).as_bytes())
+pub(super) fn is_there(path: &Path, settings: &MpcSettings) -> bool {
+    std::fs::read(path).is_ok_and(|found| found == text(settings).as_bytes())
 }

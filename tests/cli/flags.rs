@@ -131,7 +131,7 @@ const ELSEWHERE: &str = "json help version force output out-dir \
     compile: emit as-learned tolerance domain margin save-model plan \
     inspect: guess robot: name check: domain convert: inputs-of clock columns identify: robot clock columns \
     simulate: restart-every verbose clock columns mpc: horizon step lift reference-input solver figures clock columns \
-    plan: distance apex start figures reach settings \
+    plan: distance apex start figures reach settings speed yaw-rate duration \
     report: log study figures plan restart-every tolerance clock columns \
     import: format map weights xi-layout library library-order latent-dim phase input-scaling wrench-frame \
     actuators sample-time inputs-from unchecked name description \

@@ -3,7 +3,8 @@
  * a plan, a refused measurement, a latched fault. Native byte order:
  * runs until the end of the file, each of
  *   int64 samples, steps, has_u, is_next, lift, linearisation, after_end; double body_friction, effectiveness_time_s, stiffness and
- *   damping of the drives, foot_friction, lift_prior_weight, torque_rate_nm_s, swing_turn, flight_torque, is_watched;
+ *   damping of the drives, foot_friction, lift_prior_weight, torque_rate_nm_s, swing_turn, flight_torque, is_watched,
+ *   legs, place_scale_m, heading_scale_rad;
  *   double time_s[samples], x[18 samples], dx[18 samples], u[18 samples] if has_u; uint8 feet[4 samples]
  *   and for each step double time_s, x[18], dx[18]; uint8 feet[4], flags (1 prepare, 2 reset); double torque[12],
  *   joint_position[12], joint_velocity[12], stiffness, damping, u_lat[D]; int64 status, iterations. */
@@ -58,8 +59,8 @@ int main(int argc, char **argv)
     }
     while (get(head, sizeof head[0], 7)) {
         const size_t count = (size_t)head[0];
-        double chosen[10];
-        need(chosen, sizeof chosen[0], 10);
+        double chosen[13];
+        need(chosen, sizeof chosen[0], 13);
         double *time_s = array(sizeof(double), count), *x = array(sizeof(double), 18 * count);
         double *dx = array(sizeof(double), 18 * count), *u = NULL;
         if (head[2]) {
@@ -76,6 +77,9 @@ int main(int argc, char **argv)
         settings.torque_rate_nm_s = chosen[6];
         settings.swing_turn = chosen[7];
         settings.flight_torque = chosen[8];
+        settings.legs = (int32_t)chosen[10];
+        settings.place_scale_m = chosen[11];
+        settings.heading_scale_rad = chosen[12];
         settings.lift = (int32_t)head[4];
         settings.linearisation = (int32_t)head[5];
         settings.after_end = (int32_t)head[6];

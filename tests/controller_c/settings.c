@@ -51,6 +51,9 @@ int main(void)
     TRY(joint_penalty, 0);
     TRY(body_friction, -0.5);
     TRY(swing_turn, -0.1);
+    TRY(legs, 2);
+    TRY(place_scale_m, -0.1);
+    TRY(heading_scale_rad, (double)NAN);
     TRY(flight_torque, -0.1);
     TRY(flight_torque, 1.1);
     TRY(flight_torque, (double)NAN);

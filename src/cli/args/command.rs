@@ -5,7 +5,9 @@ use super::import::ImportArguments;
 use super::train::{StudyArguments, TrainArguments};
 use super::*;
 use crate::evaluate::ReferenceInput;
-use crate::limits::table::{APEX, DISTANCE, HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
+use crate::limits::table::{
+    APEX, DISTANCE, DURATION, HORIZON, RESTART_EVERY, SPEED, STEP, TORQUE_RATE, YAW_RATE,
+};
 
 /// The reduced-order model compiler: from recorded jumps to equations, code and torques.
 #[derive(Debug, Parser)]
@@ -273,16 +275,27 @@ pub(crate) struct MpcArguments {
                   romc plan models/go1-d7.json --reach --figures reach"
 )]
 pub(crate) struct PlanArguments {
-    /// Model file with `landmarks` and `prior`, as `romc train` writes them
+    /// Model file with `landmarks` and `prior`, for a walk with `strides`, as `romc train` writes them
     pub model: PathBuf,
     /// Distance of the body from start to end, in metres
-    #[arg(long, value_name = "M", value_parser = real(&DISTANCE), required_unless_present = "reach")]
+    #[arg(long, value_name = "M", value_parser = real(&DISTANCE), required_unless_present_any = ["reach", "speed"])]
     #[arg(allow_negative_numbers = true)]
     pub distance: Option<f64>,
     /// Rise of the body above its height at the start, in metres
-    #[arg(long, value_name = "M", value_parser = real(&APEX), required_unless_present = "reach")]
+    #[arg(long, value_name = "M", value_parser = real(&APEX), required_unless_present_any = ["reach", "speed"])]
     #[arg(allow_negative_numbers = true)]
     pub apex: Option<f64>,
+    /// Instead: a walk at this speed, in m/s, of a model that was trained on walks
+    #[arg(long, value_name = "M_S", value_parser = real(&SPEED), conflicts_with_all = ["distance", "apex", "start", "reach", "settings", "figures"])]
+    #[arg(allow_negative_numbers = true)]
+    pub speed: Option<f64>,
+    /// Yaw rate of the walk, to the left, in rad/s
+    #[arg(long, value_name = "RAD_S", value_parser = real(&YAW_RATE), requires = "speed", default_value = "0")]
+    #[arg(allow_negative_numbers = true)]
+    pub yaw_rate: f64,
+    /// Duration of the walk, in s
+    #[arg(long, value_name = "S", value_parser = real(&DURATION), requires = "speed", default_value = "5")]
+    pub duration: f64,
     /// Start from the first sample of this recording (default: the mean start of the training jumps)
     #[arg(long, value_name = "RECORDING")]
     pub start: Option<PathBuf>,

@@ -19,10 +19,12 @@ mod settings;
 mod solve;
 mod transcribe;
 mod verdict;
+mod walk;
 
 pub use settings::{Goal, PlanError, PlanSettings};
 pub use solve::{GoalMap, MappedGoal, Plan, PlannedPart, plan, reach};
 pub use verdict::Verdict;
+pub use walk::{WalkGoal, WalkPlan, walk};
 
 type Result<T, E = PlanError> = std::result::Result<T, E>;
 

@@ -32,6 +32,7 @@ mod rollout;
 mod seeds;
 mod select;
 mod sparse;
+mod strides;
 mod subspace;
 mod task;
 mod weak_form;

@@ -10,6 +10,7 @@ use super::latent::mean_jacobian;
 use super::metrics::measure;
 use super::recipe::RecipePart;
 use super::select::select;
+use super::strides::learn_strides;
 use super::subspace::{order_and_sign, varimax};
 use super::weak_form::check_terms;
 use super::*;
@@ -151,9 +152,11 @@ impl Task<'_> {
         let (options, robot, training) = (self.options, self.robot, &self.training);
         let (d, name) = (options.latent_dim, robot.name);
         let given_state = self.inputs_given_states(&fitted);
+        let strides = learn_strides(training);
+        let motions = if strides.is_some() { "walks" } else { "jumps" };
         let [state, input] = CoordinateNames::of_robot();
         let mut builder = ReducedModel::builder(options.name.clone(), self.library.clone())
-            .description(format!("{d} latent coordinates of {name} jumps"))
+            .description(format!("{d} latent coordinates of {name} {motions}"))
             .robot(robot)
             .actuators(options.actuators.clone())
             .wrench_frame(options.wrench_frame)
@@ -167,7 +170,8 @@ impl Task<'_> {
             .provenance(provenance)
             .encoder(fitted.maps.encoder)
             .decoder(fitted.maps.decoder)
-            .jump_prior(jumps);
+            .jump_prior(jumps)
+            .stride_prior(strides);
         let phases = training.phases.patterns.iter().zip(fitted.xi);
         for (index, ((pattern, xi), given_state)) in phases.zip(given_state).enumerate() {
             let (name, feet) = (pattern.name.clone(), pattern.feet.clone());

@@ -7,12 +7,15 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 
 use super::*;
+use crate::model::StridePrior;
 use crate::robot::{Actuators, Robot, WrenchFrame};
 use crate::robot_file::{self, RobotEntry};
 
 pub(crate) const SCHEMA: &str = "romc-model/1";
 /// With `actuators`, `wrench_frame`, `landmarks`, `prior`, inputs given states, and a `robot` that is described.
 pub(crate) const SCHEMA_2: &str = "romc-model/2";
+/// With `strides`.
+pub(crate) const SCHEMA_3: &str = "romc-model/3";
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -66,6 +69,12 @@ pub(super) struct Manifest {
     pub prior: Option<JumpPrior>,
     #[serde(
         default,
+        deserialize_with = "present",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub strides: Option<StridePrior>,
+    #[serde(
+        default,
         deserialize_with = "object",
         skip_serializing_if = "Map::is_empty"
     )]
@@ -95,10 +104,11 @@ impl Manifest {
             sample_time_s: parts.sample_time_s,
             landmarks: landmarks.map(|prior| prior.landmarks.clone()),
             prior: parts.jump_prior,
+            strides: parts.stride_prior,
             provenance: parts.provenance,
         };
-        if manifest.later_key().is_some() {
-            manifest.schema = SCHEMA_2.to_owned();
+        if let Some((_, schema)) = manifest.later_key() {
+            manifest.schema = schema.to_owned();
         }
         manifest
     }
@@ -124,6 +134,7 @@ impl Manifest {
             .actuators(self.actuators)
             .wrench_frame(self.wrench_frame.unwrap_or_default())
             .jump_prior(prior)
+            .stride_prior(self.strides)
             .sample_time_s(self.sample_time_s)
             .provenance(self.provenance)
             .encoder(self.encoder)
@@ -133,7 +144,11 @@ impl Manifest {
             .map_err(refused)
     }
 
-    pub(super) fn later_key(&self) -> Option<&'static str> {
+    /// A key that the first schema does not have, and the first one that has it; the latest such.
+    pub(super) fn later_key(&self) -> Option<(&'static str, &'static str)> {
+        if self.strides.is_some() {
+            return Some(("strides", SCHEMA_3));
+        }
         let mut statistics = self.input_statistics.iter();
         let has_given_state = statistics.any(|(_, entry)| entry.given_state.is_some());
         let later = [
@@ -145,7 +160,7 @@ impl Manifest {
             ("robot", matches!(self.robot, Some(RobotValue::Entry(_)))),
         ];
         let found = later.into_iter().find(|(_, there)| *there);
-        found.map(|(key, _)| key)
+        found.map(|(key, _)| (key, SCHEMA_2))
     }
 }
 

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fs::File;
 use std::io::Read;
 
-use super::manifest::{SCHEMA, SCHEMA_2, SchemaProbe};
+use super::manifest::{SCHEMA, SCHEMA_2, SCHEMA_3, SchemaProbe};
 use super::*;
 use crate::files::size::Format;
 
@@ -15,6 +15,7 @@ pub fn describe(error: &dyn Error) -> String {
     causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
+const SCHEMAS: [&str; 3] = [SCHEMA, SCHEMA_2, SCHEMA_3];
 const MAX_FILE_BYTES: u64 = Format::Model.most_bytes();
 
 pub fn is_standard_input(path: &Path) -> bool {
@@ -45,10 +46,14 @@ pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel> {
     check_schema(file, bytes)?;
     let manifest: Manifest =
         parse(file, bytes).map_err(|fault| foreign(file, bytes).unwrap_or(fault))?;
-    match manifest.later_key().filter(|_| manifest.schema == SCHEMA) {
-        Some(key) => {
-            let found = format!("in a file of \"{SCHEMA}\"");
-            let expected = format!("only from \"{SCHEMA_2}\" on");
+    // Names of schemas grow as their numbers do.
+    match manifest
+        .later_key()
+        .filter(|(_, from)| *manifest.schema < **from)
+    {
+        Some((key, from)) => {
+            let found = format!("in a file of \"{}\"", manifest.schema);
+            let expected = format!("only from \"{from}\" on");
             Err(ArtifactError::at(file, format!("`{key}`"), found, expected))
         }
         None => manifest.model(file),
@@ -97,10 +102,10 @@ fn check_schema(file: &str, bytes: &[u8]) -> Result<()> {
         return Ok(());
     };
     let found: String = match probe.schema {
-        Some(Value::String(schema)) if schema == SCHEMA || schema == SCHEMA_2 => return Ok(()),
+        Some(Value::String(schema)) if SCHEMAS.contains(&&*schema) => return Ok(()),
         Some(other) => other.to_string().chars().take(80).collect(),
         None => "none".to_owned(),
     };
-    let expected = format!("\"{SCHEMA}\" or \"{SCHEMA_2}\"");
+    let expected = format!("\"{SCHEMA}\", \"{SCHEMA_2}\" or \"{SCHEMA_3}\"");
     Err(ArtifactError::at(file, "`schema`", found, expected))
 }

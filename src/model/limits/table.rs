@@ -54,6 +54,9 @@ ranges! {
     SAMPLE_TIME = Range::real("sample-time", 1e-6, 1.0);
     DISTANCE = Range::real("distance", -1000.0, 1000.0);
     APEX = Range::real("apex", -1000.0, 1000.0);
+    SPEED = Range::real("speed", -10.0, 10.0);
+    YAW_RATE = Range::real("yaw-rate", -10.0, 10.0);
+    DURATION = Range::real("duration", 0.1, 600.0);
 }
 
 /// The range of a setting of `romc train` by its name.

@@ -36,6 +36,7 @@ pub struct ModelBuilder {
     pub(crate) actuators: Option<Actuators>,
     pub(crate) wrench_frame: WrenchFrame,
     pub(crate) jump_prior: Option<JumpPrior>,
+    pub(crate) stride_prior: Option<StridePrior>,
     pub(crate) sample_time_s: Option<f64>,
     pub(crate) provenance: Map<String, Value>,
 }
@@ -57,6 +58,7 @@ impl ModelBuilder {
             actuators: None,
             wrench_frame: WrenchFrame::Body,
             jump_prior: None,
+            stride_prior: None,
             sample_time_s: None,
             provenance: Map::new(),
         }
@@ -76,6 +78,7 @@ impl ModelBuilder {
         actuators: Option<Actuators>;
         wrench_frame: WrenchFrame;
         jump_prior: Option<JumpPrior>;
+        stride_prior: Option<StridePrior>;
         sample_time_s: impl Into<Option<f64>>;
         provenance: Map<String, Value>;
     }
@@ -113,6 +116,9 @@ impl ModelBuilder {
         self.check_statistics(state_dim)?;
         if let Some(prior) = &self.jump_prior {
             self.check_prior(prior)?;
+        }
+        if let Some(prior) = &self.stride_prior {
+            prior.check()?;
         }
         Ok(ReducedModel {
             parts: self,

@@ -41,6 +41,7 @@ mod rom;
 mod standard_library;
 mod state_map;
 mod statistics;
+mod stride_prior;
 
 pub use crate::robot::FeetRule;
 pub(crate) use builder::ModelBuilder;
@@ -58,6 +59,7 @@ pub use rom::{Phase, ReducedModel};
 pub use standard_library::{LibraryOrder, StandardLibrary};
 pub use state_map::{AffineMap, Layer, MAX_LAYERS, StateMap};
 pub use statistics::{InputGivenState, InputStatistics};
+pub use stride_prior::{GAIT_DIM, GaitRange, STRIDE_WIDTH, StridePrior};
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;

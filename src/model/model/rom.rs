@@ -155,6 +155,11 @@ impl ReducedModel {
         self.require(self.parts.jump_prior.as_ref(), "prior", purpose)
     }
 
+    pub fn stride_prior(&self) -> Result<&StridePrior> {
+        let purpose = "planning of walks; `romc train --phases trot` makes them";
+        self.require(self.parts.stride_prior.as_ref(), "strides", purpose)
+    }
+
     /// Mean and covariance of the training inputs of one phase, SI units.
     pub fn input_statistics(&self, phase: usize) -> Result<&InputStatistics> {
         let phase = &self.phase(phase)?.name;

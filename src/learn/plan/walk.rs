@@ -1,0 +1,165 @@
+//! Walks that nobody recorded: a speed and a yaw rate in, a recording out, from the strides of the training.
+
+use super::*;
+use crate::model::{GAIT_DIM, STRIDE_WIDTH, StridePrior};
+
+const SOURCE: &str = "plan";
+const YAW: usize = JOINT_DIM + 5;
+const SMOOTHED: usize = 2; // samples beside each that velocities are averaged over
+/// How far from the recorded range a speed or a yaw rate is still planned, as a share of that range.
+const BEYOND: f64 = 0.15;
+const NAMES: [(&str, &str); 3] = [
+    ("speed", "m/s"),
+    ("sideways speed", "m/s"),
+    ("yaw rate", "rad/s"),
+];
+
+/// A steady walk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WalkGoal {
+    /// Forwards, m/s.
+    pub speed_m_s: f64,
+    /// To the left, rad/s.
+    pub yaw_rate_rad_s: f64,
+    /// Of the walk, s.
+    pub duration_s: f64,
+}
+
+/// A planned walk, which is a recording.
+#[derive(Clone, Debug)]
+pub struct WalkPlan {
+    pub motion: Segment,
+    /// Duration of a stride, s, share of it that a foot stands, height of the body, m.
+    pub stride_s: f64,
+    pub duty: f64,
+    pub height_m: f64,
+    pub verdict: Verdict,
+}
+
+/// A stride of the goal's gait, over and over: half a stride as the prior has it, half as the mirror image of the gait turning
+/// the other way. Velocities are differences of the positions, torques those of the prior with the losses of this very motion.
+///
+/// # Errors
+/// Those of a model without strides or robot.
+pub fn walk(model: &ReducedModel, goal: &WalkGoal) -> Result<WalkPlan> {
+    let (prior, rule) = (model.stride_prior()?, model.input_rule()?);
+    let [.., frequency, duty, height] = prior.gait.map(|range| range.mean);
+    let gait = [
+        goal.speed_m_s,
+        0.0,
+        goal.yaw_rate_rad_s,
+        frequency,
+        duty,
+        height,
+    ];
+    let stride = stride(prior, rule.robot(), &gait);
+    let sample_time_s = model.sample_time_s()?;
+    let count = (goal.duration_s / sample_time_s).round().max(1.0) as usize + 1;
+    let times = (0..count).map(|sample| sample as f64 * sample_time_s);
+    let mut motion = Segment::still(SOURCE, times.collect());
+    let mut net = DMatrix::zeros(JOINT_DIM, count);
+    for sample in 0..count {
+        let time_s = motion.time_s[sample];
+        let place = (time_s * frequency).fract() * stride.nrows() as f64;
+        let (node, share) = (place as usize % stride.nrows(), place.fract());
+        let next = (node + 1) % stride.nrows();
+        let row = stride.row(node) * (1.0 - share) + stride.row(next) * share;
+        for i in 0..STATE_DIM {
+            motion.x[(i, sample)] = row[i];
+        }
+        let heading = goal.yaw_rate_rad_s * time_s;
+        let (sine, cosine) = heading.sin_cos();
+        let [along, across] = [row[BODY_X], row[BODY_X + 1]];
+        // The place on a circle, or on a line.
+        let [x, y] = match goal.yaw_rate_rad_s.abs() > 1e-9 {
+            true => [sine, 1.0 - cosine].map(|part| part * goal.speed_m_s / goal.yaw_rate_rad_s),
+            false => [goal.speed_m_s * time_s, 0.0],
+        };
+        motion.x[(BODY_X, sample)] = x + cosine * along - sine * across;
+        motion.x[(BODY_X + 1, sample)] = y + sine * along + cosine * across;
+        motion.x[(YAW, sample)] += heading;
+        for joint in 0..JOINT_DIM {
+            net[(joint, sample)] = row[STATE_DIM + joint];
+        }
+        motion.feet[sample] = std::array::from_fn(|foot| row[2 * STATE_DIM + foot] > 0.5);
+    }
+    motion.dx = smoothed_differences(&motion.time_s, &motion.x);
+    motion.ddx = smoothed_differences(&motion.time_s, &motion.dx);
+    motion.torque_nm = net + motion.losses(&rule);
+    Ok(WalkPlan {
+        motion,
+        stride_s: 1.0 / frequency,
+        duty,
+        height_m: height,
+        verdict: verdict(prior, &gait),
+    })
+}
+
+/// Both halves of a stride, `2 (n - 1) x 40`, joined where they meet.
+fn stride(prior: &StridePrior, robot: &Robot, gait: &[f64; GAIT_DIM]) -> DMatrix<f64> {
+    let [forward, sideways, yaw_rate, rest @ ..] = *gait;
+    let [frequency, duty, height] = rest;
+    let other_way = [forward, -sideways, -yaw_rate, frequency, duty, height];
+    let mut first = prior.half_stride(gait);
+    let image = prior.half_stride(&other_way);
+    let mut second = DMatrix::from_fn(image.nrows(), STRIDE_WIDTH, |node, i| match i / STATE_DIM {
+        2 => image[(node, 2 * STATE_DIM + ((i - 2 * STATE_DIM) ^ 1))],
+        block => {
+            let (from, sign) = robot.mirrored(i % STATE_DIM);
+            sign * image[(node, block * STATE_DIM + from)]
+        }
+    });
+    let last = first.nrows() - 1;
+    let gaps = [
+        (second.row(0) - first.row(last)) * 0.5,
+        (first.row(0) - second.row(last)) * 0.5,
+    ];
+    for node in 0..=last {
+        let share = node as f64 / last as f64;
+        let towards = |end: usize| &gaps[end] * share - &gaps[1 - end] * (1.0 - share);
+        let mut row = first.row_mut(node);
+        row += towards(0);
+        let mut row = second.row_mut(node);
+        row += towards(1);
+    }
+    let mut both = DMatrix::zeros(2 * last, STRIDE_WIDTH);
+    both.rows_mut(0, last).copy_from(&first.rows(0, last));
+    both.rows_mut(last, last).copy_from(&second.rows(0, last));
+    both
+}
+
+/// Central differences, each the mean of its neighbours'.
+fn smoothed_differences(time_s: &[f64], values: &DMatrix<f64>) -> DMatrix<f64> {
+    let last = time_s.len() - 1;
+    let mut rates = DMatrix::zeros(values.nrows(), time_s.len());
+    for sample in 0..=last {
+        let (from, to) = (
+            sample.saturating_sub(SMOOTHED + 1),
+            (sample + SMOOTHED + 1).min(last),
+        );
+        let rate = (values.column(to) - values.column(from)) / (time_s[to] - time_s[from]);
+        rates.set_column(sample, &rate);
+    }
+    rates
+}
+
+fn verdict(prior: &StridePrior, gait: &[f64; GAIT_DIM]) -> Verdict {
+    let (mut beyond, mut far) = (Vec::new(), Vec::new());
+    for ((range, value), (name, unit)) in prior.gait.iter().zip(gait).zip(NAMES) {
+        let margin = BEYOND * (range.most - range.least);
+        let text = format!(
+            "{name} {value} {unit}, recorded from {:.2} to {:.2}",
+            range.least, range.most
+        );
+        if *value < range.least - margin || *value > range.most + margin {
+            far.push(text);
+        } else if *value < range.least || *value > range.most {
+            beyond.push(text);
+        }
+    }
+    match (far.is_empty(), beyond.is_empty()) {
+        (false, _) => Verdict::Refused(far),
+        (true, false) => Verdict::Extrapolates(beyond),
+        (true, true) => Verdict::Trusted,
+    }
+}

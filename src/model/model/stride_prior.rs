@@ -1,0 +1,81 @@
+//! What a model keeps of the strides of its training walks, so that others can be planned: half a stride, from the touchdown of
+//! one diagonal pair of feet to that of the other, at nodes of equal shares of its duration. The other half is its mirror
+//! image. With the features `phi = (1, f_1 .. f_6)` of a gait, `f = (value - mean) / std`, a number at a node is `c . phi`.
+
+use super::*;
+
+/// Forward and sideways velocity (m/s), yaw rate (rad/s), strides a second, share of a stride that a foot stands, height (m).
+pub const GAIT_DIM: usize = 6;
+const GAIT_FEATURES: usize = 1 + GAIT_DIM;
+/// Numbers at a node: the state, the input, and for each foot how often it is down.
+pub const STRIDE_WIDTH: usize = 2 * STATE_DIM + FOOT_DIM;
+const MOST_NODES: usize = 200;
+
+/// `strides` of a model file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StridePrior {
+    pub gait: [GaitRange; GAIT_DIM],
+    /// `n x (7 x 40)`: the columns of one feature after the other. In SI units; positions and yaw are deviations from steady motion
+    /// along x, roll, pitch and height are not.
+    #[serde(with = "listed")]
+    pub nodes: DMatrix<f64>,
+}
+
+/// One number of the training's gaits.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GaitRange {
+    pub mean: f64,
+    pub std: f64,
+    pub least: f64,
+    pub most: f64,
+}
+
+impl StridePrior {
+    /// The nodes of half a stride of a gait, `n x 40`, which begins with the touchdown of the front right foot.
+    pub fn half_stride(&self, gait: &[f64; GAIT_DIM]) -> DMatrix<f64> {
+        let mut nodes = DMatrix::zeros(self.nodes.nrows(), STRIDE_WIDTH);
+        for feature in 0..GAIT_FEATURES {
+            let value = match feature.checked_sub(1) {
+                None => 1.0,
+                Some(i) => (gait[i] - self.gait[i].mean) / self.gait[i].std,
+            };
+            nodes += self.nodes.columns(feature * STRIDE_WIDTH, STRIDE_WIDTH) * value;
+        }
+        nodes
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        let place = "`strides.nodes`";
+        check_count(place, self.nodes.nrows(), "nodes", 3..=MOST_NODES)?;
+        let shape = (self.nodes.nrows(), GAIT_FEATURES * STRIDE_WIDTH);
+        check_tensor("strides.nodes", &self.nodes, shape)?;
+        for (index, range) in self.gait.iter().enumerate() {
+            let GaitRange {
+                mean,
+                std,
+                least,
+                most,
+            } = *range;
+            let fits = [mean, std, least, most].iter().all(|v| v.is_finite())
+                && std > 0.0
+                && least <= most;
+            let place = format!("`strides.gait[{index}]`");
+            check(
+                fits,
+                &place,
+                || format!("{range:?}"),
+                "finite numbers, std positive, ordered",
+            )?;
+        }
+        let [.., frequency, _, _] = &self.gait;
+        let fits = frequency.least > 0.0;
+        check(
+            fits,
+            "`strides.gait[3]`",
+            || frequency.least,
+            "positive strides a second",
+        )
+    }
+}

@@ -1,0 +1,78 @@
+//! Planned walks.
+
+use romc::plan::{Verdict, WalkGoal, walk};
+use romc::recording::{Recording, stride_s};
+use romc::robot::{BODY_X, BODY_Z};
+
+use super::*;
+
+fn trot() -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    root.join("models/go1-trot-d6.json").display().to_string()
+}
+
+#[test]
+fn walk_has_the_speed_the_turn_and_the_feet_of_a_trot() {
+    let model = romc::artifact::read(Path::new(&trot())).expect("shipped");
+    for (speed_m_s, yaw_rate_rad_s) in [(0.5, 0.0), (0.7, 0.4), (0.3, -0.3)] {
+        let goal = WalkGoal {
+            speed_m_s,
+            yaw_rate_rad_s,
+            duration_s: 4.0,
+        };
+        let planned = walk(&model, &goal).expect("strides");
+        assert_eq!(planned.verdict, Verdict::Trusted);
+        let motion = &planned.motion;
+        let last = motion.len() - 1;
+        let turned = motion.x[(17, last)] - motion.x[(17, 0)];
+        assert!((turned - 4.0 * yaw_rate_rad_s).abs() < 0.05, "{turned}");
+        let mean = |row: usize| motion.dx.row(row).mean();
+        let speed = (0..=last).map(|k| motion.dx[(BODY_X, k)].hypot(motion.dx[(BODY_X + 1, k)]));
+        let speed = speed.sum::<f64>() / motion.len() as f64;
+        assert!((speed / speed_m_s - 1.0).abs() < 0.05, "{speed}");
+        assert!(mean(BODY_Z).abs() < 0.01);
+        let found = stride_s(std::iter::once(motion)).expect("a walk");
+        assert!((found / planned.stride_s - 1.0).abs() < 0.02, "{found}");
+        // Diagonal pairs, each as long as the other.
+        let pairs = motion
+            .feet
+            .iter()
+            .filter(|[fr, fl, rr, rl]| fr == rl && fl == rr);
+        assert!(pairs.count() as f64 > 0.8 * motion.len() as f64);
+        let carried = |foot: usize| motion.feet.iter().filter(|feet| feet[foot]).count() as f64;
+        assert!((carried(0) / carried(1) - 1.0).abs() < 0.1);
+        // The model finds its own inputs in it: their sum carries the robot's weight.
+        let rule = model.input_rule().expect("a robot");
+        let input = motion.input(&rule).expect("inputs");
+        let weight = input.row(BODY_Z).mean() / 9.81;
+        assert!((11.0..14.5).contains(&weight), "{weight} kg");
+        assert_eq!(Recording::from(motion.clone()).segments.len(), 1);
+    }
+}
+
+#[test]
+fn walk_is_written_with_the_settings_of_its_controller_or_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (folder, model) = (folder.path(), trot());
+    let plan = ["plan", &model, "--output", "plan.csv", "--json"];
+    let goal = ["--speed", "0.4", "--yaw-rate", "0.2", "--duration", "2"];
+    let said: Value = serde_json::from_str(&done(folder, &[&plan[..], &goal].concat())).expect("J");
+    assert_eq!(said["status"], "trusted", "{said}");
+    let settings = fs::read_to_string(folder.join("plan.settings.toml")).expect("written");
+    assert!(settings.contains("legs = 1.0"), "{settings}");
+    let inspected = done(folder, &["inspect", "plan.csv", "--json"]);
+    let inspected: Value = serde_json::from_str(&inspected).expect("JSON");
+    assert!(inspected.to_string().contains("plan.csv"), "{inspected}");
+    fs::remove_file(folder.join("plan.csv")).expect("there");
+    let fast = failed(folder, &[&plan[..], &["--speed", "2"]].concat());
+    assert!(fast.contains("speed 2 m/s, recorded from"), "{fast}");
+    let jumper = super::model();
+    let jumps = failed(
+        folder,
+        &["plan", &jumper, "--output", "plan.csv", "--speed", "0.4"],
+    );
+    assert!(
+        jumps.contains("`strides`") || jumps.contains("strides"),
+        "{jumps}"
+    );
+}
