@@ -1,4 +1,4 @@
-"""Faults of sensors, clock and robot while a simulated Go1 jumps by the controller in C.
+"""Faults of sensors, clock and robot while a simulated Go1 jumps, or trots, by the controller in C.
 
 The supervisor of the controller has to name each fault, and torques have to fade into joint damping.
 Torques are those of the command and of the joint PD with the command's gains.
@@ -17,6 +17,7 @@ from followers import FIRST_SUPERVISED, Commanded
 from model_inputs import ModelInputs
 from perturbations import NOMINAL, perturbed_simulation
 from simulation import Push
+from walk_loop import SETTINGS, read_walk, with_settings
 
 EXAMPLE = """example:
   cargo build --release
@@ -108,16 +109,20 @@ class Faulty(Commanded):
             self.off_law_nm = max(self.off_law_nm, off + self.command.stiffness)
 
 
-def run(module, inputs, jump, fault, fault_s, rate_hz):
+def run(module, inputs, jump, fault, fault_s, rate_hz, walks):
     """Name of the status, delay and contact of the trunk after the fault (s, or none), and what torques
     are off the damping law (N m)."""
-    controller = module.Controller(module.Library().default_settings())
+    chosen = module.Library().default_settings()
+    if walks:
+        chosen = with_settings(chosen, SETTINGS.items())
+    controller = module.Controller(chosen)
     controller.set_reference(jump.time_s, jump.x, jump.dx, inputs.of(jump), jump.feet)
     simulation = perturbed_simulation(ROBOT, NOMINAL, jump.floor, jump.x[0], jump.dx[0], 0.0)
     if fault.startswith("push"):
         simulation.push = Push(fault_s, fault_s + PUSH_S, (0.0, float(fault.split()[2]), 0.0))
     faulty = Faulty(controller, FAULTS[fault], fault_s, rate_hz)
-    log = simulation.run(faulty, jump.time_s[-1] + 0.5)
+    # A walk ends in the middle of a step.
+    log = simulation.run(faulty, jump.time_s[-1] + (0.0 if walks else 0.5))
     touched = np.flatnonzero(log.other_contact & (log.time_s >= fault_s))
     touch_s = log.time_s[touched[0]] - fault_s if len(touched) else None
     if faulty.supervised is None:
@@ -131,12 +136,15 @@ def main():
     arguments = parse_arguments()
     crate = c_controller.build(arguments.model, arguments.out_dir / "controller", arguments.romc)
     inputs = ModelInputs.compiled(arguments.model, arguments.out_dir / "inputs", arguments.romc)
-    module, jump = c_controller.load(crate), read_jump(arguments.jump)
+    read = read_walk if arguments.walk else read_jump
+    module, jump = c_controller.load(crate), read(arguments.jump)
     rows, missed = [], []
     print(f"{'fault':27} {'from s':>6} {'status':18} {'after s':>7} {'touches s':>9} {'off law N m':>11}")
     for fault in FAULTS:
         for fault_s in (0.0, 0.2, 0.36):
-            word, after_s, touch_s, law = run(module, inputs, jump, fault, fault_s, arguments.rate)
+            word, after_s, touch_s, law = run(
+                module, inputs, jump, fault, fault_s, arguments.rate, arguments.walk
+            )
             rows.append(
                 {"fault": fault, "from_s": fault_s, "status": word, "after_s": after_s, "touches_s": touch_s}
             )
@@ -167,6 +175,9 @@ def parse_arguments():
     )
     parser.add_argument("--model", type=pathlib.Path, default=ROOT / "models/go1-d7.json")
     parser.add_argument("--jump", type=pathlib.Path, default=TRAINING / "test_01.csv.gz")
+    parser.add_argument(
+        "--walk", action="store_true", help="model and recording are of walks: settings of walks"
+    )
     parser.add_argument("--rate", type=int, default=100, help="control steps a second (default: 100)")
     parser.add_argument("--romc", type=pathlib.Path, default=ROMC, help="the compiler")
     parser.add_argument("--out-dir", type=pathlib.Path, default=ROOT / "out/faults")

@@ -39,7 +39,6 @@ SETTINGS = {
     "velocity_weight": 0.02,
     "place_scale_m": 0.03,
     "heading_scale_rad": 0.05,
-    "poor_steps": 250,
 }
 PUSH_N, PUSH_S = 40.0, 0.1
 PERTURBATIONS = (

@@ -1,8 +1,8 @@
 //! Settings of the controller for a plan: a file next to it, which `romc plan` writes and other commands read.
 
 use super::*;
+use crate::mpc::Legs;
 use crate::mpc::interface::{SETTINGS, Settings};
-use crate::mpc::{Bounds, Legs};
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
 pub(super) fn path_for(plan: &Path) -> PathBuf {
@@ -58,7 +58,6 @@ pub(super) fn of_jumps(robot: &Robot) -> MpcSettings {
 
 /// Along a walk the legs are those of the plan, and deviations count by lengths that do not grow with the way.
 pub(super) fn of_walks(robot: &Robot) -> MpcSettings {
-    let usual = MpcSettings::default();
     MpcSettings {
         lift: Lift::Consistent,
         legs: Legs::Reference,
@@ -67,12 +66,8 @@ pub(super) fn of_walks(robot: &Robot) -> MpcSettings {
         velocity_weight: 0.02,
         place_scale_m: Some(0.03),
         heading_scale_rad: Some(0.05),
-        bounds: Bounds {
-            poor_steps: 250,
-            ..usual.bounds
-        },
         drives: Drives::of(robot),
-        ..usual
+        ..MpcSettings::default()
     }
 }
 

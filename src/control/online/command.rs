@@ -5,7 +5,7 @@
 use super::control_model::{clamped_joint, clamped_torque};
 use super::controller::Controller;
 use super::dense::{Real, first_undefined};
-use super::settings::{AfterEnd, Drives, FallbackSettings};
+use super::settings::{AfterEnd, Drives, FallbackSettings, Legs};
 use super::supervisor::Fault;
 use crate::robot::JOINT_DIM;
 
@@ -97,9 +97,11 @@ impl Status {
         (Self::Solved.code()..Self::Inaccurate.code()).contains(&self.code())
     }
 
-    /// Whether nothing was planned, or for unknown contacts. Jumps of measurements have a patience of their own.
-    fn is_poor(self) -> bool {
-        let is_poor = !self.has_plan() || self == Self::ContactUnknown;
+    /// Whether nothing was planned, or for unknown contacts, which are usual between two phases of a walk. Jumps of measurements
+    /// have a patience of their own.
+    fn is_poor(self, legs: Legs) -> bool {
+        let is_lost = self == Self::ContactUnknown && legs == Legs::Decoded;
+        let is_poor = !self.has_plan() || is_lost;
         is_poor && self != Self::MeasurementJump && self != Self::Ended
     }
 
@@ -341,7 +343,8 @@ impl Controller {
 
     /// Counts poor steps; the status that stays.
     pub(super) fn judged(&mut self, status: Status, time_s: f64) -> Status {
-        let (settings, is_poor) = (&self.settings, self.reference.is_some() && status.is_poor());
+        let settings = &self.settings;
+        let is_poor = self.reference.is_some() && status.is_poor(settings.legs);
         let passed_s = self.memory.since_command(time_s, settings.step_s);
         let fault = self.supervisor.judge(&settings.bounds, is_poor, passed_s);
         Status::of(fault).unwrap_or(status)
