@@ -68,6 +68,20 @@ fn trots_are_predicted_and_no_longer_when_an_equation_is_negated() {
     );
 }
 
+#[test]
+fn rows_of_the_body_are_named() {
+    let model = artifact::read(Path::new("models/go1-trot-d6.json")).expect("shipped");
+    let words = model.latent_words();
+    let quantities: Vec<&str> = words.iter().map(|of| &of.quantity[..]).collect();
+    assert_eq!(quantities[0], "centre of mass forwards");
+    assert_eq!(quantities[3], "centre of mass to the left");
+    assert_eq!(words[3].unit, "in 10 m");
+    assert!(
+        quantities.iter().all(|of| !of.contains("together")),
+        "{quantities:?}"
+    );
+}
+
 /// Leg pairs are each other's image: so are the equations of their phases, to the last bit. The body has one set.
 #[test]
 fn phases_that_are_mirror_images_have_mirrored_equations() {

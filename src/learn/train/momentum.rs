@@ -8,7 +8,7 @@ const FLIGHT_WINDOW_S: f64 = 0.05; // over which accelerations are averaged
 /// The same with feet on the ground: of a walk whatever feet do in between, else short, because slow motions of one stance say
 /// little in long ones.
 const WINDOW_S: [f64; 2] = [0.02, 0.1];
-const LEAST_SPANS: usize = 4; // of a motion in the mean, from which on it counts as a walk
+const LEAST_SPANS: usize = 6; // of a motion in the mean, from which on it counts as a walk
 const STRIDE: usize = 2; // samples between the starts of two of these
 const TRIM: usize = 4; // samples left out at both ends of a flight, where feet still slip or already touch
 const LEAST_FLIGHTS: usize = 50; // averaged accelerations in flight that identify the centre of mass
@@ -20,7 +20,7 @@ const LOAD_RIDGE: f64 = 1e-5; // on what else is in the regression, relative to 
 /// The momentum rows of these body coordinates, as columns: `x + c_x^T q`, `pitch + c_t^T q` and so on over the joints `q`.
 /// In flight the centre of mass falls freely and the angular momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz +
 /// c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The regression of the body's accelerations on those of the joints (ridge) gives
-/// `c`, to first order in `q`. Where flights are fewer than [`LEAST_FLIGHTS`] or [`LEAST_SHARE`] it is that of all samples,
+/// `c`, to first order in `q`. In walks, and where flights are fewer than [`LEAST_FLIGHTS`] or [`LEAST_SHARE`], it is that of all samples,
 /// where forces and moments on the body change the momentum: `dd(b + c_b^T q) = B [F; M] - k db + a`, with the velocity of `x`
 /// and `y` alone, because feet that roll brake them; of `y` also on roll, which moves a centre of mass below the body's origin.
 /// Of the body alone if forces are in its axes. By symmetry a row in the plane has sums of left and right joints only, and one
@@ -39,15 +39,15 @@ pub(super) fn momentum_rows(
         flight_windows(training, jump, &mut flights);
     }
     let share = flights.len() as f64 / training.samples(None).max(1) as f64;
-    let flies = flights.len() >= LEAST_FLIGHTS && share >= LEAST_SHARE;
+    let spans: usize = training.jumps.iter().map(|jump| jump.spans.len()).sum();
+    let walks = spans >= LEAST_SPANS * training.jumps.len();
+    let flies = flights.len() >= LEAST_FLIGHTS && share >= LEAST_SHARE && !walks;
     if !flies && training.rule.wrench_frame() == WrenchFrame::Body {
         return rows;
     }
     let windows = match flies {
         true => flights,
         false => {
-            let spans: usize = training.jumps.iter().map(|jump| jump.spans.len()).sum();
-            let walks = spans >= LEAST_SPANS * training.jumps.len();
             let window_s = WINDOW_S[usize::from(walks)];
             let each = training.jumps.iter();
             each.flat_map(|jump| all_windows(jump, window_s)).collect()

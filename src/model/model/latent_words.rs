@@ -19,6 +19,7 @@ const PAIRS: [(&str, [Leg; 2]); 2] = [
 const LIKE_FEET: f64 = 0.95;
 const MOST: f64 = 0.9; // share of the squared weights of a row that names it after two legs
 const NONE: f64 = 1e-9;
+const ROLL: usize = BODY_X + 3; // of the state; pitch and yaw follow
 
 /// Quantity and unit of a latent coordinate; displayed as `centre of mass upwards, in 10 m`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -76,8 +77,9 @@ fn words(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
     let has_joints = (0..JOINT_DIM).any(|i| is_in(&i));
     match (body.as_slice(), has_joints) {
         ([], _) => joints(row, rest, robot),
-        ([one], _) if (row[*one] - 1.0).abs() > NONE => together(),
-        ([one], true) => {
+        ([one, ..], _) if (row[*one] - 1.0).abs() > NONE => together(),
+        // A centre of mass beside the body's origin moves with its rotation.
+        ([one, turns @ ..], true) if turns.is_empty() || (*one < ROLL && turns[0] >= ROLL) => {
             let (name, unit) = BODY[one - BODY_X];
             Words(name.to_owned(), Some(unit))
         }
