@@ -223,6 +223,7 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Dominant> {
 }
 
 const BAR_WIDTH: usize = 60;
+const STRIDES_SHOWN: f64 = 3.0;
 /// Shorter spans are feet that leave or land one after the other, part of the span before them.
 const CHATTER: usize = 10;
 const FINDINGS_SHOWN: usize = 12;
@@ -254,7 +255,12 @@ fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer> {
     let ranges = ranges(recording);
     let (findings, mismatches) = (check(recording, robot), mismatches(recording, robot));
     text += &lines("  ", &notes);
-    text += "  # a front foot is down, = only rear feet are, blank: flight\n\n";
+    text += "  # a front foot is down, = only rear feet are, blank: flight\n";
+    let stride_s = stride_s(recording.segments.iter());
+    if let Some(stride_s) = stride_s {
+        text += &feet_strips(&recording.segments[0], stride_s);
+    }
+    text += "\n";
     text += &format!("{}\n", range_table(&ranges));
     if !findings.is_empty() {
         let _ = writeln!(text, "{} implausible runs of samples", findings.len());
@@ -271,7 +277,7 @@ fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer> {
         value["segment"] = json!(finding.segment);
         value
     });
-    let json = json!({
+    let mut json = json!({
         "kind": "recording",
         "file": file,
         "samples": samples,
@@ -283,6 +289,9 @@ fn describe_recording(reading: &Reading, robot: &Robot) -> Result<Answer> {
         "mismatches": mismatches,
         "implausible": findings.collect::<Vec<_>>(),
     });
+    if let Some(stride_s) = stride_s {
+        json["stride_s"] = stride_s.into();
+    }
     Ok(Answer::new(text, json))
 }
 
@@ -294,6 +303,30 @@ fn time_bar(segment: &Segment) -> String {
         [_, _, _, _] => '#',
     };
     feet.map(character).collect()
+}
+
+/// When each foot is down in the middle of a motion, over a few strides.
+fn feet_strips(segment: &Segment, stride_s: f64) -> String {
+    let (first, last) = (segment.time_s[0], segment.time_s[segment.len() - 1]);
+    let lasts_s = (STRIDES_SHOWN * stride_s).min(last - first);
+    let start_s = first + 0.5 * (last - first - lasts_s);
+    let mut text = format!(
+        "  a stride takes {stride_s:.3} s; segment 0 from {start_s:.2} s to {:.2} s, # a foot is down\n",
+        start_s + lasts_s
+    );
+    for (foot, leg) in Leg::ALL.into_iter().zip(["fr", "fl", "rr", "rl"]) {
+        let slots = (0..BAR_WIDTH).map(|slot| {
+            let time_s = start_s + lasts_s * (slot as f64 + 0.5) / BAR_WIDTH as f64;
+            let sample = between(&segment.time_s, time_s).0;
+            if segment.feet[sample][foot.index()] {
+                '#'
+            } else {
+                ' '
+            }
+        });
+        let _ = writeln!(text, "  {leg} |{}|", slots.collect::<String>());
+    }
+    text
 }
 
 fn segment_json(segment: &Segment) -> Result<Value> {

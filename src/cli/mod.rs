@@ -72,7 +72,7 @@ use crate::recording::check::Finding;
 use crate::recording::{
     Clocks, ColumnMap, ConditionOptions, ImplausibleSamples, PhaseRule, Reader, Reading,
     ReadingNotes, Recording, RecordingError, RecordingFault, RecordingFile, RecordingSet, Segment,
-    WriteOptions, as_recorded, guess, mismatch, write_as, write_mcap,
+    WriteOptions, as_recorded, between, guess, mismatch, stride_s, write_as, write_mcap,
 };
 use crate::report::{
     Content, Figure, Introduction, NamedRun, PageOptions, all_figures, assessment_json,

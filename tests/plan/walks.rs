@@ -62,7 +62,27 @@ fn walk_is_written_with_the_settings_of_its_controller_or_refused() {
     assert!(settings.contains("legs = 1.0"), "{settings}");
     let inspected = done(folder, &["inspect", "plan.csv", "--json"]);
     let inspected: Value = serde_json::from_str(&inspected).expect("JSON");
-    assert!(inspected.to_string().contains("plan.csv"), "{inspected}");
+    let stride = number(&inspected["files"][0]["stride_s"]);
+    assert!(
+        (stride / number(&said["stride_s"]) - 1.0).abs() < 0.02,
+        "{inspected}"
+    );
+    // Diagonal feet are down together, the others when they are not.
+    let strips = done(folder, &["inspect", "plan.csv"]);
+    let strip = |foot: &str| {
+        let line = strips
+            .lines()
+            .find(|line| line.starts_with(&format!("  {foot} |")));
+        line.expect("a strip")
+            .split('|')
+            .nth(1)
+            .expect("between bars")
+            .to_owned()
+    };
+    let [fr, fl, rr, rl] = ["fr", "fl", "rr", "rl"].map(strip);
+    let alike = |a: &str, b: &str| a.chars().zip(b.chars()).filter(|(a, b)| a == b).count();
+    assert!(alike(&fr, &rl) > 50 && alike(&fl, &rr) > 50, "{strips}");
+    assert!(alike(&fr, &fl) < 15, "{strips}");
     fs::remove_file(folder.join("plan.csv")).expect("there");
     let fast = failed(folder, &[&plan[..], &["--speed", "2"]].concat());
     assert!(fast.contains("speed 2 m/s, recorded from"), "{fast}");

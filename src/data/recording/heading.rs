@@ -7,7 +7,7 @@ use super::*;
 const X: usize = JOINT_DIM; // row of the state; y follows
 const YAW: usize = JOINT_DIM + 5;
 const LARGEST_TURN_RAD: f64 = 0.25; // from the heading at the start of a piece
-const LEAST_SWING_S: f64 = 0.04; // of a foot; shorter ones are chatter of its contact
+const LEAST_SWING_S: f64 = 0.06; // of a foot; shorter ones are chatter of its contact
 const LEAST_PIECE: usize = 50; // samples, as a training needs them
 
 impl Segment {
