@@ -39,6 +39,7 @@ fn _romc(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(emission::equations, module)?,
         wrap_pyfunction!(emission::write_files, module)?,
         wrap_pyfunction!(plan::plan, module)?,
+        wrap_pyfunction!(plan::walk, module)?,
         wrap_pyfunction!(recording::from_arrays, module)?,
         wrap_pyfunction!(recording::guess, module)?,
         wrap_pyfunction!(recording::read, module)?,

@@ -1,10 +1,10 @@
-//! Jumps that nobody recorded.
+//! Jumps and walks that nobody recorded.
 
 use nalgebra::DMatrix;
 use pyo3::prelude::*;
 use romc::Error;
 use romc::limits::table;
-use romc::plan::{Goal, PlanSettings, Verdict};
+use romc::plan::{Goal, PlanSettings, Verdict, WalkGoal};
 use romc::report::plan_json;
 
 use crate::errors::{python_error, within};
@@ -42,10 +42,31 @@ pub fn plan(
     });
     let planned = planned.map_err(|error| python_error(py, error))?;
     let json = plan_json(&planned).to_string();
-    let recording = romc::recording::Recording {
-        path: "plan".into(),
-        segments: vec![planned.motion],
-        ignored_columns: Vec::new(),
+    Ok((Recording::made(planned.motion.into()), json))
+}
+
+/// Plans a walk; returns it as a recording. One that is not to be trusted is an error unless forced.
+#[pyfunction]
+pub fn walk(
+    py: Python<'_>,
+    model: &Model,
+    speed: f64,
+    yaw_rate: f64,
+    duration: f64,
+    force: bool,
+) -> PyResult<Recording> {
+    let goal = WalkGoal {
+        speed_m_s: within(py, table::SPEED, speed)?,
+        yaw_rate_rad_s: within(py, table::YAW_RATE, yaw_rate)?,
+        duration_s: within(py, table::DURATION, duration)?,
     };
-    Ok((Recording::made(recording), json))
+    let planned = py.detach(|| -> Result<_, Error> {
+        let planned = romc::plan::walk(&model.data, &goal)?;
+        match &planned.verdict {
+            Verdict::Refused(reasons) if !force => Err(Error::Distrusted(reasons.join("; "))),
+            _ => Ok(planned),
+        }
+    });
+    let planned = planned.map_err(|error| python_error(py, error))?;
+    Ok(Recording::made(planned.motion.into()))
 }

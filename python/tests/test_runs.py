@@ -253,6 +253,18 @@ def planner(tmp_path_factory):
     return folder / "planner.json"
 
 
+def test_walk_is_that_of_the_command_line(command_line, tmp_path):
+    path = MODELS / "go1-trot-d6.json"
+    goal = ["--speed", "0.5", "--yaw-rate", "0.2", "--duration", "1", "--output", "walk.csv"]
+    command_line.json("plan", path, *goal)
+    walk = romc.Model.load(path).walk(0.5, yaw_rate=0.2, duration=1.0)
+    written = romc.read(tmp_path / "walk.csv")
+    for name in ["t", "x", "dx", "torque", "feet"]:
+        assert np.array_equal(getattr(walk, name), getattr(written, name)), name
+    with pytest.raises(romc.RomcError, match="speed 3"):
+        romc.Model.load(path).walk(3.0)
+
+
 def test_plan_is_that_of_the_command_line_and_is_followed(planner, command_line, tmp_path):
     model = romc.Model.load(planner)
     answer = command_line.json("plan", planner, "--distance", "0.3", "--apex", "0.15", "--output", "plan.csv")

@@ -418,6 +418,16 @@ class Model:
         native = None if segment is None else segment._native
         return Plan(*_romc.plan(self._native, distance, apex, native, force))
 
+    def walk(
+        self, speed: float, *, yaw_rate: float = 0.0, duration: float = 5.0, force: bool = False
+    ) -> Recording:
+        """Plans a walk of `duration` s at `speed` m/s that turns by `yaw_rate` rad/s, as `romc plan --speed` does; the model
+        needs strides, which `romc train --phases trot` writes.
+
+        Raises `RomcError` where speed or yaw rate are far from those of the training, unless `force`.
+        """
+        return Recording(_romc.walk(self._native, speed, yaw_rate, duration, force))
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Model) and self.digest == other.digest
 
