@@ -91,7 +91,7 @@ def planned(arguments, number, command):
 
 
 def run(task):
-    """One run; returns what it reached."""
+    """One run; returns its speed and yaw rate and whether it fell."""
     follower, controllers, command, plan = task
     log, outcome = driven(follower, controllers, plan)
     half = len(log.x) // 2

@@ -134,6 +134,7 @@ fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<Pla
         return Err(Error::refused(&plan_settings::path_for(path), message));
     }
     let motion = read_jump(model, path, &arguments.simplification.reading)?;
+    note_turns([&motion], UNROLLED);
     Ok(Some(PlannedJump {
         u: motion.input(&model.input_rule()?)?,
         time_s: motion.time_s,

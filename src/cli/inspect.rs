@@ -314,11 +314,11 @@ fn feet_strips(segment: &Segment, stride_s: f64) -> String {
         "  a stride takes {stride_s:.3} s; segment 0 from {start_s:.2} s to {:.2} s, # a foot is down\n",
         start_s + lasts_s
     );
-    for (foot, leg) in Leg::ALL.into_iter().zip(["fr", "fl", "rr", "rl"]) {
+    for leg in Leg::ALL {
         let slots = (0..BAR_WIDTH).map(|slot| {
             let time_s = start_s + lasts_s * (slot as f64 + 0.5) / BAR_WIDTH as f64;
             let sample = between(&segment.time_s, time_s).0;
-            if segment.feet[sample][foot.index()] {
+            if segment.feet[sample][leg.index()] {
                 '#'
             } else {
                 ' '

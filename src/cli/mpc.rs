@@ -12,6 +12,7 @@ pub(super) fn run(arguments: &MpcArguments) -> Result<Answer> {
     let model = artifact::read(&arguments.model)?;
     let settings = settings(arguments)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
+    note_turns(motions(&recordings), UNROLLED);
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
     let runs = JudgedRuns::of(&model, &recordings, runs)?;
     let mut answer = answer(arguments, &settings, &runs);

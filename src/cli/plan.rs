@@ -4,6 +4,8 @@ use super::convert::write_recording;
 use super::*;
 use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict, WalkGoal, WalkPlan};
 
+const DURATION_S: f64 = 5.0; // of a walk
+
 pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     let inputs = Inputs::reading(&arguments.reading)
         .and([&arguments.model])
@@ -24,8 +26,8 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     if let (Some(speed_m_s), Some(path)) = (arguments.speed, output) {
         let goal = WalkGoal {
             speed_m_s,
-            yaw_rate_rad_s: arguments.yaw_rate,
-            duration_s: arguments.duration,
+            yaw_rate_rad_s: arguments.yaw_rate.unwrap_or(0.0),
+            duration_s: arguments.duration.unwrap_or(DURATION_S),
         };
         let planned = plan::walk(&model, &goal)?;
         trusted(&planned.verdict, arguments.force)?;

@@ -46,6 +46,7 @@ fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer>
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
     let model = artifact::read(model_path)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
+    note_turns(motions(&recordings), CUT);
     note_late_restarts(&recordings, arguments.restart_every);
     let study = (arguments.study.as_deref()).map(summary).transpose()?;
     let plan = (arguments.plan.as_ref()).map(|path| read_jump(&model, path, &arguments.reading));

@@ -207,6 +207,26 @@ pub(super) fn read_jump(
     Ok(recording.segments.swap_remove(0))
 }
 
+/// Notes motions that turn too far for a linear encoder, with what becomes of them.
+pub(super) fn note_turns<'a>(motions: impl IntoIterator<Item = &'a Segment>, consequence: &str) {
+    let turns = |motion: &Segment| motion.by_heading().len() > 1;
+    let turns: Vec<bool> = motions.into_iter().map(turns).collect();
+    if let turning @ 1.. = turns.iter().filter(|turns| **turns).count() {
+        let all = turns.len();
+        note(&format!(
+            "{turning} of {all} motions turn by more than 0.25 rad: {consequence}"
+        ));
+    }
+}
+
+pub(super) fn motions(recordings: &[Recording]) -> impl Iterator<Item = &Segment> {
+    recordings.iter().flat_map(|recording| &recording.segments)
+}
+
+pub(super) const CUT: &str = "predictions are of pieces, each in the axes of its heading";
+pub(super) const UNROLLED: &str =
+    "a controller follows them only in the axes of their path, see docs/walking.md";
+
 pub(super) fn read_recordings(
     paths: &[PathBuf],
     arguments: &ReadingArguments,

@@ -9,6 +9,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer> {
         .check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
+    note_turns(motions(&recordings), CUT);
     note_late_restarts(&recordings, arguments.restart_every);
     let progress = spinner("simulating");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;

@@ -13,6 +13,8 @@ pub const STATE_DIM: usize = JOINT_DIM + BODY_DIM;
 pub const BODY_X: usize = JOINT_DIM;
 /// Row of the body's height in the state.
 pub const BODY_Z: usize = JOINT_DIM + 2;
+/// Row of the body's yaw in the state.
+pub const YAW: usize = JOINT_DIM + 5;
 /// Number of feet.
 pub const FOOT_DIM: usize = 4;
 /// Number of joints of a leg.

@@ -33,7 +33,7 @@ pub use geometry::{LegGeometry, LegLinks, Robot};
 pub use input_rule::{Actuators, DRY_SPEED_RAD_S, InputRule, WrenchFrame, joint_loss, rotation};
 pub use joints::{
     BODY_DIM, BODY_NAMES, BODY_X, BODY_Z, ContactFlags, FOOT_DIM, GRAVITY_M_S2, JOINT_DIM,
-    JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM,
+    JOINT_NAMES, LEG_JOINT_DIM, Leg, STATE_DIM, YAW,
 };
 pub use leg::{LEAST_HEIGHT, LEAST_SPAN, LegShape, Posture, foot_height};
 pub use links::{LegMoments, MovingLeg, Scalar, TrunkMotion};

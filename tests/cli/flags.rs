@@ -10,7 +10,12 @@ use romc::Error;
 use romc::limits::{Range, table};
 
 /// Command lines with a flag that does nothing there, and that flag.
-const IDLE: [(&str, &str); 32] = [
+const IDLE: [(&str, &str); 34] = [
+    (
+        "plan m.json --distance 0.3 --apex 0.1 --output p.csv --yaw-rate 0.1",
+        "--yaw-rate",
+    ),
+    ("plan m.json --reach --duration 2", "--duration"),
     (
         "compile m.json --out-dir o --emit latex --precision f32",
         "--precision",
@@ -131,7 +136,7 @@ const ELSEWHERE: &str = "json help version force output out-dir \
     compile: emit as-learned tolerance domain margin save-model plan \
     inspect: guess robot: name check: domain convert: inputs-of clock columns identify: robot clock columns \
     simulate: restart-every verbose clock columns mpc: horizon step lift reference-input solver figures clock columns \
-    plan: distance apex start figures reach settings speed yaw-rate duration \
+    plan: distance apex start figures reach settings speed \
     report: log study figures plan restart-every tolerance clock columns \
     import: format map weights xi-layout library library-order latent-dim phase input-scaling wrench-frame \
     actuators sample-time inputs-from unchecked name description \

@@ -1,7 +1,7 @@
 //! Planned walks.
 
 use romc::plan::{Verdict, WalkGoal, walk};
-use romc::recording::{Recording, stride_s};
+use romc::recording::stride_s;
 use romc::robot::{BODY_X, BODY_Z};
 
 use super::*;
@@ -46,8 +46,45 @@ fn walk_has_the_speed_the_turn_and_the_feet_of_a_trot() {
         let input = motion.input(&rule).expect("inputs");
         let weight = input.row(BODY_Z).mean() / 9.81;
         assert!((11.0..14.5).contains(&weight), "{weight} kg");
-        assert_eq!(Recording::from(motion.clone()).segments.len(), 1);
     }
+}
+
+/// A reference that turns is not for a controller in the axes of the world.
+#[test]
+fn commands_note_a_walk_that_turns() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (folder, model) = (folder.path(), trot());
+    let noted = |yaw_rate: &str| {
+        let goal = [
+            "--speed",
+            "0.4",
+            "--yaw-rate",
+            yaw_rate,
+            "--duration",
+            "1",
+            "--force",
+        ];
+        done(
+            folder,
+            &[&["plan", &model, "--output", "plan.csv"], &goal[..]].concat(),
+        );
+        let emit = [
+            "--emit",
+            "controller-c",
+            "--plan",
+            "plan.csv",
+            "--out-dir",
+            "out",
+            "--force",
+        ];
+        let compiled = romc(folder, &[&["compile", &model], &emit[..]].concat());
+        let simulated = romc(folder, &["simulate", &model, "plan.csv"]);
+        [compiled, simulated].map(|output| {
+            text(&output.stderr).contains("1 of 1 motions turn by more than 0.25 rad")
+        })
+    };
+    assert_eq!(noted("0.5"), [true; 2]);
+    assert_eq!(noted("0.1"), [false; 2]);
 }
 
 #[test]
@@ -91,8 +128,22 @@ fn walk_is_written_with_the_settings_of_its_controller_or_refused() {
         folder,
         &["plan", &jumper, "--output", "plan.csv", "--speed", "0.4"],
     );
+    assert!(jumps.contains("strides"), "{jumps}");
+    // A model file may have any time between samples.
+    let text = fs::read_to_string(&model).expect("shipped");
+    let text = text.replace("\"sample_time_s\": 0.002", "\"sample_time_s\": 1e-6");
+    fs::write(folder.join("fine.json"), &text).expect("written");
+    let fine = [
+        "plan",
+        "fine.json",
+        "--output",
+        "plan.csv",
+        "--speed",
+        "0.4",
+    ];
+    let fine = failed(folder, &fine);
     assert!(
-        jumps.contains("`strides`") || jumps.contains("strides"),
-        "{jumps}"
+        fine.contains("samples of the walk: found 5000000"),
+        "{fine}"
     );
 }

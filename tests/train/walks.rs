@@ -95,6 +95,33 @@ fn phases_that_are_mirror_images_have_mirrored_equations() {
 }
 
 #[test]
+fn strides_are_those_of_trots_alone() {
+    let with = |recordings: &[Recording]| {
+        let mut options = TrainOptions::new("strides", 6);
+        options.set_body(BodyRows::all());
+        let trained = train_with(recordings, &[], &options).expect("trains");
+        trained.model.stride_prior().is_ok()
+    };
+    assert!(with(&trots("train", 12)));
+    assert!(!with(&jumps_of("go1-gaits", "pronk", 3)));
+    assert!(!with(&jumps("train", 6)));
+}
+
+/// Jumps with one set of equations keep the rows of their feet.
+#[test]
+fn rows_of_feet_are_those_of_jumps() {
+    let mut options = TrainOptions::new("feet", 7);
+    options.regression.body_equations = BodyEquations::AllPhases;
+    let trained = train_with(&jumps("train", 6), &jumps("validation", 1), &options);
+    let words = trained.expect("trains").model.latent_words();
+    let feet = words
+        .iter()
+        .filter(|of| of.quantity.contains("feet"))
+        .count();
+    assert_eq!(feet, 4, "{words:?}");
+}
+
+#[test]
 fn motions_that_turn_are_cut_into_pieces_along_their_heading() {
     let recordings = trots("train", 12);
     let yaw = |segment: &Segment| segment.x.row(17).into_owned();

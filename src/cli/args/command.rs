@@ -289,13 +289,13 @@ pub(crate) struct PlanArguments {
     #[arg(long, value_name = "M_S", value_parser = real(&SPEED), conflicts_with_all = ["distance", "apex", "start", "reach", "settings", "figures"])]
     #[arg(allow_negative_numbers = true)]
     pub speed: Option<f64>,
-    /// Yaw rate of the walk, to the left, in rad/s
-    #[arg(long, value_name = "RAD_S", value_parser = real(&YAW_RATE), requires = "speed", default_value = "0")]
+    /// Yaw rate of the walk, to the left, in rad/s [default: 0]
+    #[arg(long, value_name = "RAD_S", value_parser = real(&YAW_RATE))]
     #[arg(allow_negative_numbers = true)]
-    pub yaw_rate: f64,
-    /// Duration of the walk, in s
-    #[arg(long, value_name = "S", value_parser = real(&DURATION), requires = "speed", default_value = "5")]
-    pub duration: f64,
+    pub yaw_rate: Option<f64>,
+    /// Duration of the walk, in s [default: 5]
+    #[arg(long, value_name = "S", value_parser = real(&DURATION))]
+    pub duration: Option<f64>,
     /// Start from the first sample of this recording (default: the mean start of the training jumps)
     #[arg(long, value_name = "RECORDING")]
     pub start: Option<PathBuf>,

@@ -17,6 +17,9 @@ impl Arguments {
                     .by("--torque-rate", arguments.torque_rate.is_some())
             }
             Command::Plan(arguments) => {
+                let walks = Needed("--speed", arguments.speed.is_some());
+                walks.by("--yaw-rate", arguments.yaw_rate.is_some())?;
+                walks.by("--duration", arguments.duration.is_some())?;
                 Needed("--start", arguments.start.is_some()).by_reading(&arguments.reading)
             }
             Command::Robot(arguments) => {

@@ -5,9 +5,9 @@ use super::dense::first_undefined;
 use super::error::ControlError;
 use super::settings::MpcSettings;
 use super::trajectory::{EARLY_S, Instant, Trajectory, write_between, write_still};
-use crate::robot::{BODY_X, ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
+use crate::robot::{BODY_X, ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM, YAW};
 
-const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5]; // x, y, yaw
+const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, YAW];
 
 /// A trajectory in SI units as its user has it: samples one after the other.
 #[derive(Debug, Clone, Copy)]

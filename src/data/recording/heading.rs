@@ -4,14 +4,12 @@ use std::borrow::Cow;
 
 use super::*;
 
-const X: usize = JOINT_DIM; // row of the state; y follows
-const YAW: usize = JOINT_DIM + 5;
 const LARGEST_TURN_RAD: f64 = 0.25; // from the heading at the start of a piece
 const LEAST_SWING_S: f64 = 0.06; // of a foot; shorter ones are chatter of its contact
 const LEAST_PIECE: usize = 50; // samples, as a training needs them
 
 impl Segment {
-    /// The motion, cut into pieces that turn by 0.25 rad at most if it turns by more. Each piece is turned about the vertical
+    /// The motion, cut where it has turned by 0.25 rad, in pieces of 50 samples or more. Each piece is turned about the vertical
     /// through the world's origin, so that it begins with yaw 0. A motion that never leaves +-0.25 rad stays as it is.
     pub fn by_heading(&self) -> Vec<Cow<'_, Segment>> {
         let yaw = self.x.row(YAW);
@@ -41,13 +39,11 @@ impl Segment {
 
     /// The motion turned about the vertical through the world's origin, by an angle in rad.
     fn turned(&self, angle_rad: f64) -> Segment {
-        let (sine, cosine) = angle_rad.sin_cos();
         let mut turned = self.clone();
         for rows in [&mut turned.x, &mut turned.dx, &mut turned.ddx] {
             for mut column in rows.column_iter_mut() {
-                let (x, y) = (column[X], column[X + 1]);
-                column[X] = cosine * x - sine * y;
-                column[X + 1] = sine * x + cosine * y;
+                let place = about_vertical([column[BODY_X], column[BODY_X + 1]], angle_rad);
+                [column[BODY_X], column[BODY_X + 1]] = place;
             }
         }
         turned.x.row_mut(YAW).add_scalar_mut(angle_rad);
@@ -55,7 +51,13 @@ impl Segment {
     }
 }
 
-/// Mean time from one touchdown of a foot to its next, in s; none if feet touch down less than three times each in a motion.
+/// Two numbers along x and y, turned about the vertical by an angle in rad.
+pub fn about_vertical([x, y]: [f64; 2], angle_rad: f64) -> [f64; 2] {
+    let (sine, cosine) = angle_rad.sin_cos();
+    [cosine * x - sine * y, sine * x + cosine * y]
+}
+
+/// Mean time from one touchdown of a foot to its next, in s; none unless feet touch down three times each in a motion, in the mean.
 pub fn stride_s<'a>(motions: impl Iterator<Item = &'a Segment>) -> Option<f64> {
     let (mut total_s, mut strides, mut feet) = (0.0, 0, 0);
     for segment in motions {

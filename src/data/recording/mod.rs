@@ -60,7 +60,7 @@ pub use foreign::{
     guess::{Guess, guess},
     map::ColumnMap,
 };
-pub use heading::stride_s;
+pub use heading::{about_vertical, stride_s};
 pub use phases::{CHATTER_SAMPLES, PhasePattern, PhaseRule, PhaseSpan, Stance};
 pub use reader::{Clocks, Column, Reader, Reading, ReadingNotes, read, read_from_bytes};
 pub use segment::{Recording, Segment, between, stretches};
@@ -78,6 +78,7 @@ use segment::{DERIVED_DDX, Rows, divided};
 use serde::{Deserialize, Serialize};
 
 use crate::robot::{
-    BODY_DIM, ContactFlags, FOOT_DIM, FeetRule, GRAVITY_M_S2, InputRule, JOINT_DIM, JOINT_NAMES,
-    LEAST_HEIGHT, LEAST_SPAN, LEG_JOINT_DIM, Leg, Robot, RobotError, STATE_DIM, rotation,
+    BODY_DIM, BODY_X, ContactFlags, FOOT_DIM, FeetRule, GRAVITY_M_S2, InputRule, JOINT_DIM,
+    JOINT_NAMES, LEAST_HEIGHT, LEAST_SPAN, LEG_JOINT_DIM, Leg, Robot, RobotError, STATE_DIM, YAW,
+    rotation,
 };

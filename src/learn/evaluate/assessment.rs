@@ -57,12 +57,9 @@ impl<'a> Assessment<'a> {
         let recorded: Vec<&Segment> = (recordings.iter())
             .flat_map(|recording| &recording.segments)
             .collect();
-        let pieces: Vec<Vec<Cow<'a, Segment>>> = recorded
-            .iter()
-            .map(|segment| segment.by_heading())
+        let pieces: Vec<Cow<'a, Segment>> = (recorded.iter())
+            .flat_map(|segment| segment.by_heading())
             .collect();
-        let cut = pieces.iter().filter(|pieces| pieces.len() > 1).count();
-        let pieces: Vec<Cow<'a, Segment>> = pieces.into_iter().flatten().collect();
         let segments: Vec<&Segment> = pieces.iter().map(|piece| &**piece).collect();
         let compiled = CompiledModel::new(model)?;
         let (names, units) = match model.state() {
@@ -71,13 +68,6 @@ impl<'a> Assessment<'a> {
         };
         let full = CoordinateSums::new(model)?;
         let rule = model.input_rule()?;
-        let mut remarks = remarks(model, recordings)?;
-        if cut > 0 {
-            remarks.push(format!(
-                "{cut} of {} motions turn by more than 0.25 rad: they are cut into pieces, each in the axes of its heading",
-                recorded.len()
-            ));
-        }
         let mut assessment = Self {
             names,
             units,
@@ -94,11 +84,11 @@ impl<'a> Assessment<'a> {
             stride: None,
             lift: LiftSums::default(),
             active_terms: model.phases().iter().map(|p| p.active_count()).sum(),
-            remarks,
+            remarks: Vec::new(),
         };
         let restart = Restart::Every(restart_every_s);
-        for piece in &pieces {
-            let segment = &**piece;
+        for piece in pieces {
+            let segment = &*piece;
             let latent = LatentSegment::encode(model, segment)?;
             let full = rollout(&compiled, &latent, Restart::Never);
             let restarted = rollout(&compiled, &latent, restart);
@@ -113,11 +103,12 @@ impl<'a> Assessment<'a> {
             assessment.lift.add(model, segment)?;
             let baselines = assessment.baselines.iter_mut();
             let baselines = baselines.map(|baseline| baseline.add(&rule, segment, restart));
+            let baselines = baselines.collect::<Result<_, _>>()?;
             assessment.runs.push(SegmentRun {
-                segment: piece.clone(),
+                segment: piece,
                 full,
                 restarted,
-                baselines: baselines.collect::<Result<_, _>>()?,
+                baselines,
                 latent,
             });
         }
@@ -125,6 +116,7 @@ impl<'a> Assessment<'a> {
         let linearised = linearise_phases(&compiled, &latent);
         assessment.stride = StrideGrowth::of(model, &linearised, &latent);
         assessment.linearised = linearised;
+        assessment.remarks = remarks_of(model, recordings, &assessment.pointwise)?;
         Ok(assessment)
     }
 
@@ -145,15 +137,23 @@ impl<'a> Assessment<'a> {
 
 /// Reasons against a model on these recordings: another robot ([`notes`]) or unexplained accelerations.
 pub fn remarks(model: &ReducedModel, recordings: &[Recording]) -> Result<Vec<String>> {
-    let robot = model.robot()?;
     let mut pointwise = PointwiseSums::new(model);
     let segments = recordings.iter().flat_map(|recording| &recording.segments);
-    for segment in segments {
-        let latent = LatentSegment::encode(model, segment)?;
-        pointwise.add(model, segment, &latent)?;
+    for piece in segments.flat_map(Segment::by_heading) {
+        let latent = LatentSegment::encode(model, &piece)?;
+        pointwise.add(model, &piece, &latent)?;
     }
+    remarks_of(model, recordings, &pointwise)
+}
+
+fn remarks_of(
+    model: &ReducedModel,
+    recordings: &[Recording],
+    pointwise: &PointwiseSums,
+) -> Result<Vec<String>> {
+    let robot = model.robot()?;
     let of_recordings = (recordings.iter()).flat_map(|recording| notes(recording, robot));
-    Ok((of_recordings.chain(unexplained(model, &pointwise))).collect())
+    Ok((of_recordings.chain(unexplained(model, pointwise))).collect())
 }
 
 /// `R^2` of accelerations below that of the training; single jumps of another controller are up to 1.6 below.

@@ -7,7 +7,7 @@ use super::*;
 
 const LEAST_STRIDES: usize = 3; // of one motion, by which phases count as repeated
 
-/// The usual stride of a walk, and what a small deviation becomes in it.
+/// The usual stride of a walk, and the growth of small deviations over it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StrideGrowth {
     /// Names of its phases and their mean durations in s.

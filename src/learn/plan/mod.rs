@@ -37,8 +37,8 @@ use transcribe::{Bound, Task};
 
 use crate::model::{GOAL_DIM, JumpPart, JumpPrior, Landmark, ModelError, ReducedModel};
 use crate::mpc::{ConeProgram, ControlError, Outcome, QpSettings, QpSolver, SolverProfile};
-use crate::recording::{Recording, RecordingError, Segment};
+use crate::recording::{Recording, RecordingError, Segment, about_vertical};
 use crate::robot::{
     BODY_NAMES, BODY_X, BODY_Z, GRAVITY_M_S2, InputRule, JOINT_DIM, JOINT_NAMES, Leg, Robot,
-    STATE_DIM,
+    STATE_DIM, YAW,
 };

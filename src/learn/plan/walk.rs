@@ -4,7 +4,7 @@ use super::*;
 use crate::model::{GAIT_DIM, STRIDE_WIDTH, StridePrior};
 
 const SOURCE: &str = "plan";
-const YAW: usize = JOINT_DIM + 5;
+const MOST_SAMPLES: f64 = 1e6;
 const SMOOTHED: usize = 2; // samples beside each that velocities are averaged over
 /// How far from the recorded range a speed or a yaw rate is still planned, as a share of that range.
 const BEYOND: f64 = 0.15;
@@ -40,7 +40,7 @@ pub struct WalkPlan {
 /// the other way. Velocities are differences of the positions, torques those of the prior with the losses of this very motion.
 ///
 /// # Errors
-/// Those of a model without strides or robot.
+/// Those of a model without strides or robot, and for more than 1e6 samples.
 pub fn walk(model: &ReducedModel, goal: &WalkGoal) -> Result<WalkPlan> {
     let (prior, rule) = (model.stride_prior()?, model.input_rule()?);
     let [.., frequency, duty, height] = prior.gait.map(|range| range.mean);
@@ -54,7 +54,17 @@ pub fn walk(model: &ReducedModel, goal: &WalkGoal) -> Result<WalkPlan> {
     ];
     let stride = stride(prior, rule.robot(), &gait);
     let sample_time_s = model.sample_time_s()?;
-    let count = (goal.duration_s / sample_time_s).round().max(1.0) as usize + 1;
+    let steps = (goal.duration_s / sample_time_s).round().max(1.0);
+    if steps > MOST_SAMPLES {
+        return Err(PlanError::Goal {
+            what: "samples of the walk",
+            found: steps,
+            expected: format!(
+                "at most {MOST_SAMPLES}: a shorter duration, or a longer `sample_time_s`"
+            ),
+        });
+    }
+    let count = steps as usize + 1;
     let times = (0..count).map(|sample| sample as f64 * sample_time_s);
     let mut motion = Segment::still(SOURCE, times.collect());
     let mut net = DMatrix::zeros(JOINT_DIM, count);
@@ -68,15 +78,13 @@ pub fn walk(model: &ReducedModel, goal: &WalkGoal) -> Result<WalkPlan> {
             motion.x[(i, sample)] = row[i];
         }
         let heading = goal.yaw_rate_rad_s * time_s;
-        let (sine, cosine) = heading.sin_cos();
-        let [along, across] = [row[BODY_X], row[BODY_X + 1]];
-        // The place on a circle, or on a line.
-        let [x, y] = match goal.yaw_rate_rad_s.abs() > 1e-9 {
-            true => [sine, 1.0 - cosine].map(|part| part * goal.speed_m_s / goal.yaw_rate_rad_s),
-            false => [goal.speed_m_s * time_s, 0.0],
-        };
-        motion.x[(BODY_X, sample)] = x + cosine * along - sine * across;
-        motion.x[(BODY_X + 1, sample)] = y + sine * along + cosine * across;
+        // The place on a circle: a chord along the mean heading, on a line as long as the way.
+        let half = 0.5 * heading;
+        let shortened = if half == 0.0 { 1.0 } else { half.sin() / half };
+        let [x, y] = about_vertical([goal.speed_m_s * time_s * shortened, 0.0], half);
+        let [along, across] = about_vertical([row[BODY_X], row[BODY_X + 1]], heading);
+        motion.x[(BODY_X, sample)] = x + along;
+        motion.x[(BODY_X + 1, sample)] = y + across;
         motion.x[(YAW, sample)] += heading;
         for joint in 0..JOINT_DIM {
             net[(joint, sample)] = row[STATE_DIM + joint];

@@ -12,7 +12,7 @@ const NAMED: [(&str, usize); 6] = [
     ("pitch", PITCH),
     ("y", Y),
     ("roll", ROLL),
-    ("yaw", JOINT_DIM + 5),
+    ("yaw", YAW),
 ];
 const IN_PLANE: usize = 3;
 const ALL: &str = "all";

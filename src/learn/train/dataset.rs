@@ -8,6 +8,7 @@ use crate::robot::ContactFlags;
 
 /// Fewest samples of a segment, and of a phase over all segments.
 pub const MIN_SAMPLES: usize = 50;
+const LEAST_SPANS: usize = 6; // of a motion in the mean, from which on it counts as a walk
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Scaling {
@@ -131,6 +132,12 @@ impl Dataset {
             }
         }
         Ok(())
+    }
+
+    /// Whether feet change so often that the motions are walks.
+    pub(super) fn walks(&self) -> bool {
+        let spans: usize = self.jumps.iter().map(|motion| motion.spans.len()).sum();
+        spans >= LEAST_SPANS * self.jumps.len()
     }
 
     /// One phase or all side by side, `18 x samples`; likewise the inputs.

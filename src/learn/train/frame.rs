@@ -51,7 +51,7 @@ impl Frame {
     }
 
     /// With [`Coordinates::Named`] the first rows are the momentum of the coordinates in `body`. With pitch among them and
-    /// four or more rows beside, the next four are foot positions relative to the centre of mass. The others combine
+    /// four or more rows beside, the next four are foot positions relative to the centre of mass, unless these are walks. The others combine
     /// `active` coordinates. In the plane these are mirror-symmetric sums of joints, and pitch where it has no row. With
     /// a row that changes sign in a mirror image the sums of the legs that move alike ([`paired_joints`]) if these are enough, else
     /// all joints, and all of the body without a row.
@@ -75,9 +75,8 @@ impl Frame {
         let mut held: Vec<DVector<f64>> =
             momentum.column_iter().map(|row| row.into_owned()).collect();
         let mut legs = Vec::new();
-        let standing =
-            options.has(RecipePart::LegRows) && options.body_equations == BodyEquations::PerPhase;
-        if standing && has_leg_rows(body, latent_dim) {
+        let stands = options.has(RecipePart::LegRows) && !training.walks();
+        if stands && has_leg_rows(body, latent_dim) {
             for (row, leg) in leg_rows(training, &momentum, options, robot) {
                 held.push(row);
                 legs.push(leg);

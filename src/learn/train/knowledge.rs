@@ -4,7 +4,7 @@ use super::body::Y;
 use super::frame::{LegRow, TURN};
 use super::momentum::loads_on;
 use super::recipe::RecipePart::{self, *};
-use super::weak_form::{FLIGHT_WINDOW, flight_samples, samples_of_all_phases, windowed_samples};
+use super::weak_form::{FLIGHT_WINDOW, flight_samples, windowed_samples};
 use super::*;
 
 const HEIGHT: usize = 1; // the momentum row upwards
@@ -121,19 +121,31 @@ impl Knowledge {
         fitted
     }
 
-    /// With the momentum columns of [`Self::share_body`] known: ridge regression over windows of all motions, whatever the
-    /// phases in them.
-    pub(super) fn with_shared_body(&self, set: EncodedSet<'_>, features: &Features) -> Self {
+    pub(super) fn shares_body(&self) -> bool {
+        !self.shared.is_empty()
+    }
+
+    /// With the momentum columns of [`Self::share_body`] known: ridge regression over windows of all motions, whatever the phases in them,
+    /// without a velocity that would drive.
+    pub(super) fn with_shared_body(
+        &self,
+        (theta, target): &(DMatrix<f64>, DMatrix<f64>),
+        features: &Features,
+    ) -> Self {
         let mut fitted = self.clone();
-        if self.shared.is_empty() {
-            return fitted;
-        }
-        let (theta, target) = samples_of_all_phases(set, features);
         let (p, d) = self.known.shape();
-        let regression = Regression::new(&theta, &target, Self::nothing(p, d));
+        let regression = Regression::new(theta, target, Self::nothing(p, d));
         for (column, terms) in self.shared.iter().enumerate() {
-            let support = DMatrix::from_fn(p, d, |term, k| k == column && terms.contains(&term));
-            let coefficients = regression.fit_column(column, &support, SHARED_RIDGE);
+            let fit = |without: Option<usize>| {
+                let is_term = |term: usize| terms.contains(&term) && Some(term) != without;
+                let support = DMatrix::from_fn(p, d, |term, k| k == column && is_term(term));
+                regression.fit_column(column, &support, SHARED_RIDGE)
+            };
+            let mut coefficients = fit(None);
+            let velocity = features.variable_term(d + column);
+            if velocity.is_some_and(|term| coefficients[term] > 0.0) {
+                coefficients = fit(velocity);
+            }
             fitted.known.set_column(column, &coefficients);
         }
         fitted
@@ -155,7 +167,8 @@ impl Knowledge {
                 [v] => is_load(v) || v == d + k && [BODY_X, Y].contains(&coordinate),
                 _ => false,
             };
-            let terms = (features.variables()).filter(|(_, variables)| suits(variables));
+            let terms = features.variables();
+            let terms = terms.filter(|(term, of)| features.affine[*term] && suits(of));
             self.shared.push(terms.map(|(term, _)| term).collect());
             self.free.column_mut(k).fill(false);
             self.kept.column_mut(k).fill(false);
@@ -240,7 +253,9 @@ impl Knowledge {
                 if phase.feet != FeetRule::None {
                     knowledge.share_body(features, frame);
                 }
-                knowledge.move_joints(features, frame);
+                if training.walks() {
+                    knowledge.move_joints(features, frame);
+                }
             }
             let inputs = (0..d).map(|k| (2 * d + k, k, KeptInputs));
             for (variable, k, part) in inputs.chain((0..2).map(|k| (d + k, k, KeptVelocities))) {

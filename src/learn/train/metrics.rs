@@ -5,7 +5,7 @@ use super::latent::map_samples;
 use super::*;
 use crate::sim::phase_rule;
 
-pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, JOINT_DIM + 5]; // place and heading: x, y, yaw
+pub(super) const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, YAW]; // place and heading: x, y, yaw
 const SHORT_S: f64 = 0.1;
 const SMOOTHING: usize = 11; // samples, of the accelerations behind `ddz_r2`
 

@@ -7,22 +7,23 @@ use crate::robot::{ContactFlags, FOOT_DIM};
 /// The mirror image of the dynamics, for latent coordinates that each stay or change sign in a mirror.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mirror {
-    images: Vec<usize>,  // of each phase; none where nothing is known
-    signs: DMatrix<f64>, // of a coefficient, library_dim x latent_dim
+    images: Vec<Option<usize>>, // of each phase, if its image is a phase
+    /// Of a coefficient, library_dim x latent_dim; none if the image of a term is no multiple of it.
+    signs: Option<DMatrix<f64>>,
 }
 
 impl Mirror {
-    /// Nothing is known of phases whose image is no phase, or of a library with terms whose image is no multiple of them.
     /// `parity` is 1 for each latent coordinate that stays, -1 for each that changes sign.
     pub(super) fn of(phases: &PhaseRule, features: &Features, parity: &[f64]) -> Self {
         let d = features.latent_dim;
-        let mut signs = DMatrix::zeros(features.library_dim(), d);
+        let mut signs = Some(DMatrix::zeros(features.library_dim(), d));
         for (term, variables) in features.variables() {
-            if !features.affine[term] && variables.len() != 2 {
-                return Self::default();
-            }
+            let has_sign = features.affine[term] || variables.len() == 2;
+            signs = signs.filter(|_| has_sign);
             let sign: f64 = variables.iter().map(|v| parity[v % d]).product();
-            (0..d).for_each(|k| signs[(term, k)] = sign * parity[k]);
+            for signs in signs.iter_mut() {
+                (0..d).for_each(|k| signs[(term, k)] = sign * parity[k]);
+            }
         }
         let image = |phase: usize| {
             let feet =
@@ -31,21 +32,22 @@ impl Mirror {
             let first = images.next()??;
             images.all(|image| image == Some(first)).then_some(first)
         };
-        let images: Option<Vec<usize>> = (0..phases.patterns.len()).map(image).collect();
-        let images = images.unwrap_or_default();
+        let images = (0..phases.patterns.len()).map(image).collect();
         Self { images, signs }
     }
 
     /// Whether a phase is its own image: its equations keep no term that a mirror turns around.
     pub(super) fn is_own_image(&self, phase: usize) -> bool {
-        self.images.get(phase) == Some(&phase)
+        self.images.get(phase) == Some(&Some(phase))
     }
 
     /// Makes the later of two phases that are images of each other the image of the earlier, to the last bit.
     pub(super) fn copy(&self, xi: &mut [Xi]) {
-        for (phase, &image) in self.images.iter().enumerate() {
-            if image > phase && self.images[image] == phase {
-                xi[image] = xi[phase].component_mul(&self.signs);
+        let Some(signs) = &self.signs else { return };
+        for (phase, image) in self.images.iter().enumerate() {
+            let Some(image) = *image else { continue };
+            if image > phase && self.images[image] == Some(phase) {
+                xi[image] = xi[phase].component_mul(signs);
             }
         }
     }
@@ -58,3 +60,7 @@ fn mirrored(feet: ContactFlags) -> ContactFlags {
     }
     image
 }
+
+#[cfg(test)]
+#[path = "../../../tests/units/learn_train_mirror.rs"]
+mod tests;

@@ -66,6 +66,7 @@ use crate::model::{
 use crate::recording::{PhaseRule, Recording};
 use crate::robot::{
     BODY_X, BODY_Z, FeetRule, GRAVITY_M_S2, InputRule, JOINT_DIM, Robot, STATE_DIM, WrenchFrame,
+    YAW,
 };
 use crate::sim::Restart;
 use body::is_lateral;

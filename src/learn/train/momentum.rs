@@ -8,7 +8,6 @@ const FLIGHT_WINDOW_S: f64 = 0.05; // over which accelerations are averaged
 /// The same with feet on the ground: of a walk whatever feet do in between, else short, because slow motions of one stance say
 /// little in long ones.
 const WINDOW_S: [f64; 2] = [0.02, 0.1];
-const LEAST_SPANS: usize = 6; // of a motion in the mean, from which on it counts as a walk
 const STRIDE: usize = 2; // samples between the starts of two of these
 const TRIM: usize = 4; // samples left out at both ends of a flight, where feet still slip or already touch
 const LEAST_FLIGHTS: usize = 50; // averaged accelerations in flight that identify the centre of mass
@@ -39,10 +38,10 @@ pub(super) fn momentum_rows(
         flight_windows(training, jump, &mut flights);
     }
     let share = flights.len() as f64 / training.samples(None).max(1) as f64;
-    let spans: usize = training.jumps.iter().map(|jump| jump.spans.len()).sum();
-    let walks = spans >= LEAST_SPANS * training.jumps.len();
-    let flies = flights.len() >= LEAST_FLIGHTS && share >= LEAST_SHARE && !walks;
-    if !flies && training.rule.wrench_frame() == WrenchFrame::Body {
+    let walks = training.walks();
+    let has_loads = training.rule.wrench_frame() != WrenchFrame::Body;
+    let flies = flights.len() >= LEAST_FLIGHTS && share >= LEAST_SHARE && !(walks && has_loads);
+    if !flies && !has_loads {
         return rows;
     }
     let windows = match flies {

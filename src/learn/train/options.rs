@@ -273,8 +273,9 @@ impl TrainOptions {
         table::MASK_STD.check(encoder.least_std)?;
         table::MASK_INPUT_SHARE.check(encoder.least_input_share)?;
         table::SEEDS.check_count(self.n_seeds.max(1))?;
-        let rows = self.body().coordinates.len();
-        if rows > self.latent_dim {
+        let body = self.body();
+        if !body.fits(self.latent_dim) {
+            let rows = body.coordinates.len();
             return Err(TrainError::Option {
                 option: "body",
                 found: format!("{rows} rows with {} latent coordinates", self.latent_dim),

@@ -1,7 +1,8 @@
 //! Strides of the training walks over what describes a gait, so that gaits can be planned that nobody recorded.
 
 use super::*;
-use crate::model::{GAIT_DIM, GaitRange, STRIDE_WIDTH, StridePrior};
+use crate::model::{GAIT_DIM, GoalRange, STRIDE_WIDTH, StridePrior};
+use crate::recording::{about_vertical, between};
 use crate::robot::FOOT_DIM;
 
 const NODES: usize = 40;
@@ -9,11 +10,10 @@ const LEAST_HALVES: usize = 20; // half strides that a regression takes, mirror 
 const RIDGE: f64 = 3.0; // on features of unit variance, against one half stride
 const LEAST_SWING_S: f64 = 0.04; // of a pair in the air; shorter ones are chatter of its contacts
 const HALF_S: [f64; 2] = [0.1, 0.4]; // duration of half a stride
-const YAW: usize = JOINT_DIM + 5;
 
 /// Half strides of all motions from a touchdown of the pair of the front right foot to the next of the other, by ridge
-/// regression over their gaits. None if there are fewer than [`LEAST_HALVES`], as in jumps, or without mirror images, by which
-/// half a stride tells the other.
+/// regression over their gaits. None if there are fewer than [`LEAST_HALVES`], as in jumps, or without mirror images: the
+/// other half of a stride is the mirror image of the first.
 pub(super) fn learn_strides(training: &Dataset) -> Option<StridePrior> {
     let has_images = training.jumps.iter().any(|motion| motion.is_image);
     let halves: Vec<Half> = (training.jumps.iter())
@@ -22,22 +22,12 @@ pub(super) fn learn_strides(training: &Dataset) -> Option<StridePrior> {
     if !has_images || halves.len() < LEAST_HALVES {
         return None;
     }
-    let count = halves.len() as f64;
-    let gait = std::array::from_fn(|i| {
-        let values = || halves.iter().map(|half| half.gait[i]);
-        let mean = values().sum::<f64>() / count;
-        let square: f64 = values().map(|value| (value - mean).powi(2)).sum();
-        GaitRange {
-            mean,
-            std: (square / count).sqrt().max(1e-6),
-            least: values().fold(f64::INFINITY, f64::min),
-            most: values().fold(f64::NEG_INFINITY, f64::max),
-        }
-    });
+    let gaits: Vec<[f64; GAIT_DIM]> = halves.iter().map(|half| half.gait).collect();
+    let gait = GoalRange::of(&gaits);
     let features = DMatrix::from_fn(halves.len(), 1 + GAIT_DIM, |row, k| {
         match k.checked_sub(1) {
             None => 1.0,
-            Some(i) => (halves[row].gait[i] - gait[i].mean) / gait[i].std,
+            Some(i) => gait[i].normalised(gaits[row][i]),
         }
     });
     let mut gram = features.tr_mul(&features);
@@ -65,10 +55,12 @@ struct Half {
 
 fn halves_of(training: &Dataset, motion: &Jump) -> Vec<Half> {
     let [first, second] = [[0, 3], [1, 2]].map(|pair| touchdowns(motion, pair));
+    let after_s = |from: usize, to: usize| motion.time_s[to] - motion.time_s[from];
     let halves = first.iter().filter_map(|&start| {
         let end = second.iter().copied().find(|end| *end > start)?;
-        let duration_s = motion.time_s[end] - motion.time_s[start];
-        let fits = (HALF_S[0]..=HALF_S[1]).contains(&duration_s);
+        // Pairs take turns: all feet of a pronk come down together.
+        let is_together = |other: &usize| after_s(start, *other).abs() < HALF_S[0];
+        let fits = !second.iter().any(is_together) && after_s(start, end) <= HALF_S[1];
         fits.then(|| half(training, motion, start..end))
     });
     halves.collect()
@@ -102,7 +94,7 @@ fn half(training: &Dataset, motion: &Jump, range: Range<usize>) -> Half {
     let share = |node: usize| node as f64 / (NODES - 1) as f64;
     for node in 0..NODES {
         let time_s = start_s + share(node) * duration_s;
-        let (left, right, between) = crate::recording::between(&motion.time_s, time_s);
+        let (left, right, between) = between(&motion.time_s, time_s);
         let at = |rows: &DMatrix<f64>, i: usize| {
             rows[(i, left)] + between * (rows[(i, right)] - rows[(i, left)])
         };
@@ -110,8 +102,9 @@ fn half(training: &Dataset, motion: &Jump, range: Range<usize>) -> Half {
             nodes[(node, i)] = at(&motion.x, i) / factors.state[i];
             nodes[(node, STATE_DIM + i)] = at(&motion.u, i) / factors.input[i];
         }
-        for block in [0, STATE_DIM] {
-            turn(&mut nodes, node, block + BODY_X, -heading);
+        for x in [BODY_X, STATE_DIM + BODY_X] {
+            let turned = about_vertical([nodes[(node, x)], nodes[(node, x + 1)]], -heading);
+            [nodes[(node, x)], nodes[(node, x + 1)]] = turned;
         }
         for foot in 0..FOOT_DIM {
             let down = |sample: usize| f64::from(u8::from(motion.feet[sample][foot]));
@@ -135,12 +128,4 @@ fn half(training: &Dataset, motion: &Jump, range: Range<usize>) -> Half {
     let duty = stance_s / (2.0 * duration_s);
     let gait = [forward, sideways, yaw_rate, 0.5 / duration_s, duty, height];
     Half { gait, nodes }
-}
-
-/// Turns two numbers of a node, along x and y, about the vertical.
-fn turn(nodes: &mut DMatrix<f64>, node: usize, first: usize, angle_rad: f64) {
-    let (sine, cosine) = angle_rad.sin_cos();
-    let (x, y) = (nodes[(node, first)], nodes[(node, first + 1)]);
-    nodes[(node, first)] = cosine * x - sine * y;
-    nodes[(node, first + 1)] = sine * x + cosine * y;
 }

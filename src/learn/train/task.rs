@@ -12,7 +12,7 @@ use super::recipe::RecipePart;
 use super::select::select;
 use super::strides::learn_strides;
 use super::subspace::{order_and_sign, varimax};
-use super::weak_form::check_terms;
+use super::weak_form::{check_terms, samples_of_all_phases};
 use super::*;
 use crate::files::hex;
 use crate::model::{CoordinateNames, InputGivenState, JumpPrior, Phase, ScaleFactors, Scaling};
@@ -345,12 +345,15 @@ impl Task<'_> {
                 }
             }
         }
-        let knowledge = knowledge.iter().enumerate();
-        let knowledge = knowledge.map(|(phase, known)| {
-            let known = known.with_flights(set, features, phase);
-            known.with_shared_body(set, features)
-        });
-        let known = (&knowledge.collect::<Vec<_>>()[..], &mirror);
+        let shares = knowledge.iter().any(Knowledge::shares_body);
+        let samples = shares.then(|| samples_of_all_phases(set, features));
+        for (phase, known) in knowledge.iter_mut().enumerate() {
+            *known = known.with_flights(set, features, phase);
+            if let Some(samples) = &samples {
+                *known = known.with_shared_body(samples, features);
+            }
+        }
+        let known = (&knowledge[..], &mirror);
         let (xi, choice, candidates) = select(set, known, &judge, options, monitor)?;
         Ok(Fitted {
             maps,

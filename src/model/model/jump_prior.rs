@@ -11,7 +11,9 @@ const MAX_NODES: usize = 200;
 
 pub(crate) type GoalFeatures = [f64; FEATURE_DIM];
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// One number of the training's goals: of jumps, or of the gaits of walks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GoalRange {
     pub mean: f64,
     pub std: f64,
@@ -19,11 +21,11 @@ pub struct GoalRange {
     pub most: f64,
 }
 
-/// Numbers that differ less say nothing of how jumps depend on them, m.
+/// Numbers that differ less say nothing of how motions depend on them, SI units.
 const LEAST_STD_M: f64 = 1e-3;
 
 impl GoalRange {
-    pub fn of(jumps: &[[f64; GOAL_DIM]]) -> [Self; GOAL_DIM] {
+    pub fn of<const N: usize>(jumps: &[[f64; N]]) -> [Self; N] {
         std::array::from_fn(|i| {
             let values = || jumps.iter().map(|jump| jump[i]);
             let n = jumps.len().max(1) as f64;
@@ -41,8 +43,12 @@ impl GoalRange {
     pub fn features(ranges: &[Self; GOAL_DIM], goal: &[f64; GOAL_DIM]) -> GoalFeatures {
         std::array::from_fn(|k| match k.checked_sub(1) {
             None => 1.0,
-            Some(i) => (goal[i] - ranges[i].mean) / ranges[i].std,
+            Some(i) => ranges[i].normalised(goal[i]),
         })
+    }
+
+    pub fn normalised(&self, value: f64) -> f64 {
+        (value - self.mean) / self.std
     }
 }
 

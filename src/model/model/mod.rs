@@ -59,7 +59,7 @@ pub use rom::{Phase, ReducedModel};
 pub use standard_library::{LibraryOrder, StandardLibrary};
 pub use state_map::{AffineMap, Layer, MAX_LAYERS, StateMap};
 pub use statistics::{InputGivenState, InputStatistics};
-pub use stride_prior::{GAIT_DIM, GaitRange, STRIDE_WIDTH, StridePrior};
+pub use stride_prior::{GAIT_DIM, STRIDE_WIDTH, StridePrior};
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;

@@ -6,6 +6,7 @@ use super::*;
 
 /// Forward and sideways velocity (m/s), yaw rate (rad/s), strides a second, share of a stride that a foot stands, height (m).
 pub const GAIT_DIM: usize = 6;
+const FREQUENCY: usize = 3;
 const GAIT_FEATURES: usize = 1 + GAIT_DIM;
 /// Numbers at a node: the state, the input, and for each foot how often it is down.
 pub const STRIDE_WIDTH: usize = 2 * STATE_DIM + FOOT_DIM;
@@ -15,21 +16,11 @@ const MOST_NODES: usize = 200;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StridePrior {
-    pub gait: [GaitRange; GAIT_DIM],
+    pub gait: [GoalRange; GAIT_DIM],
     /// `n x (7 x 40)`: the columns of one feature after the other. In SI units; positions and yaw are deviations from steady motion
     /// along x, roll, pitch and height are not.
     #[serde(with = "listed")]
     pub nodes: DMatrix<f64>,
-}
-
-/// One number of the training's gaits.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GaitRange {
-    pub mean: f64,
-    pub std: f64,
-    pub least: f64,
-    pub most: f64,
 }
 
 impl StridePrior {
@@ -39,7 +30,7 @@ impl StridePrior {
         for feature in 0..GAIT_FEATURES {
             let value = match feature.checked_sub(1) {
                 None => 1.0,
-                Some(i) => (gait[i] - self.gait[i].mean) / self.gait[i].std,
+                Some(i) => self.gait[i].normalised(gait[i]),
             };
             nodes += self.nodes.columns(feature * STRIDE_WIDTH, STRIDE_WIDTH) * value;
         }
@@ -52,29 +43,23 @@ impl StridePrior {
         let shape = (self.nodes.nrows(), GAIT_FEATURES * STRIDE_WIDTH);
         check_tensor("strides.nodes", &self.nodes, shape)?;
         for (index, range) in self.gait.iter().enumerate() {
-            let GaitRange {
+            let GoalRange {
                 mean,
                 std,
                 least,
                 most,
             } = *range;
-            let fits = [mean, std, least, most].iter().all(|v| v.is_finite())
-                && std > 0.0
-                && least <= most;
-            let place = format!("`strides.gait[{index}]`");
-            check(
-                fits,
-                &place,
-                || format!("{range:?}"),
-                "finite numbers, std positive, ordered",
-            )?;
+            let is_finite = [mean, std, least, most].iter().all(|v| v.is_finite());
+            let fits = is_finite && std > 0.0 && least <= mean && mean <= most;
+            let (place, found) = (format!("`strides.gait[{index}]`"), || format!("{range:?}"));
+            let expected = "finite numbers, `std` positive, `mean` between `least` and `most`";
+            check(fits, &place, found, expected)?;
         }
-        let [.., frequency, _, _] = &self.gait;
-        let fits = frequency.least > 0.0;
+        let least = self.gait[FREQUENCY].least;
         check(
-            fits,
-            "`strides.gait[3]`",
-            || frequency.least,
+            least > 0.0,
+            "`strides.gait[3].least`",
+            || least,
             "positive strides a second",
         )
     }
