@@ -39,6 +39,8 @@ mod solver;
 #[path = "controller_c/steps.rs"]
 mod steps;
 mod tools;
+#[path = "controller_c/walk.rs"]
+mod walk;
 use emitted::Emitted;
 use programs::{root, shipped, succeed, with_losses};
 use random::Random;
@@ -404,6 +406,7 @@ fn is_limited(
         phase,
         losses_nm: command.losses_nm,
         near_nm: None,
+        keeps_swing: false,
     };
     let mut lift = ConsistentLift::new(controller.plant(), settings).expect("a sound program");
     let torque = lift.lift(controller.plant(), &command.u_lat, &stance);

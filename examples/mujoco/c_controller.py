@@ -104,7 +104,54 @@ def load(crate):
         def __init__(self):
             self.default_settings = default_settings
 
-    return types.SimpleNamespace(Library=Library, Controller=Controller)
+    class Machine:
+        """The state machine around a controller that walks by commands."""
+
+        def __init__(self, changes=()):
+            def of(name, result, *arguments):
+                found = getattr(library, facts["name"] + name)
+                found.restype, found.argtypes = result, arguments
+                return found
+
+            settings = of("_walk_settings", Settings)()
+            for name, value in changes:
+                setattr(settings, name, type(getattr(settings, name))(value))
+            self._memory = ctypes.create_string_buffer(1 << 22)
+            init = of("_machine_init", ctypes.c_int, pointer, ctypes.POINTER(Settings), pointer)
+            Controller._check(init(self._memory, ctypes.byref(settings), None))
+            Controller._check(of("_machine_set_walk", ctypes.c_int, pointer)(self._memory))
+            self._stand = of("_machine_stand", ctypes.c_int, pointer, number, pointer)
+            self._walk = of("_machine_walk", ctypes.c_int, pointer, number, number, number)
+            self._stop = of("_machine_stop", ctypes.c_int, pointer)
+            self._mode = of("_machine_mode", ctypes.c_int, pointer)
+            self._mode_text = of("_machine_mode_text", ctypes.c_char_p, ctypes.c_int)
+            self._step = of(
+                "_machine_step", ctypes.c_int, *step.argtypes
+            )
+
+        def stand(self, time_s, x):
+            return bool(self._stand(self._memory, time_s, _array(x, number)))
+
+        def walk(self, forward_m_s, left_m_s, yaw_rate_rad_s):
+            return bool(self._walk(self._memory, forward_m_s, left_m_s, yaw_rate_rad_s))
+
+        def stop(self):
+            return bool(self._stop(self._memory))
+
+        def mode(self):
+            return self._mode_text(self._mode(self._memory)).decode()
+
+        def step(self, time_s, x, dx, feet):
+            command = Command()
+            state = [_array(values, number) for values in (x, dx)]
+            down = _array([1 if down else 0 for down in feet], ctypes.c_uint8)
+            self._step(self._memory, time_s, *state, down, ctypes.byref(command))
+            return command
+
+        def status_text(self, status):
+            return status_text(status).decode()
+
+    return types.SimpleNamespace(Library=Library, Controller=Controller, Machine=Machine)
 
 
 def _array(values, kind):

@@ -78,8 +78,9 @@ FAULTS = {
     "push of 60 N": lambda _, *measured: measured,
     "push of 200 N": lambda _, *measured: measured,
 }
-# The body has to move before they show.
+# The body has to move before they show; in a walk the robot has to come to its other feet.
 SLOW = ("velocity of the base zero", "push of 200 N")
+SLOW_IN_WALKS = (*SLOW, "contacts inverted", "left and right exchanged")
 # The robot stays on its feet, at least in some of the runs.
 HARMLESS = ("clock 0.3 s ahead", "clock 0.3 s behind", "left and right exchanged", "push of 60 N")
 
@@ -139,6 +140,7 @@ def main():
     read = read_walk if arguments.walk else read_jump
     module, jump = c_controller.load(crate), read(arguments.jump)
     rows, missed = [], []
+    slow = SLOW_IN_WALKS if arguments.walk else SLOW
     print(f"{'fault':27} {'from s':>6} {'status':18} {'after s':>7} {'touches s':>9} {'off law N m':>11}")
     for fault in FAULTS:
         for fault_s in (0.0, 0.2, 0.36):
@@ -150,7 +152,7 @@ def main():
             )
             numbers = [f"{s:.3f}" if s is not None else "-" for s in (after_s, touch_s)]
             print(f"{fault:27} {fault_s:6.2f} {word or '-':18} {numbers[0]:>7} {numbers[1]:>9} {law:11.2g}")
-            if not is_right(fault, word, after_s, touch_s, law):
+            if not is_right(fault, word, after_s, touch_s, law, slow):
                 missed.append(f"{fault} from {fault_s} s")
     if arguments.json:
         print(json.dumps(rows))
@@ -159,13 +161,13 @@ def main():
     sys.exit(1 if missed else 0)
 
 
-def is_right(fault, word, after_s, touch_s, law):
+def is_right(fault, word, after_s, touch_s, law, slow):
     """Whether a fault is named before the trunk touches the floor, and torques follow the law."""
     if fault == "none":
         return word is None
     if word is None and fault in HARMLESS:
         return touch_s is None
-    in_time = word is not None and (after_s < IN_TIME_S + 1e-9 or fault in SLOW)
+    in_time = word is not None and (after_s < IN_TIME_S + 1e-9 or fault in slow)
     return in_time and (touch_s is None or after_s < touch_s) and law < 1e-3
 
 

@@ -17,7 +17,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     let model = artifact::read(&arguments.model)?;
     let robot = model.robot()?;
     let of_controller = match arguments.speed {
-        Some(_) => plan_settings::of_walks(robot),
+        Some(_) => crate::mpc::walk_settings(robot),
         None => plan_settings::of_jumps(robot),
     };
     let settings_path = output.map(plan_settings::path_for);

@@ -1,7 +1,6 @@
 //! Settings of the controller for a plan: a file next to it, which `romc plan` writes and other commands read.
 
 use super::*;
-use crate::mpc::Legs;
 use crate::mpc::interface::{SETTINGS, Settings};
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
@@ -51,21 +50,6 @@ pub(super) fn of_jumps(robot: &Robot) -> MpcSettings {
     MpcSettings {
         input_weight: 8.0,
         effectiveness: Some(1.0),
-        drives: Drives::of(robot),
-        ..MpcSettings::default()
-    }
-}
-
-/// Along a walk the legs are those of the plan, and deviations count by lengths that do not grow with the way.
-pub(super) fn of_walks(robot: &Robot) -> MpcSettings {
-    MpcSettings {
-        lift: Lift::Consistent,
-        legs: Legs::Reference,
-        input_weight: 2.0,
-        terminal_weight: 100.0,
-        velocity_weight: 0.02,
-        place_scale_m: Some(0.03),
-        heading_scale_rad: Some(0.05),
         drives: Drives::of(robot),
         ..MpcSettings::default()
     }

@@ -15,7 +15,7 @@ pub const SOURCES: &[(&str, &str)] = sources! {
     "online":
         choices command conic control_model controller dense effectiveness error estimate horizon
         interface lift linearise machine mod plan problem qp reference routine settings stage step
-        structured supervisor trajectory;
+        structured supervisor trajectory walk walker;
     "solver":
         interior links lower mod point problem riccati rows scalar solve;
 };

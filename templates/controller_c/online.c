@@ -37,6 +37,9 @@
 /* Half width of the window in which velocities are fitted by a straight line, s. */
 #define ONLINE_HALF_WINDOW_S (0.016 + 1e-9)
 
+/* Torques that are kept are so far inside the limits, as a share, that rounding does not put them beyond. */
+#define ONLINE_INSIDE (real)0.999
+
 #define ONLINE_LARGEST (real)1.3
 
 /* Largest number of a measurement, SI: beyond it none is real, and a solver would iterate in vain. */
@@ -68,6 +71,9 @@
 
 /* Phase of feet that select none. */
 #define ONLINE_NO_PHASE 255
+
+/* Longest time that a walk may be on the other feet: twice that by which feet may be early, s. */
+#define ONLINE_OPPOSED_S 0.08
 
 /* How long measurements are refused before they are a fault, s. */
 #define ONLINE_PATIENCE_S 0.019
@@ -605,6 +611,35 @@ static inline MAYBE_UNUSED void online_keep_limits(const real *limit_nm, const r
     }
 }
 
+/* The larger of two numbers; the second if the first is not one. */
+static inline MAYBE_UNUSED real online_greater(real value, real other)
+{
+    return value > other ? value : other;
+}
+
+/* The smaller of two numbers; the second if the first is not one. */
+static inline MAYBE_UNUSED real online_smaller(real value, real other)
+{
+    return value < other ? value : other;
+}
+
+/* Legs in the air keep the torques of the reference, or none at the links where those are not known, within the limits. */
+static inline MAYBE_UNUSED void online_keep_swing(bool *is_down, bool is_known, const real *limit_nm,
+        const real *losses_nm, real *restrict mean, real *restrict deviation)
+{
+    for (int joint = 0; joint < 12; ++joint) {
+        if (!is_down[joint / 3]) {
+            const real least = -ONLINE_INSIDE * limit_nm[joint] - losses_nm[joint];
+            const real most = ONLINE_INSIDE * limit_nm[joint] - losses_nm[joint];
+            const real kept = is_known ? mean[joint] : 0;
+            mean[joint] = online_smaller(online_greater(kept, least), most);
+            for (int k = 0; k < 12; ++k) {
+                deviation[12 * joint + k] = 0;
+            }
+        }
+    }
+}
+
 /* b dq + c tanh(dq / v) + I ddq of a joint with these b, c and I, N m, at dq (rad/s) and ddq (rad/s^2). */
 static inline MAYBE_UNUSED real online_joint_loss(const real *of, real dq, real ddq)
 {
@@ -803,12 +838,6 @@ static inline MAYBE_UNUSED void online_unscale(const real *root, const real *dev
     for (int i = 0; i < 2 * d; ++i) {
         end[i] += deviation[i] * x[i];
     }
-}
-
-/* The larger of two numbers; the second if the first is not one. */
-static inline MAYBE_UNUSED real online_greater(real value, real other)
-{
-    return value > other ? value : other;
 }
 
 /* The largest violation of a limit by joint positions, in half ranges, or largest if that is more. */
@@ -1148,12 +1177,6 @@ static inline MAYBE_UNUSED void online_memory_hold(online_memory *restrict self,
     }
 }
 
-/* The smaller of two numbers; the second if the first is not one. */
-static inline MAYBE_UNUSED real online_smaller(real value, real other)
-{
-    return value < other ? value : other;
-}
-
 /* The position within the limits that is nearest to this one; the lower limit for what is not a number. */
 static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
 {
@@ -1337,11 +1360,11 @@ static inline MAYBE_UNUSED void online_routine_enter(online_routine *restrict se
     }
 }
 
-/* Begins a jump: the reference starts now, where the robot stands and looks. */
-static inline MAYBE_UNUSED void online_routine_leap(online_routine *restrict self, double time_s, double start_s,
-        const real *x, const real *start)
+/* Begins a jump or a walk: the reference starts now, where the robot stands and looks. */
+static inline MAYBE_UNUSED void online_routine_leap(online_routine *restrict self, online_mode mode, double time_s,
+        double start_s, const real *x, const real *start)
 {
-    online_routine_enter(self, ONLINE_JUMP, time_s, x);
+    online_routine_enter(self, mode, time_s, x);
     self->has_flown = false;
     self->offset_s = time_s - start_s;
     self->yaw = start[17] - x[17];
@@ -1476,6 +1499,7 @@ static inline MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self
     self->is_doubted = false;
     self->is_aloft = false;
     self->is_contradicted = false;
+    self->is_opposed = false;
     self->poor_s = 0.0;
     for (int i = 0; i < 3; ++i) {
         self->unexplained[i] = 0;
@@ -1699,11 +1723,31 @@ static inline MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor 
     return is_wrong && most > 0.0 && steps > most - 0.5;
 }
 
-/* Takes a finite measurement of state and velocity, 18 each, with the reference's state and the heights of the feet,
- * m; what is wrong. */
+/* Whether a walk has for too long been on just the other feet than measured. */
+static inline MAYBE_UNUSED bool online_supervisor_opposes(online_supervisor *restrict self,
+        const online_bounds *bounds, double time_s, bool *is_down, bool *walks_on)
+{
+    bool is_opposed = true;
+    int on = 0;
+    for (int foot = 0; foot < 4; ++foot) {
+        is_opposed = is_opposed && is_down[foot] != walks_on[foot];
+        if (walks_on[foot]) {
+            on += 1;
+        }
+    }
+    is_opposed = is_opposed && on > 0 && on < 4;
+    if (is_opposed && !self->is_opposed) {
+        self->opposed_s = time_s;
+    }
+    self->is_opposed = is_opposed;
+    return is_opposed && bounds->contact_mismatch_steps > 0 && time_s - self->opposed_s > ONLINE_OPPOSED_S;
+}
+
+/* Takes a finite measurement of state and velocity, 18 each, with the reference's state, the heights of the feet, m, those
+ * on the ground and those that a walk has there (otherwise the measured ones); what is wrong. */
 static inline MAYBE_UNUSED online_fault online_supervisor_watch(online_supervisor *restrict self,
         const online_bounds *bounds, double time_s, const real *x, const real *dx, const real *nominal,
-        const real *heights, bool *is_down, const real *lower, const real *upper, const real *speed)
+        const real *heights, bool *is_down, bool *walks_on, const real *lower, const real *upper, const real *speed)
 {
     if (self->fault != ONLINE_NONE) {
         return self->fault;
@@ -1733,7 +1777,8 @@ static inline MAYBE_UNUSED online_fault online_supervisor_watch(online_superviso
     self->is_doubted = false;
     if (online_supervisor_is_unexplained(self, bounds, time_s, x, dx)) {
         self->fault = ONLINE_VELOCITY_MISMATCH;
-    } else if (online_supervisor_contradicts(self, bounds, time_s, dx[14], heights, is_down)) {
+    } else if (online_supervisor_contradicts(self, bounds, time_s, dx[14], heights, is_down)
+            || online_supervisor_opposes(self, bounds, time_s, is_down, walks_on)) {
         self->fault = ONLINE_CONTACT_MISMATCH;
     }
     self->has_good = true;

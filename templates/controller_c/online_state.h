@@ -79,6 +79,9 @@ typedef struct {
     /* Since when contacts cannot be, s. */
     bool is_contradicted;
     double contradicted_s;
+    /* Since when a walk is on the other feet, s. */
+    bool is_opposed;
+    double opposed_s;
     /* Time without a good plan, s, and that of a step. */
     double poor_s;
     double step_s;
@@ -90,10 +93,12 @@ typedef struct {
     double stand_s;
     /* How long the robot stands still before it is ready, and after the reference's end before it recovers, s. */
     double settle_s;
+    /* Time in which a commanded velocity goes through its range, s. */
+    double range_s;
 } online_timing;
 
 /* Modes of the state machine, each with its number for interfaces without enumerations. */
-typedef enum { ONLINE_DAMP, ONLINE_STAND_UP, ONLINE_READY, ONLINE_JUMP, ONLINE_LAND, ONLINE_RECOVER } online_mode;
+typedef enum { ONLINE_DAMP, ONLINE_STAND_UP, ONLINE_READY, ONLINE_JUMP, ONLINE_LAND, ONLINE_RECOVER, ONLINE_WALK } online_mode;
 
 /* Mode of the state machine, memory of its transitions, and frame of the reference. */
 typedef struct {

@@ -97,6 +97,7 @@ fn consistent_lift_has_the_librarys_bits_for_planar_legs_and_chains_in_both_fram
                 phase,
                 losses_nm: std::array::from_fn(|_| 2.0 * random.signed()),
                 near_nm: None,
+                keeps_swing: false,
             };
             let inputs = &plant.phases()[phase];
             let size = [0.3, 1.0, 5.0][sample / 3 % 3];

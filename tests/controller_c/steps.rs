@@ -38,7 +38,7 @@ pub(crate) fn made_of_changed(
     file: &str,
     from: &str,
     changed: &str,
-) -> [(&'static str, String); 4] {
+) -> [(&'static str, String); 6] {
     let copy = tempfile::tempdir().expect("a folder");
     copy_changed(copy.path(), file, from, changed);
     controller(copy.path()).expect("in the subset")

@@ -44,6 +44,7 @@ fn sample(plant: &ControlModel, size: f64, random: &mut Random) -> (StanceState,
         phase,
         losses_nm: std::array::from_fn(|_| 2.0 * random.signed()),
         near_nm: None,
+        keeps_swing: false,
     };
     let phase = &plant.phases()[phase];
     let d = plant.latent_dim();

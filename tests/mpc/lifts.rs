@@ -17,6 +17,7 @@ const FOOTING: StanceState = StanceState {
     phase: 0,
     losses_nm: [0.0; 12],
     near_nm: None,
+    keeps_swing: false,
 };
 
 fn go1() -> &'static Robot {

@@ -20,6 +20,7 @@ use super::settings::{Lift, Linearisation, MissingInput, MpcSettings, RowSelecti
 use super::stage::{StageShape, write_weights};
 use super::supervisor::{Fault, Supervisor};
 use super::trajectory::Trajectory;
+use super::walk::Walk;
 use crate::robot::{ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot, STATE_DIM};
 
 /// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the rows that were
@@ -185,6 +186,13 @@ impl Controller {
         self.reference = Some(reference);
         self.forget();
         Ok(())
+    }
+
+    /// Moves the reference on along a walk that it already is.
+    pub(super) fn take_window(&mut self, walk: &Walk, new: usize) {
+        if let Some(reference) = &mut self.reference {
+            reference.take_window(&self.plant, walk, new);
+        }
     }
 
     /// Torques of the motors, N m, that this lift makes of a latent input on a stance: links plus losses, unclamped.

@@ -28,7 +28,8 @@ use nalgebra::{Cholesky, Matrix3};
 use super::conic::{StageSolver, Start};
 use super::control_model::{ControlModel, ControlPhase};
 use super::dense::{
-    MOST_LATENT, MOST_SQUARE, Real, add_scaled, factorise, solve_lower, solve_upper,
+    MOST_LATENT, MOST_SQUARE, Real, add_scaled, factorise, greater, smaller, solve_lower,
+    solve_upper,
 };
 use super::error::ControlError;
 use super::problem::to_upright;
@@ -42,6 +43,8 @@ const LIFT_ITERATIONS: u32 = 60;
 /// Curvature of the cost as the solvers have it: `CURVATURE / 2 ‖v‖²`. Inputs a few deviations beyond the limits then
 /// have multipliers near those at which iterations begin.
 const CURVATURE: Real = 0.01;
+/// Torques that are kept are so far inside the limits, as a share, that rounding does not put them beyond.
+const INSIDE: Real = 0.999;
 
 type Torque = [f64; JOINT_DIM];
 /// The upright force of each foot in contact by its leg's torques.
@@ -62,6 +65,8 @@ pub struct StanceState {
     pub losses_nm: [f64; JOINT_DIM],
     /// Torques at the links that the consistent lift stays near, N m; none for the mean of the training's in the phase.
     pub near_nm: Option<[f64; JOINT_DIM]>,
+    /// Whether legs in the air keep those torques, or none where they are not known: they do not push the body.
+    pub keeps_swing: bool,
 }
 
 impl StanceState {
@@ -74,6 +79,7 @@ impl StanceState {
             phase,
             losses_nm: [0.0; JOINT_DIM],
             near_nm: None,
+            keeps_swing: false,
         }
     }
 }
@@ -169,9 +175,22 @@ impl ConsistentLift {
         let wrench = rule.wrench_map(&stance.joints_rad, stance.attitude_rad, stance.feet);
         let wrench = wrench.map_err(|_| LiftFailure::SingularLeg)?.transpose();
         let deviation = self.deviation[stance.phase].ok_or(BROKEN)?;
-        let deviation = deviation.as_flattened();
+        let (mut deviation, mut mean) = (deviation, [0.0; JOINT_DIM]);
+        let deviation = deviation.as_flattened_mut();
         let near = stance.near_nm.as_ref().map(<[f64; JOINT_DIM]>::as_slice);
-        let mean = near.unwrap_or(plant.phases()[stance.phase].torque_mean.as_slice());
+        mean.copy_from_slice(near.unwrap_or(plant.phases()[stance.phase].torque_mean.as_slice()));
+        if stance.keeps_swing {
+            let (limit_nm, losses_nm) = (&self.limit_nm, &stance.losses_nm);
+            keep_swing(
+                &stance.feet,
+                near.is_some(),
+                limit_nm,
+                losses_nm,
+                &mut mean,
+                deviation,
+            );
+        }
+        let (deviation, mean) = (&*deviation, &mean[..]);
         let (d, weight) = (u_lat.len(), self.prior_weight);
         let (projection, scaled_map) = (&self.projection, &mut self.scaled_map);
         let (wrench, mut y) = (wrench.as_slice(), [0.0; JOINT_DIM]);
@@ -361,6 +380,28 @@ fn free_optimum(
         add_scaled(residual[i], &scaled_map[12 * i..], 12, y);
     }
     true
+}
+
+/// Legs in the air keep the torques of the reference, or none at the links where those are not known, within the limits.
+fn keep_swing(
+    is_down: &[bool],
+    is_known: bool,
+    limit_nm: &[Real],
+    losses_nm: &[Real],
+    mean: &mut [Real],
+    deviation: &mut [Real],
+) {
+    for joint in 0..12 {
+        if !is_down[joint / 3] {
+            let least = -INSIDE * limit_nm[joint] - losses_nm[joint];
+            let most = INSIDE * limit_nm[joint] - losses_nm[joint];
+            let kept: Real = if is_known { mean[joint] } else { 0.0 };
+            mean[joint] = smaller(greater(kept, least), most);
+            for k in 0..12 {
+                deviation[12 * joint + k] = 0.0;
+            }
+        }
+    }
 }
 
 /// Writes both sides of the torque limits as rows on the torques, and the room that `torque` leaves.

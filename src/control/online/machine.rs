@@ -1,4 +1,4 @@
-//! A state machine around the controller: stand up, be ready, jump, land, recover, damp.
+//! A state machine around the controller: stand up, be ready, jump, land, recover, walk, damp.
 //!
 //! In: every measurement, in the robot's own world and on its own clock, and requests. Out: a command of the same kind as
 //! the controller's. The joints move on a smooth curve to the reference's first posture, with the torques that carry the
@@ -12,6 +12,7 @@ use super::routine::{Mode, Routine, Timing, write_support};
 use super::settings::Accepts;
 use super::step::watched;
 use super::supervisor::Fault;
+use super::walk::{Strides, Walk};
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, LEG_JOINT_DIM, Leg, STATE_DIM};
 
 /// The controller with the state machine around it. References are set on [`Machine::controller_mut`], before a jump.
@@ -20,18 +21,25 @@ pub struct Machine {
     controller: Controller,
     timing: Timing,
     routine: Routine,
+    walk: Option<Walk>,
 }
 
 impl Machine {
     /// A state machine in [`Mode::Damp`] around a controller; an error names a time that is not positive.
     pub fn new(controller: Controller, timing: Timing) -> Result<Self, ControlError> {
-        for (name, found) in [("stand_s", timing.stand_s), ("settle_s", timing.settle_s)] {
+        let times = [
+            ("stand_s", timing.stand_s),
+            ("settle_s", timing.settle_s),
+            ("range_s", timing.range_s),
+        ];
+        for (name, found) in times {
             Accepts::Positive.check(name, found)?;
         }
         Ok(Self {
             controller,
             timing,
             routine: Routine::default(),
+            walk: None,
         })
     }
 
@@ -54,6 +62,10 @@ impl Machine {
     /// modes, after a fault and without a reference.
     pub fn stand(&mut self, time_s: f64, x: &[f64]) -> bool {
         let has_fault = self.controller.supervisor.fault != Fault::None;
+        let is_walk = self.follows_walk() && matches!(self.routine.mode, Mode::Damp | Mode::Ready);
+        if let (true, Some(walk)) = (is_walk, &mut self.walk) {
+            walk.stand(&mut self.controller);
+        }
         let Some(start) = self.start() else {
             return false;
         };
@@ -80,8 +92,58 @@ impl Machine {
             Mode::Ready => start[..JOINT_DIM] == self.routine.stand,
             _ => mode == Mode::Damp && is_sound,
         };
-        self.routine.is_asked = self.start().is_some_and(may_start);
+        let is_jump = !self.follows_walk();
+        self.routine.is_asked = is_jump && self.start().is_some_and(may_start);
         self.routine.is_asked
+    }
+
+    /// Takes the strides of a model as its reference, not while it jumps or walks. The controller needs settings for walks.
+    ///
+    /// # Errors
+    /// Those of the strides as a reference, a horizon that is too long for a walk, feet that select no phase.
+    pub fn set_walk(&mut self, strides: Strides) -> Result<(), ControlError> {
+        self.walk = Some(Walk::new(strides, &mut self.controller)?);
+        Ok(())
+    }
+
+    /// Walks at a velocity along the heading, to the left (m/s) and of yaw (rad/s), kept within what the strides reach and
+    /// reached in [`Timing::range_s`] at most: from [`Mode::Ready`] at the stand of the walk, or from [`Mode::Damp`] where
+    /// something else made the robot stand there. In [`Mode::Walk`] it is the new command. False in other modes, after a
+    /// fault, without strides, and for numbers that are not finite.
+    pub fn walk(&mut self, velocity: [f64; 3]) -> bool {
+        let is_sound = self.controller.supervisor.fault == Fault::None;
+        let may = self.follows_walk() && velocity.iter().all(|number| number.is_finite());
+        let Some(walk) = self.walk.as_mut().filter(|_| may) else {
+            return false;
+        };
+        let is_there = self.routine.stand == walk.strides.gait.stand[..JOINT_DIM];
+        match self.routine.mode {
+            Mode::Walk => {}
+            Mode::Ready if is_there => self.routine.is_asked = true,
+            Mode::Damp if is_sound => self.routine.is_asked = true,
+            _ => return false,
+        }
+        if self.routine.is_asked {
+            walk.stand(&mut self.controller);
+        }
+        walk.walker.command(&walk.strides.gait, &velocity);
+        true
+    }
+
+    /// Slows down, stands, and moves the joints back to the stand: [`Mode::Recover`], then [`Mode::Ready`]. False in other
+    /// modes than [`Mode::Walk`].
+    pub fn stop(&mut self) -> bool {
+        match &mut self.walk {
+            Some(walk) if self.routine.mode == Mode::Walk => {
+                walk.walker.stop();
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn follows_walk(&self) -> bool {
+        (self.controller.reference()).is_some_and(|reference| reference.is_walk)
     }
 
     /// Damps the joints, in any mode.
@@ -97,7 +159,7 @@ impl Machine {
 
     /// See [`Controller::prepare`].
     pub fn prepare(&mut self, time_s: f64) {
-        if let Mode::Jump | Mode::Land = self.routine.mode {
+        if let Mode::Jump | Mode::Land | Mode::Walk = self.routine.mode {
             self.controller.prepare(time_s - self.routine.offset_s);
         }
     }
@@ -108,13 +170,17 @@ impl Machine {
         let Measurement { time_s, x, dx, .. } = measurement;
         let starts = self.routine.is_asked && is_whole;
         if starts && self.controller.memory.accepts(time_s, x, dx) {
-            let start = self.start().expect("a jump was accepted");
-            let start_s = self.controller.reference().expect("it has one").start_s();
-            self.routine.leap(time_s, start_s, x, &start);
+            let start = self.start().expect("a request was accepted");
+            let reference = self.controller.reference().expect("it has one");
+            let (mode, start_s) = match reference.is_walk {
+                true => (Mode::Walk, 0.0),
+                false => (Mode::Jump, reference.start_s()),
+            };
+            self.routine.leap(mode, time_s, start_s, x, &start);
             self.controller.forget();
         }
         match self.routine.mode {
-            Mode::Jump | Mode::Land => self.follow(measurement, is_whole, command),
+            Mode::Jump | Mode::Land | Mode::Walk => self.follow(measurement, is_whole, command),
             Mode::StandUp | Mode::Ready | Mode::Recover => self.hold(measurement, command),
             Mode::Damp => self.damped(measurement, command),
         }
@@ -128,11 +194,16 @@ impl Machine {
     /// A step of the controller, in its frame and on its clock.
     fn follow(&mut self, measurement: Measurement<'_>, is_whole: bool, command: &mut Command) {
         let (routine, mut x, mut dx) = (&mut self.routine, [0.0; STATE_DIM], [0.0; STATE_DIM]);
+        let time_s = measurement.time_s - routine.offset_s;
         if is_whole {
             routine.write_in_frame(measurement.x, measurement.dx, &mut x, &mut dx);
         }
+        let walk = self.walk.as_mut().filter(|_| routine.mode == Mode::Walk);
+        if let Some(walk) = walk {
+            walk.extend(&mut self.controller, time_s, self.timing.range_s);
+            walk.walker.move_to_path(time_s, &mut x, &mut dx);
+        }
         let width = if is_whole { STATE_DIM } else { 0 };
-        let time_s = measurement.time_s - routine.offset_s;
         let framed = Measurement {
             time_s,
             x: &x[..width],
@@ -145,10 +216,15 @@ impl Machine {
         } else if command.status.has_plan()
             && let Some(reference) = self.controller.reference()
         {
-            let is_over = reference.is_over(time_s);
             let (timing, feet) = (&self.timing, &measurement.feet);
-            let mode =
-                routine.after_jump(timing, measurement.time_s, is_over, measurement.dx, feet);
+            let mode = match (routine.mode, &self.walk) {
+                (Mode::Walk, Some(walk)) if walk.walker.rests(time_s) => Mode::Recover,
+                (Mode::Walk, _) => Mode::Walk,
+                _ => {
+                    let is_over = reference.is_over(time_s);
+                    routine.after_jump(timing, measurement.time_s, is_over, measurement.dx, feet)
+                }
+            };
             if mode == Mode::Recover {
                 routine.enter(mode, measurement.time_s, &command.joint_position_rad);
                 self.controller.forget();
@@ -195,7 +271,13 @@ impl Machine {
             bounds.contact_mismatch_steps = 0;
         }
         let (supervisor, plant) = (&mut controller.supervisor, &controller.plant);
-        if !watched(supervisor, plant, &bounds, (&nominal, measurement)) {
+        if !watched(
+            supervisor,
+            plant,
+            &bounds,
+            (&nominal, measurement),
+            measurement.feet,
+        ) {
             controller.memory.joint_velocity = [0.0; JOINT_DIM];
             return Status::MeasurementJump;
         }

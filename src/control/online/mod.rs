@@ -40,6 +40,8 @@ mod step;
 pub mod structured;
 mod supervisor;
 mod trajectory;
+mod walk;
+mod walker;
 
 pub use crate::solver::{Outcome, Residuals};
 pub use command::{Command, Source, Status};
@@ -60,3 +62,5 @@ pub use settings::{
 };
 pub use supervisor::Bounds;
 pub use trajectory::NO_PHASE;
+pub use walk::Strides;
+pub use walker::Gait;

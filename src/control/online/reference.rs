@@ -4,7 +4,8 @@ use super::control_model::ControlModel;
 use super::dense::first_undefined;
 use super::error::ControlError;
 use super::settings::MpcSettings;
-use super::trajectory::{EARLY_S, Instant, Trajectory, write_between, write_still};
+use super::trajectory::{EARLY_S, Instant, NO_PHASE, Trajectory, write_between, write_still};
+use super::walk::Walk;
 use crate::robot::{BODY_X, ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM, YAW};
 
 const PLACE: [usize; 3] = [BODY_X, BODY_X + 1, YAW];
@@ -46,6 +47,8 @@ pub struct Reference {
     /// Torques at the links, 12 per sample, N m, if the trajectory has an input of its own.
     torque_nm: Option<Vec<f64>>,
     deviation: Vec<f64>,
+    /// Whether it is the window of a walk.
+    pub(super) is_walk: bool,
 }
 
 impl Reference {
@@ -67,6 +70,7 @@ impl Reference {
         let phase = |&feet| plant.phase_for(feet).expect("phases were checked");
         let mut reference = Self {
             latent_dim: d,
+            is_walk: false,
             deviation: vec![0.0; 2 * d],
             state,
             input: samples.u.map(|u| project_all(plant, samples.x, u)),
@@ -94,6 +98,34 @@ impl Reference {
         Ok(reference)
     }
 
+    /// Takes the samples of a walk, of which the last ones are new.
+    pub(super) fn take_window(&mut self, plant: &ControlModel, walk: &Walk, new: usize) {
+        let (d, count, walker) = (self.latent_dim, self.time_s.len(), &walk.walker);
+        self.is_walk = true;
+        self.time_s.copy_from_slice(&walker.time_s);
+        self.x.copy_from_slice(&walker.x);
+        self.dx.copy_from_slice(&walker.dx);
+        self.state.copy_within(2 * d * new.min(count).., 0);
+        // The velocity of the last one of the others has changed, too.
+        for sample in count.saturating_sub(new + 1)..count {
+            let (x, dx) = (row(&walker.x, sample), row(&walker.dx, sample));
+            let (z, rate) = self.state[2 * d * sample..][..2 * d].split_at_mut(d);
+            plant.encode(x, z);
+            plant.encode_velocity(x, dx, rate);
+        }
+        for sample in 0..count {
+            self.feet[sample] = walk.feet(sample);
+            self.phase[sample] = plant.phase_for(self.feet[sample]).unwrap_or(NO_PHASE);
+            let u = row(&walker.u, sample);
+            if let Some(input) = &mut self.input {
+                plant.project(row(&walker.x, sample), u, &mut input[d * sample..][..d]);
+            }
+            if let Some(torque) = &mut self.torque_nm {
+                torque[JOINT_DIM * sample..][..JOINT_DIM].copy_from_slice(&u[..JOINT_DIM]);
+            }
+        }
+    }
+
     /// Standard deviation of each of `(z, dz)` over the trajectory, never below a hundredth of the largest position's
     /// or velocity's; for one that stands still, the scale of a small motion of the joints.
     pub(crate) fn deviation(&self) -> &[f64] {
@@ -118,11 +150,15 @@ impl Reference {
         }
     }
 
+    /// Feet on the ground at a time.
+    pub(super) fn feet_at(&self, time_s: f64) -> ContactFlags {
+        self.feet[self.locate(time_s).sample]
+    }
+
     /// Of measured feet on the ground those that are there in the trajectory now or soon. One that should swing but still drags
     /// is not to carry.
     pub(super) fn carrying(&self, time_s: f64, measured: ContactFlags) -> ContactFlags {
-        let [now, soon] =
-            [time_s, time_s + EARLY_S].map(|time_s| self.feet[self.locate(time_s).sample]);
+        let [now, soon] = [time_s, time_s + EARLY_S].map(|time_s| self.feet_at(time_s));
         std::array::from_fn(|foot| measured[foot] && (now[foot] || soon[foot]))
     }
 

@@ -30,6 +30,8 @@ pub enum Mode {
     Land,
     /// The joints move back to the first posture.
     Recover,
+    /// The robot walks at the commanded velocity.
+    Walk,
 }
 
 /// Times of the state machine.
@@ -39,6 +41,8 @@ pub struct Timing {
     pub stand_s: f64,
     /// How long the robot stands still before it is ready, and after the reference's end before it recovers, s.
     pub settle_s: f64,
+    /// Time in which a commanded velocity goes through its range, s.
+    pub range_s: f64,
 }
 
 impl Default for Timing {
@@ -46,6 +50,7 @@ impl Default for Timing {
         Self {
             stand_s: 1.5,
             settle_s: 0.3,
+            range_s: 2.0,
         }
     }
 }
@@ -88,9 +93,16 @@ impl Routine {
         }
     }
 
-    /// Begins a jump: the reference starts now, where the robot stands and looks.
-    pub(super) fn leap(&mut self, time_s: f64, start_s: f64, x: &[Real], start: &[Real]) {
-        self.enter(Mode::Jump, time_s, x);
+    /// Begins a jump or a walk: the reference starts now, where the robot stands and looks.
+    pub(super) fn leap(
+        &mut self,
+        mode: Mode,
+        time_s: f64,
+        start_s: f64,
+        x: &[Real],
+        start: &[Real],
+    ) {
+        self.enter(mode, time_s, x);
         self.has_flown = false;
         self.offset_s = time_s - start_s;
         self.yaw = start[17] - x[17];

@@ -10,7 +10,7 @@ use super::settings::{AfterEnd, Legs};
 use super::stage::unscale;
 use super::supervisor::{Bounds, Fault, Supervisor};
 use super::trajectory::{NO_PHASE, Trajectory};
-use crate::robot::{JOINT_DIM, Leg, STATE_DIM};
+use crate::robot::{ContactFlags, JOINT_DIM, Leg, STATE_DIM};
 use crate::solver::Outcome;
 
 /// Lifted force, N, below which its inconsistency means nothing.
@@ -40,11 +40,16 @@ impl Controller {
         if self.settings.after_end != AfterEnd::Hold && reference.is_over(time_s) {
             return Err(Status::Ended);
         }
+        let walks_on = match self.settings.legs {
+            Legs::Decoded => measurement.feet,
+            Legs::Reference => reference.feet_at(time_s),
+        };
         if !watched(
             &mut self.supervisor,
             &self.plant,
             &self.settings.bounds,
             (&reference.robot_state_at(measurement.time_s), measurement),
+            walks_on,
         ) {
             // The measured velocities must not become torques.
             self.memory.joint_velocity = [0.0; JOINT_DIM];
@@ -175,6 +180,7 @@ impl Controller {
             let rates = [&before, &after];
             stance.losses_nm = self.plant.losses_between(at, &x, rates, step_s);
             stance.near_nm = reference.torque_at(now_s + 0.5 * held_s);
+            stance.keeps_swing = true;
         } else {
             command.joint_velocity_rad_s = self.plant.decode_joint_velocities(z, dz);
             let ends = [plan.start(stage), plan.end(stage)];
@@ -224,6 +230,7 @@ pub(super) fn watched(
     plant: &ControlModel,
     bounds: &Bounds,
     (nominal, measurement): (&[f64; STATE_DIM], &Measurement<'_>),
+    walks_on: ContactFlags,
 ) -> bool {
     let &Measurement {
         time_s,
@@ -242,6 +249,7 @@ pub(super) fn watched(
         nominal,
         &heights,
         feet,
+        &walks_on,
         &lower,
         &upper,
         &robot.joint_speed_limit_rad_s,

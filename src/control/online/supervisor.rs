@@ -29,6 +29,8 @@ const MEMORY_S: Real = 0.05;
 const FOOT_UP_M: Real = 0.06;
 /// Time in the air after which a body has to fall, s, and the least share of gravity.
 const FALL_S: f64 = 0.03;
+/// Longest time that a walk may be on the other feet: twice that by which feet may be early, s.
+const OPPOSED_S: f64 = 0.08;
 const FALL_SHARE: Real = 0.5;
 /// How far a reference moves, rad or m, while a measurement that stays the same is not believed.
 const REFERENCE_MOVES: Real = 0.01;
@@ -144,6 +146,9 @@ pub(super) struct Supervisor {
     /// Since when contacts cannot be, s.
     is_contradicted: bool,
     contradicted_s: f64,
+    /// Since when a walk is on the other feet, s.
+    is_opposed: bool,
+    opposed_s: f64,
     /// Time without a good plan, s, and that of a step.
     poor_s: f64,
     pub step_s: f64,
@@ -170,6 +175,7 @@ impl Supervisor {
         self.is_doubted = false;
         self.is_aloft = false;
         self.is_contradicted = false;
+        self.is_opposed = false;
         self.poor_s = 0.0;
         for i in 0..3 {
             self.unexplained[i] = 0.0;
@@ -192,8 +198,8 @@ impl Supervisor {
         };
     }
 
-    /// Takes a finite measurement of state and velocity, 18 each, with the reference's state and the heights of the feet,
-    /// m; what is wrong.
+    /// Takes a finite measurement of state and velocity, 18 each, with the reference's state, the heights of the feet, m, those
+    /// on the ground and those that a walk has there (otherwise the measured ones); what is wrong.
     pub(super) fn watch(
         &mut self,
         bounds: &Bounds,
@@ -203,6 +209,7 @@ impl Supervisor {
         nominal: &[Real],
         heights: &[Real],
         is_down: &[bool],
+        walks_on: &[bool],
         lower: &[Real],
         upper: &[Real],
         speed: &[Real],
@@ -235,7 +242,9 @@ impl Supervisor {
         self.is_doubted = false;
         if self.is_unexplained(bounds, time_s, x, dx) {
             self.fault = Fault::VelocityMismatch;
-        } else if self.contradicts(bounds, time_s, dx[14], heights, is_down) {
+        } else if self.contradicts(bounds, time_s, dx[14], heights, is_down)
+            || self.opposes(bounds, time_s, is_down, walks_on)
+        {
             self.fault = Fault::ContactMismatch;
         }
         self.has_good = true;
@@ -424,6 +433,30 @@ impl Supervisor {
         let steps = 1.0 + (time_s - self.contradicted_s) / self.step_s;
         let most = bounds.contact_mismatch_steps as f64;
         is_wrong && most > 0.0 && steps > most - 0.5
+    }
+
+    /// Whether a walk has for too long been on just the other feet than measured.
+    fn opposes(
+        &mut self,
+        bounds: &Bounds,
+        time_s: f64,
+        is_down: &[bool],
+        walks_on: &[bool],
+    ) -> bool {
+        let mut is_opposed = true;
+        let mut on: usize = 0;
+        for foot in 0..4 {
+            is_opposed = is_opposed && is_down[foot] != walks_on[foot];
+            if walks_on[foot] {
+                on += 1;
+            }
+        }
+        is_opposed = is_opposed && on > 0 && on < 4;
+        if is_opposed && !self.is_opposed {
+            self.opposed_s = time_s;
+        }
+        self.is_opposed = is_opposed;
+        is_opposed && bounds.contact_mismatch_steps > 0 && time_s - self.opposed_s > OPPOSED_S
     }
 
     /// Adds up steps without a good plan, `passed_s` after the last one; what is wrong.

@@ -31,6 +31,8 @@ struct Facts<'a> {
     /// Whether the model knows what its states say of its inputs, in all phases.
     has_given_state: bool,
     rows: &'a StageRows,
+    /// Whether the model has strides to walk by.
+    walks: bool,
     timing: Timing,
     /// Names of the columns of a log.
     log_columns: Vec<String>,
@@ -58,6 +60,11 @@ pub(crate) fn emit(
     let (model, precision) = (&equations.model, options.precision);
     let plant = plant(model)?;
     let rows = StageRows::of_all_kinds(&plant);
+    let is_complete = plant.phase_of_feet.iter().all(Option::is_some);
+    let strides = match model.stride_prior() {
+        Ok(_) if is_complete => Some(crate::mpc::walk_strides(model)?),
+        _ => None,
+    };
     let entries = compiled(equations, options, Units::Si)?;
     let own = |phase: &&PhaseInterface| phase.identifier.eq_ignore_ascii_case("controller");
     if let Some(phase) = entries.phases.iter().find(own) {
@@ -71,7 +78,7 @@ pub(crate) fn emit(
         &plant,
         &rows,
         (precision, options.plan.as_ref()),
-        provenance,
+        (provenance, strides.is_some()),
     );
     let name = facts.name;
     let (what, jump) = match &options.plan {
@@ -81,7 +88,7 @@ pub(crate) fn emit(
             ("A jump of a simulated go1", shipped.within(model))
         }
     };
-    let source = Source::new(facts, &entries, &plant, precision)?;
+    let source = Source::new(facts, &entries, &plant, strides, precision)?;
     let self_test = selftest::text(facts, model, &jump, precision)?;
     let mut texts = texts(facts, provenance)?;
     let made = [
@@ -107,7 +114,7 @@ impl<'a> Facts<'a> {
         plant: &'a ControlModel,
         rows: &'a StageRows,
         (precision, plan): (Precision, Option<&PlannedJump>),
-        provenance: &str,
+        (provenance, walks): (&str, bool),
     ) -> Self {
         let controller = controller::Facts::new(entries, plant, plan);
         let (real, f) = match precision {
@@ -120,8 +127,9 @@ impl<'a> Facts<'a> {
             _ => None,
         };
         Self {
-            solver_stage: source::stage(controller.name, &controller.upper, real),
+            solver_stage: source::stage(controller.name, &controller.upper, real, walks),
             row_numbers: ROW_NUMBERS,
+            walks,
             controller,
             banner: format!("/* {provenance} */"),
             real,

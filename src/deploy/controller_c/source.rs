@@ -5,7 +5,7 @@ use std::borrow::Borrow;
 use super::*;
 use crate::mpc::problem::{Row, pairs};
 use crate::mpc::structured::{LINK_SOFTNESS, LINK_TOLERANCE, TOLERANCE};
-use crate::mpc::{FallbackSettings, InputGivenState, NO_PHASE, torque_deviation};
+use crate::mpc::{FallbackSettings, Gait, InputGivenState, NO_PHASE, Strides, torque_deviation};
 use crate::robot::{GRAVITY_M_S2, LegShape};
 
 #[derive(Template)]
@@ -43,6 +43,17 @@ pub(super) struct Source<'a> {
     weight_n: f64,
     fallback: FallbackSettings,
     phases: &'a [PhaseInterface],
+    walk: Option<WalkText>,
+}
+
+/// What the controller of a model with strides has besides.
+struct WalkText {
+    /// Initialisers.
+    gait: String,
+    nodes: String,
+    steps: String,
+    /// Settings for walks that differ from the controller's own, with their numbers in C.
+    settings: Vec<(&'static str, String)>,
 }
 
 extends! { <'a> Source<'a>: Facts<'a>, facts }
@@ -52,6 +63,7 @@ impl<'a> Source<'a> {
         facts: &'a Facts<'a>,
         entries: &'a ModelInterface,
         plant: &'a ControlModel,
+        strides: Option<Strides>,
         precision: Precision,
     ) -> Result<Self, MpcError> {
         let (numbers, phases) = (Numbers(precision), plant.phases());
@@ -107,7 +119,30 @@ impl<'a> Source<'a> {
             weight_n: robot.mass_kg() * GRAVITY_M_S2,
             fallback: mpc.fallback,
             phases: &entries.phases,
+            walk: strides.map(|strides| WalkText::new(facts, &strides, robot, numbers)),
         })
+    }
+}
+
+impl WalkText {
+    fn new(facts: &Facts<'_>, strides: &Strides, robot: &Robot, numbers: Numbers) -> Self {
+        let own = Settings::from(&crate::mpc::walk_settings(robot));
+        let settings = SETTINGS
+            .iter()
+            .zip(own.numbers().into_iter().zip(facts.defaults.numbers()));
+        let differs = settings.filter(|(_, (own, usual))| own != usual);
+        let text = |setting: &Setting, number: f64| match setting.kind {
+            "i32" => format!("{number}"),
+            _ => numbers.one(number),
+        };
+        Self {
+            gait: numbers.gait(&strides.gait),
+            nodes: numbers.vector(&strides.nodes),
+            steps: for_controller(WALK, facts.name),
+            settings: differs
+                .map(|(setting, (own, _))| (setting.name, text(setting, own)))
+                .collect(),
+        }
     }
 }
 
@@ -190,6 +225,19 @@ impl Numbers {
         format!("{{{}}}", fields.join(",\n     "))
     }
 
+    fn gait(self, gait: &Gait) -> String {
+        let fields = [
+            ("count", gait.count.to_string()),
+            ("frequency_hz", self.one(gait.frequency_hz)),
+            ("least", self.vector(gait.least)),
+            ("most", self.vector(gait.most)),
+            ("mean", self.vector(gait.mean)),
+            ("stand", self.vector(gait.stand)),
+        ];
+        let fields = fields.map(|(name, value)| format!(".{name} = {value}"));
+        format!("{{{}}}", fields.join(",\n     "))
+    }
+
     fn limits(self, rows: &[Row]) -> String {
         nested(rows.iter().map(|of| {
             let [bound, per_loss] = [of.bound, of.per_loss].map(|number| self.one(number));
@@ -239,6 +287,9 @@ const STAGE: &str = include_str!("../../../templates/controller_c/solver_stage.h
 const FUNCTIONS: &str = include_str!("../../../templates/controller_c/solver.c");
 const STATE: &str = include_str!("../../../templates/controller_c/online_state.h");
 const ONLINE: &str = include_str!("../../../templates/controller_c/online.c");
+const WALKER: &str = include_str!("../../../templates/controller_c/walk_state.h");
+const WALK: &str = include_str!("../../../templates/controller_c/walk.c");
+const WALK_TYPES: [&str; 2] = ["walk_walker", "walk_gait"];
 
 /// Whether a word is the type of a part of the controller's own state.
 fn is_state(word: &str) -> bool {
@@ -251,18 +302,25 @@ fn is_value(word: &str) -> bool {
     word.starts_with("ONLINE_") && (separated(",") || separated(" }"))
 }
 
-/// A stage of the horizon's solver and the controller's own state, for the header of a controller.
-pub(super) fn stage(name: &str, upper: &str, real: &str) -> String {
+/// A stage of the horizon's solver, the controller's own state and that of a walk, for the header of a controller.
+pub(super) fn stage(name: &str, upper: &str, real: &str, walks: bool) -> String {
     let rename = |word: &str| match word {
         "real" => Some(real.to_owned()),
         "NX" => Some(format!("2 * {upper}_LATENT_DIM")),
         "NU" => Some(format!("{upper}_LATENT_DIM")),
         "bool" => Some("int32_t".to_owned()),
+        "WALK_WINDOW" => Some(format!("{upper}_{word}")),
         _ if is_state(word) || word.starts_with("solver_") => Some(format!("{name}_{word}")),
+        _ if WALK_TYPES.contains(&word) => Some(format!("{name}_{word}")),
         _ if is_value(word) => Some(format!("{upper}_{word}")),
         _ => None,
     };
-    renamed(STAGE, rename) + &renamed(STATE, rename)
+    let texts: &[&str] = if walks {
+        &[STAGE, STATE, WALKER]
+    } else {
+        &[STAGE, STATE]
+    };
+    texts.iter().map(|text| renamed(text, rename)).collect()
 }
 
 /// With the names of the settings, of the state and of the stages that the header of a controller has.
@@ -270,6 +328,7 @@ fn for_controller(text: &str, name: &str) -> String {
     renamed(text, |word| match word {
         "online_settings" => Some(format!("{name}_controller_settings")),
         _ if is_state(word) || word == "solver_stage" => Some(format!("{name}_{word}")),
+        _ if WALK_TYPES.contains(&word) => Some(format!("{name}_{word}")),
         _ if is_value(word) => Some(format!("{}_{word}", name.to_ascii_uppercase())),
         _ => None,
     })

@@ -11,8 +11,10 @@
 //! answer). [`evaluate::along_recording()`](crate::evaluate::along_recording()) runs it on recorded jumps.
 
 mod of_model;
+mod strides;
 
 pub use crate::online::*;
 pub use of_model::{
     LIFTS, MpcError, SOLVERS, STEP_SLACK, control_model, controller, words_of_setting,
 };
+pub use strides::{walk_settings, walk_strides};

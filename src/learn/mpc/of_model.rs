@@ -10,7 +10,7 @@ use super::*;
 use crate::lower::{CompiledModel, LowerError};
 use crate::model::{ModelError, ReducedModel};
 use crate::recording::RecordingError;
-use crate::robot::{JOINT_DIM, STATE_DIM};
+use crate::robot::{JOINT_DIM, RobotError, STATE_DIM};
 
 /// Share of a recording's sampling below which the controller's step is too short for it.
 pub const STEP_SLACK: f64 = 0.99;
@@ -218,6 +218,8 @@ pub enum MpcError {
     Model(#[from] ModelError),
     #[error("the model's dynamics cannot be compiled")]
     Lower(#[from] LowerError),
+    #[error("the model's strides cannot be walked")]
+    Strides(#[from] RobotError),
     #[error("the recording cannot be used for control")]
     Recording(#[from] RecordingError),
     #[error("the model's encoder takes {found} coordinates, the robot has {expected}")]

@@ -1,13 +1,11 @@
 //! Walks that nobody recorded: a speed and a yaw rate in, a recording out, from the strides of the training.
 
 use super::*;
-use crate::model::{GAIT_DIM, STRIDE_WIDTH, StridePrior};
+use crate::model::{GAIT_DIM, StridePrior};
 
 const SOURCE: &str = "plan";
 const MOST_SAMPLES: f64 = 1e6;
 const SMOOTHED: usize = 2; // samples beside each that velocities are averaged over
-/// How far from the recorded range a speed or a yaw rate is still planned, as a share of that range.
-const BEYOND: f64 = 0.15;
 const NAMES: [(&str, &str); 3] = [
     ("speed", "m/s"),
     ("sideways speed", "m/s"),
@@ -52,7 +50,7 @@ pub fn walk(model: &ReducedModel, goal: &WalkGoal) -> Result<WalkPlan> {
         duty,
         height,
     ];
-    let stride = stride(prior, rule.robot(), &gait);
+    let stride = prior.stride(rule.robot(), &gait);
     let sample_time_s = model.sample_time_s()?;
     let steps = (goal.duration_s / sample_time_s).round().max(1.0);
     if steps > MOST_SAMPLES {
@@ -103,39 +101,6 @@ pub fn walk(model: &ReducedModel, goal: &WalkGoal) -> Result<WalkPlan> {
     })
 }
 
-/// Both halves of a stride, `2 (n - 1) x 40`, joined where they meet.
-fn stride(prior: &StridePrior, robot: &Robot, gait: &[f64; GAIT_DIM]) -> DMatrix<f64> {
-    let [forward, sideways, yaw_rate, rest @ ..] = *gait;
-    let [frequency, duty, height] = rest;
-    let other_way = [forward, -sideways, -yaw_rate, frequency, duty, height];
-    let mut first = prior.half_stride(gait);
-    let image = prior.half_stride(&other_way);
-    let mut second = DMatrix::from_fn(image.nrows(), STRIDE_WIDTH, |node, i| match i / STATE_DIM {
-        2 => image[(node, 2 * STATE_DIM + ((i - 2 * STATE_DIM) ^ 1))],
-        block => {
-            let (from, sign) = robot.mirrored(i % STATE_DIM);
-            sign * image[(node, block * STATE_DIM + from)]
-        }
-    });
-    let last = first.nrows() - 1;
-    let gaps = [
-        (second.row(0) - first.row(last)) * 0.5,
-        (first.row(0) - second.row(last)) * 0.5,
-    ];
-    for node in 0..=last {
-        let share = node as f64 / last as f64;
-        let towards = |end: usize| &gaps[end] * share - &gaps[1 - end] * (1.0 - share);
-        let mut row = first.row_mut(node);
-        row += towards(0);
-        let mut row = second.row_mut(node);
-        row += towards(1);
-    }
-    let mut both = DMatrix::zeros(2 * last, STRIDE_WIDTH);
-    both.rows_mut(0, last).copy_from(&first.rows(0, last));
-    both.rows_mut(last, last).copy_from(&second.rows(0, last));
-    both
-}
-
 /// Central differences, each the mean of its neighbours'.
 fn smoothed_differences(time_s: &[f64], values: &DMatrix<f64>) -> DMatrix<f64> {
     let last = time_s.len() - 1;
@@ -154,12 +119,12 @@ fn smoothed_differences(time_s: &[f64], values: &DMatrix<f64>) -> DMatrix<f64> {
 fn verdict(prior: &StridePrior, gait: &[f64; GAIT_DIM]) -> Verdict {
     let (mut beyond, mut far) = (Vec::new(), Vec::new());
     for ((range, value), (name, unit)) in prior.gait.iter().zip(gait).zip(NAMES) {
-        let margin = BEYOND * (range.most - range.least);
+        let [least, most] = range.reach();
         let text = format!(
             "{name} {value} {unit}, recorded from {:.2} to {:.2}",
             range.least, range.most
         );
-        if *value < range.least - margin || *value > range.most + margin {
+        if *value < least || *value > most {
             far.push(text);
         } else if *value < range.least || *value > range.most {
             beyond.push(text);

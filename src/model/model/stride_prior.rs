@@ -24,8 +24,43 @@ pub struct StridePrior {
 }
 
 impl StridePrior {
+    /// Both halves of a stride, `2 (n - 1) x 40`, joined where they meet: the second is the mirror image of the gait turning
+    /// the other way.
+    pub fn stride(&self, robot: &Robot, gait: &[f64; GAIT_DIM]) -> DMatrix<f64> {
+        let [forward, sideways, yaw_rate, rest @ ..] = *gait;
+        let [frequency, duty, height] = rest;
+        let other_way = [forward, -sideways, -yaw_rate, frequency, duty, height];
+        let mut first = self.half_stride(gait);
+        let image = self.half_stride(&other_way);
+        let mut second =
+            DMatrix::from_fn(image.nrows(), STRIDE_WIDTH, |node, i| match i / STATE_DIM {
+                2 => image[(node, 2 * STATE_DIM + ((i - 2 * STATE_DIM) ^ 1))],
+                block => {
+                    let (from, sign) = robot.mirrored(i % STATE_DIM);
+                    sign * image[(node, block * STATE_DIM + from)]
+                }
+            });
+        let last = first.nrows() - 1;
+        let gaps = [
+            (second.row(0) - first.row(last)) * 0.5,
+            (first.row(0) - second.row(last)) * 0.5,
+        ];
+        for node in 0..=last {
+            let share = node as f64 / last as f64;
+            let towards = |end: usize| &gaps[end] * share - &gaps[1 - end] * (1.0 - share);
+            let mut row = first.row_mut(node);
+            row += towards(0);
+            let mut row = second.row_mut(node);
+            row += towards(1);
+        }
+        let mut both = DMatrix::zeros(2 * last, STRIDE_WIDTH);
+        both.rows_mut(0, last).copy_from(&first.rows(0, last));
+        both.rows_mut(last, last).copy_from(&second.rows(0, last));
+        both
+    }
+
     /// The nodes of half a stride of a gait, `n x 40`, which begins with the touchdown of the front right foot.
-    pub fn half_stride(&self, gait: &[f64; GAIT_DIM]) -> DMatrix<f64> {
+    fn half_stride(&self, gait: &[f64; GAIT_DIM]) -> DMatrix<f64> {
         let mut nodes = DMatrix::zeros(self.nodes.nrows(), STRIDE_WIDTH);
         for feature in 0..GAIT_FEATURES {
             let value = match feature.checked_sub(1) {

@@ -192,7 +192,7 @@ fn texts(root: &Path, folders: &[&str], what: &str, unit: &Unit<'_>) -> Found<[S
 }
 
 /// The C of the structured solver and of the controller, as paths below the workspace's folder and texts.
-pub fn controller(root: &Path) -> Result<[(&'static str, String); 4], Fault> {
+pub fn controller(root: &Path) -> Result<[(&'static str, String); 6], Fault> {
     let users = read(root, "templates/controller_c", ".askama")?;
     let solver = Unit {
         prefix: "solver",
@@ -228,6 +228,16 @@ pub fn controller(root: &Path) -> Result<[(&'static str, String); 4], Fault> {
         ],
         attribute: "MAYBE_UNUSED ",
     };
+    let walk = Unit {
+        prefix: "walk",
+        users: &users,
+        fixed: &["Gait"],
+        header: &["Walker", "Gait"],
+        attribute: "MAYBE_UNUSED ",
+        ..Unit::default()
+    };
+    let folders = ["src/control/online"];
+    let [walker, walk] = texts(root, &folders, "walks", &walk)?;
     let folders = ["src/control/solver"];
     let [stage, solver] = texts(root, &folders, "the structured solver", &solver)?;
     let folders = ["src/control/online", "src/robot"];
@@ -237,5 +247,7 @@ pub fn controller(root: &Path) -> Result<[(&'static str, String); 4], Fault> {
         ("templates/controller_c/solver.c", solver),
         ("templates/controller_c/online_state.h", state),
         ("templates/controller_c/online.c", steps),
+        ("templates/controller_c/walk_state.h", walker),
+        ("templates/controller_c/walk.c", walk),
     ])
 }

@@ -1,0 +1,343 @@
+//! A walk by commands under the state machine: a robot that stands up, walks where it is told, turns, stops and stands, in
+//! Rust, and the same up to rounding in C.
+
+use std::f64::consts::PI;
+use std::fs;
+
+use romc::mpc::{
+    Command, Gait, Machine, Measurement, Mode, MpcSettings, Solver, Status, walk_settings,
+    walk_strides,
+};
+
+use romc::robot::Leg;
+
+use crate::emitted::Emitted;
+use crate::programs::{root, shipped, succeed};
+use crate::{push, push_counts};
+
+const STEP_S: f64 = 0.002;
+/// Those of `machine.c`: forwards and to the left, m/s, and yaw, rad/s.
+const VELOCITIES: [[f64; 3]; 4] = [
+    [0.5, 0.0, 0.3],
+    [0.8, 0.05, -0.4],
+    [9.0, -9.0, 9.0],
+    [0.5, f64::NAN, 0.0],
+];
+const TOLERANCE: f64 = 1e-6;
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Request {
+    None = 0,
+    Stand = 1,
+    Jump = 2,
+    Damp = 3,
+    Reset = 4,
+    Prepare = 5,
+    New = 7,
+    Stop = 8,
+    Walk = 9,
+    Turn = 10,
+    Beyond = 11,
+    Undefined = 12,
+}
+
+/// A robot whose joints go where they are sent and whose body moves as commanded, somewhere in the world.
+struct Robot {
+    machine: Machine,
+    time_s: f64,
+    x: [f64; 18],
+    dx: [f64; 18],
+    /// Velocity that the body goes over to, and its present one.
+    velocity: [f64; 3],
+    now: [f64; 3],
+    gait: Gait,
+    robot: &'static romc::robot::Robot,
+    command: Command,
+    bytes: Vec<u8>,
+}
+
+impl Robot {
+    fn new() -> Self {
+        let model = shipped("go1-trot-d6");
+        let settings = MpcSettings {
+            solver: Solver::Riccati,
+            ..walk_settings(model.robot().expect("a robot"))
+        };
+        let controller = romc::mpc::controller(&model, settings).expect("a complete model");
+        let timing = romc::mpc::Timing::default();
+        let mut machine = Machine::new(controller, timing).expect("sound");
+        let strides = walk_strides(&model).expect("it has strides");
+        let mut x = [0.0; 18];
+        let gait = strides.gait;
+        x[..12].copy_from_slice(&gait.stand[..12]);
+        (x[1], x[4]) = (x[1] + 0.2, x[4] - 0.2);
+        [x[12], x[13], x[14], x[17]] = [3.0, -2.0, 0.27, 3.1];
+        assert!(!machine.walk(VELOCITIES[0]), "without strides");
+        machine.set_walk(strides).expect("strides to walk by");
+        let mut bytes = Vec::new();
+        push_counts(&mut bytes, &[0]);
+        let mut robot = Self {
+            machine,
+            time_s: 7.0,
+            x,
+            dx: [0.0; 18],
+            velocity: [0.0; 3],
+            now: [0.0; 3],
+            gait,
+            robot: model.robot().expect("a robot"),
+            command: Command::zeros(6),
+            bytes,
+        };
+        robot.step(Request::New);
+        robot
+    }
+
+    /// A step with a request before it; the answer to the request.
+    fn step(&mut self, request: Request) -> bool {
+        self.step_with(request, |_| ())
+    }
+
+    fn step_with(&mut self, request: Request, change: impl Fn(&mut [f64; 18])) -> bool {
+        self.time_s += STEP_S;
+        let mode = self.machine.mode();
+        if !matches!(mode, Mode::Damp) {
+            let sent = &self.command.joint_position_rad;
+            let moved: [f64; 12] = std::array::from_fn(|joint| sent[joint] - self.x[joint]);
+            self.x[..12].copy_from_slice(sent);
+            self.dx[..12].copy_from_slice(&moved.map(|angle| angle / STEP_S));
+        }
+        self.dx[12..].fill(0.0);
+        if mode == Mode::Walk {
+            for i in 0..3 {
+                let most = (self.gait.most[i] - self.gait.least[i]) * STEP_S / 2.0;
+                self.now[i] += (self.velocity[i] - self.now[i]).clamp(-most, most);
+            }
+            let ([forward, left, turn], (sine, cosine)) = (self.now, self.x[17].sin_cos());
+            self.dx[12] = cosine * forward - sine * left;
+            self.dx[13] = sine * forward + cosine * left;
+            self.dx[17] = turn;
+        }
+        let feet = match mode {
+            Mode::Damp => [false; 4],
+            _ => self.low_feet(),
+        };
+        for i in 12..18 {
+            self.x[i] += STEP_S * self.dx[i];
+        }
+        // The heading is measured within half a turn.
+        self.x[17] = (self.x[17] + PI).rem_euclid(2.0 * PI) - PI;
+        let mut x = self.x;
+        change(&mut x);
+        let walk = |machine: &mut Machine| machine.walk(VELOCITIES[request as usize - 9]);
+        let machine = &mut self.machine;
+        let answer = match request {
+            Request::None | Request::New => false,
+            Request::Stand => machine.stand(self.time_s, &x),
+            Request::Jump => machine.jump(),
+            Request::Damp => {
+                machine.damp();
+                false
+            }
+            Request::Reset => {
+                machine.reset();
+                false
+            }
+            Request::Prepare => {
+                machine.prepare(self.time_s);
+                false
+            }
+            Request::Stop => machine.stop(),
+            _ => walk(machine),
+        };
+        let measurement = Measurement {
+            time_s: self.time_s,
+            x: &x,
+            dx: &self.dx,
+            feet,
+        };
+        machine.step_into(measurement, &mut self.command);
+        if machine.mode() == Mode::Walk && mode != Mode::Walk {
+            self.now = [0.0; 3];
+        }
+        let (bytes, command) = (&mut self.bytes, &self.command);
+        push_counts(bytes, &[request as i64, i64::from(answer)]);
+        push(bytes, &[self.time_s]);
+        push(bytes, &x);
+        push(bytes, &self.dx);
+        push_counts(
+            bytes,
+            &[(0..4).map(|foot| i64::from(feet[foot]) << foot).sum()],
+        );
+        push(bytes, &command.torque_nm);
+        push(bytes, &command.joint_position_rad);
+        push(bytes, &command.joint_velocity_rad_s);
+        let drives = command.drives;
+        push(bytes, &[drives.stiffness_nm_rad, drives.damping_nm_s_rad]);
+        push(bytes, &command.u_lat);
+        push_counts(
+            bytes,
+            &[i64::from(command.status.code()), machine.mode() as i64],
+        );
+        answer
+    }
+
+    /// Feet near the floor: which they are on is what the supervisor compares with their heights.
+    fn low_feet(&self) -> [bool; 4] {
+        let heights = Leg::ALL.map(|leg| {
+            let q: [f64; 3] = std::array::from_fn(|joint| self.x[3 * leg.index() + joint]);
+            self.robot.geometry(leg).foot_position(&q).z
+        });
+        let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        heights.map(|height| height < lowest + 0.015)
+    }
+
+    /// Steps for a time, with feedback about a body that goes over to a velocity as late as a command arrives.
+    fn pass(&mut self, seconds: f64, velocity: [f64; 3]) {
+        for step in 0..(seconds / STEP_S) as usize {
+            if step as f64 * STEP_S > 0.3 {
+                self.velocity = velocity;
+            }
+            self.step([Request::None, Request::Prepare][step % 2]);
+        }
+    }
+
+    fn until(&mut self, mode: Mode) {
+        for _ in 0..3000 {
+            if self.machine.mode() == mode {
+                return;
+            }
+            self.step(Request::None);
+        }
+        panic!(
+            "{:?}, not {mode:?}: {:?}",
+            self.machine.mode(),
+            self.command.status
+        );
+    }
+
+    fn ready() -> Self {
+        let mut robot = Self::new();
+        assert!(!robot.step(Request::Jump), "strides are no jump");
+        assert!(robot.step(Request::Stand));
+        assert!(!robot.step(Request::Walk), "walks while it stands up");
+        robot.until(Mode::Ready);
+        robot
+    }
+}
+
+#[test]
+fn robot_walks_where_it_is_told_turns_more_than_a_turn_stops_and_stands() {
+    let mut robot = Robot::ready();
+    let stand: Vec<f64> = robot.command.joint_position_rad.to_vec();
+    assert!(!robot.step(Request::Stop), "it does not walk");
+    assert!(!robot.step(Request::Undefined));
+    assert!(robot.step(Request::Walk));
+    assert_eq!(robot.machine.mode(), Mode::Walk);
+    robot.pass(0.1, [0.0; 3]);
+    let off = |robot: &Robot| {
+        let pairs = robot.command.joint_position_rad.iter().zip(&stand);
+        pairs
+            .map(|(sent, stood)| (sent - stood).abs())
+            .fold(0.0, f64::max)
+    };
+    assert!(off(&robot) < 0.02, "steps at once: {}", off(&robot));
+    robot.pass(25.0, VELOCITIES[0]);
+    assert!(
+        robot.command.status.has_plan(),
+        "{:?}",
+        robot.command.status
+    );
+    assert!(
+        !robot.step(Request::Undefined),
+        "no numbers, the walk goes on"
+    );
+    assert!(!robot.step(Request::Jump));
+    assert!(!robot.step(Request::Stand));
+    assert_eq!(robot.machine.mode(), Mode::Walk);
+    let swing = |robot: &mut Robot| {
+        let mut spread = 0.0f64;
+        for _ in 0..180 {
+            robot.step(Request::None);
+            spread = spread.max(off(robot));
+        }
+        spread
+    };
+    let strides = swing(&mut robot);
+    assert!(strides > 0.3, "{strides}");
+    assert!(robot.step(Request::Stop));
+    robot.pass(0.4, [0.0; 3]);
+    robot.until(Mode::Recover);
+    assert!(off(&robot) < 0.02, "{}", off(&robot));
+    robot.until(Mode::Ready);
+    assert!(robot.step(Request::Walk), "and again");
+    assert_eq!(robot.machine.mode(), Mode::Walk);
+}
+
+#[test]
+fn commands_are_kept_within_what_the_strides_reach_and_change_slowly() {
+    let mut robot = Robot::ready();
+    robot.step(Request::Beyond);
+    let (least, most) = (robot.gait.least, robot.gait.most);
+    assert!(most[0] > 0.9 && most[0] < 1.1, "{most:?}");
+    // A body as fast as the strides reach stays near the reference; one as fast as asked does not.
+    robot.pass(6.0, [most[0], least[1], most[2]]);
+    assert_eq!(
+        robot.machine.mode(),
+        Mode::Walk,
+        "{:?}",
+        robot.command.status
+    );
+    assert!(robot.command.status.has_plan());
+    robot.pass(3.0, [2.0 * most[0], least[1], most[2]]);
+    assert_eq!(robot.machine.mode(), Mode::Damp);
+    assert!(matches!(
+        robot.command.status,
+        Status::BodyFar | Status::BodyLeap | Status::VelocityMismatch
+    ));
+    assert!(!robot.step(Request::Walk), "after a fault");
+    robot.step(Request::Reset);
+    assert!(robot.step(Request::Stand));
+    robot.until(Mode::Ready);
+}
+
+#[test]
+fn walk_in_c_repeats_the_library() {
+    let mut robot = Robot::ready();
+    robot.step(Request::Walk);
+    robot.pass(1.5, VELOCITIES[0]);
+    robot.step(Request::Turn);
+    robot.pass(2.0, VELOCITIES[1]);
+    robot.step(Request::Undefined);
+    for step in 0..500 {
+        robot.step_with(Request::None, |x| {
+            x[14] += 0.01 * (step as f64 * 0.1).sin();
+            x[16] += 0.03 * (step as f64 * 0.07).sin();
+        });
+    }
+    robot.step(Request::Stop);
+    robot.pass(0.4, [0.0; 3]);
+    robot.until(Mode::Recover);
+    robot.until(Mode::Ready);
+    robot.step(Request::Beyond);
+    robot.pass(1.0, [0.2, 0.0, 0.2]);
+    robot.step_with(Request::None, |x| x[15] = 3.0);
+    for _ in 0..20 {
+        robot.step_with(Request::None, |x| x[15] = 3.0);
+    }
+    assert_eq!(robot.machine.mode(), Mode::Damp);
+    robot.step(Request::Reset);
+    robot.step(Request::Stand);
+    robot.step(Request::Damp);
+    let emitted = Emitted::with_library_sines(&shipped("go1-trot-d6"));
+    let replay = root().join("tests/controller_c/machine.c");
+    let program = emitted.program("cc", &["-DWALKS"], replay.to_str().expect("UTF-8"));
+    let file = emitted.scratch.path().join("steps");
+    fs::write(&file, &robot.bytes).expect("written");
+    let tolerance = TOLERANCE.to_string();
+    let output = succeed(
+        std::process::Command::new(program)
+            .arg(&file)
+            .arg(tolerance),
+    );
+    println!("{}", String::from_utf8_lossy(&output.stdout));
+}
