@@ -306,6 +306,7 @@ fn pitch_that_is_wrong_makes_the_verdict_fail() {
 fn every_row_that_praises_the_dynamics_falls_with_them() {
     let go1 = "examples/recordings/go1/test_02.csv.gz";
     let go2 = "examples/recordings/go2-asynchronous/test_01.csv.gz";
+    let trot = "examples/recordings/go1-trot/test_02.csv.gz";
     let all = &["0.1 s", "whole motion", "torques", "control"][..];
     for (name, jump, fit) in [
         ("go1-d2", go1, &all[..2]),
@@ -313,11 +314,19 @@ fn every_row_that_praises_the_dynamics_falls_with_them() {
         ("go1-d6", go1, all),
         ("go1-d7", go1, all),
         ("go2-async-d4", go2, all),
+        (
+            "go1-trot-d6",
+            trot,
+            &["0.1 s", "a stride", "torques", "control"],
+        ),
     ] {
         let model = shipped(name);
         let right = verdict_on(&model, &[jump]);
         assert_eq!(right.fit_for, fit, "{name}: {right:?}");
-        for (what, wrong) in broken(&model) {
+        // Three of the four phases of the trot have the same equations.
+        let is_walk = fit.contains(&"a stride");
+        let broken = broken(&model).into_iter();
+        for (what, wrong) in broken.filter(|(what, _)| !(is_walk && *what == "phases exchanged")) {
             let wrong = verdict_on(&wrong, &[jump]);
             assert!(wrong.fit_for.is_empty(), "{name} {what}: {wrong:?}");
             assert!(right.fit_for.iter().all(|of| wrong.failed.contains(of)));

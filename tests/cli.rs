@@ -1648,7 +1648,7 @@ fn held_out_jumps_and_repeated_recordings_are_said() {
     };
     let page = path(&folder, "page.html");
     for (set, expected) in [
-        ("test, 1 jump: ", "Its training did not see it."),
+        ("test, 1 motion: ", "Its training did not see it."),
         ("training, ", "Its training saw it"),
     ] {
         let assessed = judged(&[

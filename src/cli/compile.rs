@@ -124,10 +124,10 @@ fn jump(arguments: &CompileArguments, model: &ReducedModel) -> Result<Option<Pla
     let jumps = |target| arguments.emit.contains(&target);
     if !jumps(Target::Controller) && !jumps(Target::ControllerC) {
         let message =
-            "--plan without a target that jumps it; add --emit controller or controller-c";
+            "--plan without a target that follows it; add --emit controller or controller-c";
         return Err(Error::refused(path, message));
     }
-    let settings = plan_settings::read_for(path)?;
+    let settings = plan_settings::read_for(path, &crate::mpc::settings_for(model))?;
     if settings.torque_rate_nm_s.is_some() {
         let message =
             "found `torque_rate_nm_s`, expected none: generated controllers have it as an option";

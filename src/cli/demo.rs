@@ -43,6 +43,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
         assessment: &evaluation,
         verdict: &verdict,
         plain: &control[0],
+        usual: &control[0],
         consistent: &control[1],
         study: None,
         plan: None,

@@ -10,7 +10,7 @@ pub(super) fn run(arguments: &MpcArguments) -> Result<Answer> {
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(arguments.output.as_deref(), Format::TABLE, arguments.force)?;
     let model = artifact::read(&arguments.model)?;
-    let settings = settings(arguments)?;
+    let settings = settings(&model, arguments)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_turns(motions(&recordings), UNROLLED);
     let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
@@ -73,10 +73,11 @@ impl JudgedRuns {
 }
 
 /// Those next to the recordings, where an option does not replace them.
-fn settings(arguments: &MpcArguments) -> Result<MpcSettings> {
-    let mut settings = plan_settings::read_for(&arguments.recordings[0])?;
+fn settings(model: &ReducedModel, arguments: &MpcArguments) -> Result<MpcSettings> {
+    let usual = crate::mpc::settings_for(model);
+    let mut settings = plan_settings::read_for(&arguments.recordings[0], &usual)?;
     for path in &arguments.recordings[1..] {
-        if plan_settings::read_for(path)? != settings {
+        if plan_settings::read_for(path, &usual)? != settings {
             let message = format!(
                 "found settings of the controller that differ from those for {}, expected the same for all recordings: \
                  follow them one at a time",
@@ -91,6 +92,17 @@ fn settings(arguments: &MpcArguments) -> Result<MpcSettings> {
     set(&mut settings.solver, arguments.solver);
     settings.torque_rate_nm_s = arguments.torque_rate.or(settings.torque_rate_nm_s);
     Ok(settings)
+}
+
+/// Of the runs with both lifts those with the lift that the model usually has.
+pub(super) fn of_usual_lift<'r>(
+    model: &ReducedModel,
+    [plain, consistent]: [&'r [NamedRun]; 2],
+) -> &'r [NamedRun] {
+    match crate::mpc::settings_for(model).lift {
+        Lift::Transpose => plain,
+        Lift::Consistent => consistent,
+    }
 }
 
 pub(super) fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
@@ -124,7 +136,7 @@ pub(super) fn run_with_both_lifts(
     model: &ReducedModel,
     recordings: &[Recording],
 ) -> Result<[Vec<NamedRun>; 2]> {
-    let usual = usual_settings(recordings);
+    let usual = usual_settings(model, recordings);
     let default = MpcSettings::default();
     if usual.step_s != default.step_s {
         note(&format!(

@@ -19,15 +19,14 @@ pub(super) fn path_for(plan: &Path) -> PathBuf {
     path.into()
 }
 
-/// The settings next to a recording; the usual ones where there is no file.
-pub(super) fn read_for(recording: &Path) -> Result<MpcSettings> {
+/// The settings next to a recording, the others default; the usual ones where there is no file.
+pub(super) fn read_for(recording: &Path, usual: &MpcSettings) -> Result<MpcSettings> {
     let path = path_for(recording);
-    let usual = MpcSettings::default();
     if !path.is_file() {
-        return Ok(usual);
+        return Ok(*usual);
     }
     let numbers: BTreeMap<String, f64> = read_settings(&path, |_| Ok(()))?;
-    let mut settings = Settings::from(&usual);
+    let mut settings = Settings::from(&MpcSettings::default());
     for (name, number) in numbers {
         let is_whole = SETTINGS
             .iter()

@@ -87,7 +87,7 @@ impl RecordedSets {
                 (words, json!({ "file": file, "row": row }))
             };
             let (jumps, rows): (Vec<_>, Vec<_>) = places.iter().map(of_jump).unzip();
-            let count = counted(jumps.len(), "jump");
+            let count = counted(jumps.len(), "motion");
             text += &format!("{name}, {count}: {}\n", jumps.join(", "));
             json.insert(name.to_owned(), rows.into());
         }

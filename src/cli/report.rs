@@ -1,6 +1,6 @@
 //! `romc report`: a one-page assessment of a model, and its figures as files; or a page on a controller's log.
 
-use super::mpc::{judged, run_with_both_lifts};
+use super::mpc::{judged, of_usual_lift, run_with_both_lifts};
 use super::*;
 use crate::recording::ControllerLog;
 use crate::report::{LogFacts, log_figures, log_page};
@@ -58,6 +58,7 @@ fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer>
     let runs = can_control.then(|| run_with_both_lifts(&model, &recordings));
     // Without statistics of the inputs there are no runs, and the page says so.
     let [plain, consistent] = runs.transpose()?.unwrap_or_default();
+    let usual = of_usual_lift(&model, [&plain, &consistent]);
     progress.set_message("drawing");
     let paths = recordings.iter().map(|recording| &recording.path);
     // A file that is gone by now has no digest, and counts as one that the model does not name.
@@ -65,8 +66,9 @@ fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer>
     let content = Content {
         model: &model,
         assessment: &assessment,
-        verdict: &verdict(&model, &assessment, &judged(&plain)),
+        verdict: &verdict(&model, &assessment, &judged(usual)),
         plain: &plain,
+        usual,
         consistent: &consistent,
         study: study.as_ref(),
         plan: plan.as_ref(),

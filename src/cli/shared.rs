@@ -201,7 +201,7 @@ pub(super) fn read_jump(
     let mut recording = read_for(model, std::slice::from_ref(path), arguments)?.swap_remove(0);
     note_mismatches(&recording, model.robot()?);
     if let found @ 2.. = recording.segments.len() {
-        let message = format!("--plan takes one jump: found {found} segments");
+        let message = format!("--plan takes one motion: found {found} segments");
         return Err(Error::refused(path, message));
     }
     Ok(recording.segments.swap_remove(0))

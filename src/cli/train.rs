@@ -180,7 +180,7 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
         table.row([name.into(), unit.into()].into_iter().chain(cells));
     };
     let lift = "torque R^2 of the plain lift, all samples";
-    let (short, whole) = ("fixed steps over 0.1 s", "fixed steps, whole jump");
+    let (short, whole) = ("fixed steps over 0.1 s", "fixed steps, whole motion");
     row("decoder mean square", "scaled", &|m| Some(m.decoder_mse));
     row(lift, "", &|m| Some(m.torque_r2));
     row(&format!("body x, {short}"), "m", &|m| {
@@ -200,7 +200,7 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
         table.row([name.into(), "".into(), Cell::from(value)]);
     };
     for score in &report.deviations {
-        let name = format!("ddz R^2 of deviations in {}, jump left out", score.part);
+        let name = format!("ddz R^2 of deviations in {}, motion left out", score.part);
         of_all(name, score.ddz_r2);
     }
     if let Some(overlap) = report.support_overlap {

@@ -14,6 +14,8 @@ pub(crate) struct Content<'a> {
     /// The controller along each recording with the plain lift; empty if it did not run.
     pub plain: &'a [NamedRun],
     pub consistent: &'a [NamedRun],
+    /// Those with the model's usual lift, by which it is judged.
+    pub usual: &'a [NamedRun],
     pub study: Option<&'a Summary>,
     pub plan: Option<&'a Segment>,
     /// Digests of the recordings' files, by path, as a model's provenance has them.

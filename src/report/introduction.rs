@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::tables::template_rms;
 use super::*;
+use crate::mpc::{Lift, settings_for};
 
 pub(crate) struct Introduction {
     pub headline: String,
@@ -47,7 +48,11 @@ pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
 fn cause(content: &Content<'_>) -> Option<String> {
     let failed = &content.verdict.failed;
     let lift_r2 = content.assessment.lift.torque.r2().contact;
-    if let Some(r2) = lift_r2.filter(|r2| *r2 < 0.5 && failed.iter().any(|of| of == "torques")) {
+    let is_plain = settings_for(content.model).lift == Lift::Transpose;
+    if let Some(r2) = lift_r2
+        .filter(|_| is_plain)
+        .filter(|r2| *r2 < 0.5 && failed.iter().any(|of| of == "torques"))
+    {
         return Some(format!(
             "Torques fail because encoder and decoder lose them: R^2 of recorded inputs projected and lifted is {r2:.2}."
         ));
@@ -85,7 +90,7 @@ fn subject(content: &Content<'_>) -> Result<String> {
     ))
 }
 
-fn listed(names: &[String]) -> String {
+pub(super) fn listed(names: &[String]) -> String {
     match names {
         [] => String::new(),
         [name] => name.clone(),
@@ -121,8 +126,8 @@ fn compared(content: &Content<'_>) -> String {
         (yes, 0) if yes == paths.len() => format!("Its training saw all of them, {FLATTERS}."),
         (yes, _) => format!("Its training saw {yes} of the {of_recordings}, {FLATTERS}."),
     };
-    let jumps = counted(runs.len(), "jump");
-    format!("It is compared with {jumps} of {of_recordings}, {seconds:.1} s in all. {training}")
+    let motions = counted(runs.len(), "motion");
+    format!("It is compared with {motions} of {of_recordings}, {seconds:.1} s in all. {training}")
 }
 
 fn millimetres(metres: f64) -> String {
@@ -132,7 +137,11 @@ fn millimetres(metres: f64) -> String {
 fn errors(content: &Content<'_>) -> String {
     let assessment = content.assessment;
     let shown = |value: Option<f64>| value.map_or("nowhere predicted".to_owned(), millimetres);
-    let [whole, short] = [&assessment.full, &assessment.restarted].map(|sums| {
+    let (over, long) = match &assessment.over_stride {
+        Some([own, ..]) => ("a stride", own),
+        None => ("whole motions", &assessment.full),
+    };
+    let [long, short] = [long, &assessment.restarted].map(|sums| {
         let [x, z] = body_rms(assessment, sums).map(shown);
         format!("{x} in body.x and {z} in body.z")
     });
@@ -140,10 +149,10 @@ fn errors(content: &Content<'_>) -> String {
     let diverged = runs.filter(|run| run.full.diverged_at_s().is_some());
     let diverged = match diverged.count() {
         0 => String::new(),
-        diverged => format!(" The rollout diverges in {}.", counted(diverged, "jump")),
+        diverged => format!(" The rollout diverges in {}.", counted(diverged, "motion")),
     };
     format!(
-        "Driven by the recorded torques and contacts over whole jumps, its error is {whole} (root mean square); started \
+        "Driven by the recorded torques and contacts over {over}, its error is {long} (root mean square); started \
          again every {} s from the recorded state, {short}.{diverged}",
         assessment.restart_every_s
     )
@@ -233,10 +242,10 @@ fn recordings(content: &Content<'_>) -> Result<Table> {
         })
         .column("forward", "m", |(_, s, _)| moved(x, travelled, s))
         .column("rise of the body", "m", |(_, s, _)| moved(z, risen, s))
-        .column("body.x rms, whole jump", "mm", |(.., rms)| shown(rms[0]))
-        .column("body.z rms, whole jump", "mm", |(.., rms)| shown(rms[1]))
+        .column("body.x rms, whole motion", "mm", |(.., rms)| shown(rms[0]))
+        .column("body.z rms, whole motion", "mm", |(.., rms)| shown(rms[1]))
         .table();
-    let count = counted(table.rows.len(), "jump");
+    let count = counted(table.rows.len(), "motion");
     Ok(table.captioned(format!("{count} of the recordings")))
 }
 

@@ -88,14 +88,14 @@ impl<'a> Jump<'a> {
         let segment = &*self.run.segment;
         let predicted = Motion {
             role: Role::Full,
-            words: "model, whole jump".to_owned(),
+            words: "model, whole motion".to_owned(),
             states: self.states(),
         };
         let mut motions = vec![Motion::recorded(segment), predicted];
         motions.extend(plan.map(|plan| Motion::planned(plan, segment)));
         let caption = match plan {
-            Some(_) => "planned, recorded, and predicted over the whole jump",
-            None => "recorded, and predicted over the whole jump",
+            Some(_) => "planned, recorded, and predicted over the whole motion",
+            None => "recorded, and predicted over the whole motion",
         };
         let caption = format!("{}: {caption}.", self.place.words);
         let names = (self.place.id("motion"), caption);
@@ -141,7 +141,7 @@ impl<'a> Jump<'a> {
         let restarted = format!("model, restarted every {every} s");
         let legend = [
             (Role::Recorded, "recorded"),
-            (Role::Full, "model, whole jump"),
+            (Role::Full, "model, whole motion"),
             (Role::Restarted, &restarted),
         ];
         Figure::over_time(self.place.id(id), caption, panels, &legend)
@@ -229,7 +229,7 @@ impl<'a> Jump<'a> {
         };
         let mut legend = vec![
             (Role::Recorded, "recorded"),
-            (Role::Full, "model, whole jump"),
+            (Role::Full, "model, whole motion"),
         ];
         let names = self.assessment.baselines.iter().map(|b| b.name);
         legend.extend(roles.into_iter().zip(names));

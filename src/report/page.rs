@@ -2,6 +2,7 @@
 
 use askama::Template;
 
+use super::introduction::listed;
 use super::sections::{Section, sections, tiles};
 use super::*;
 use crate::artifact;
@@ -36,7 +37,7 @@ pub(crate) fn page(
         tiles: tiles(content),
         coordinates: words.collect(),
         remarks: &content.assessment.remarks,
-        phases: typeset.systems.iter().zip(&equations.phases).collect(),
+        phases: alike(typeset.systems.iter().zip(&equations.phases)),
         rounding: rounding(&HTML, Rounding::default(), &typeset.rounding),
         jumps: &figures.jumps,
         rest: content.assessment.runs.len() - figures.jumps.len(),
@@ -58,7 +59,8 @@ struct Page<'a> {
     /// Quantity and unit of each latent coordinate; empty where the model does not determine them.
     coordinates: Vec<String>,
     remarks: &'a [String],
-    phases: Vec<(&'a EquationSystem, &'a PhaseEquations)>,
+    /// Equations with the phases that have them.
+    phases: Vec<(&'a EquationSystem, Vec<&'a PhaseEquations>)>,
     rounding: String,
     jumps: &'a [JumpFigures],
     rest: usize,
@@ -80,7 +82,30 @@ fn errors(jump: &JumpFigures) -> String {
         Some(rms) => format!("{} mm", rounded(1e3 * rms, 2)),
         None => "nothing predicted".to_owned(),
     });
-    format!("body x off by {x}, body z by {z} over the whole jump")
+    format!("body x off by {x}, body z by {z} over the whole motion")
+}
+
+/// Phases of the same equations together, each list where its first phase is.
+fn alike<'a>(
+    phases: impl Iterator<Item = (&'a EquationSystem, &'a PhaseEquations)>,
+) -> Vec<(&'a EquationSystem, Vec<&'a PhaseEquations>)> {
+    let mut groups: Vec<(&EquationSystem, Vec<&PhaseEquations>)> = Vec::new();
+    for (system, phase) in phases {
+        let known = groups
+            .iter_mut()
+            .find(|(other, _)| other.equations == system.equations);
+        match known {
+            Some((_, phases)) => phases.push(phase),
+            None => groups.push((system, vec![phase])),
+        }
+    }
+    groups
+}
+
+fn title(phases: &[&PhaseEquations]) -> String {
+    let names: Vec<String> = phases.iter().map(|phase| html(&phase.name)).collect();
+    let word = if names.len() == 1 { "Phase" } else { "Phases" };
+    format!("{word} {}", listed(&names))
 }
 
 fn holds(phase: &PhaseEquations) -> String {

@@ -69,15 +69,19 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
     let loss = shown(assessment.combined_loss());
     let lift_r2 = assessment.lift.torque.r2().contact;
     let restarted = format!("body x, z: rms error, restarted every {every} s");
+    let (over, long) = match &assessment.over_stride {
+        Some([own, ..]) => ("body x, z: rms error over a stride", own),
+        None => ("body x, z: rms error over whole motions", &assessment.full),
+    };
     let names = [
-        "body x, z: rms error over whole jumps",
+        over,
         &restarted,
         "torque R² in contact that the controller finds itself: worst recording; no dynamics",
         "deviation after a push, mm: worst recording; feedback off",
         "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod",
         "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact",
     ];
-    let [whole, restarted] = [&assessment.full, &assessment.restarted].map(errors);
+    let [whole, restarted] = [long, &assessment.restarted].map(errors);
     let [torques, push] = [(TORQUES_IN_CONTACT, 1.0), (AFTER_A_PUSH, 1e3)].map(pair);
     let size = format!("{d}, {terms}, {loss}");
     let values = [whole, restarted, torques, push, size, shown(lift_r2)];
@@ -92,7 +96,7 @@ pub(super) fn sections<'a>(
     let (model, assessment) = (content.model, content.assessment);
     let every = assessment.restart_every_s;
     let by_phase = format!(
-        "All {} coordinates: root mean square errors over whole jumps and restarted every {every} s; on the right those of \
+        "All {} coordinates: root mean square errors over whole motions and restarted every {every} s; on the right those of \
          each phase, restarted",
         assessment.names.len()
     );
@@ -168,7 +172,7 @@ fn control(content: &Content<'_>) -> Section<'static> {
     });
     Section::new("control")
         .and(without)
-        .and(failures(plain))
+        .and(failures(content.usual))
         .with(first)
         .folding(every)
         .folding([judged(plain, format!("{PLAIN}: {beside}"))])

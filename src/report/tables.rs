@@ -72,7 +72,7 @@ pub(crate) fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
 
 pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     let every = format!("restarted every {} s", assessment.restart_every_s);
-    let rows = ["body.x", "body.z"].map(|name| ["whole jump", &every].map(|kind| (name, kind)));
+    let rows = ["body.x", "body.z"].map(|name| ["whole motion", &every].map(|kind| (name, kind)));
     let rows = rows.concat().into_iter();
     let rows = rows.map(|(name, kind)| format!("{name}, {kind}"));
     let mut table = Table::default();

@@ -43,7 +43,7 @@ pub(crate) fn rollout_table(effect: &RolloutEffect) -> Table {
     let every = format!("restarted every {} s", effect.restart_every_s);
     let mut table = Table::default();
     table.column("rms error", "", names);
-    for (kind, title) in ["whole jump", &every].into_iter().enumerate() {
+    for (kind, title) in ["whole motion", &every].into_iter().enumerate() {
         let of = |rms: &[Option<f64>; 2]| rms[kind];
         let before = format!("{title}, before");
         table.column(&before, "", effect.before.rms.iter().map(of));

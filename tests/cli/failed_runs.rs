@@ -165,7 +165,7 @@ fn every_line_of_a_runaway_prediction_stays_inside_the_frame() {
     let body = read("body_1.csv");
     let full = body
         .lines()
-        .filter(|line| line.contains("model, whole jump"));
+        .filter(|line| line.contains("model, whole motion"));
     let values = full.filter_map(|line| line.rsplit(',').next()?.parse::<f64>().ok());
     let farthest = values.fold(0.0, |most, value| value.abs().max(most));
     assert!(farthest > 10.0, "it runs away: {farthest}");

@@ -28,6 +28,8 @@ pub struct Assessment<'a> {
     pub restarted: CoordinateSums,
     /// Residuals of a robot that keeps the velocity it has at the start, over whole segments and restarted.
     pub constant_velocity: [CoordinateSums; 2],
+    /// The same of latent coordinates that keep their velocity.
+    pub constant_latent_velocity: [CoordinateSums; 2],
     pub pointwise: PointwiseSums,
     /// Residuals of `decode(encode(x))`: of a prediction without any error of the dynamics.
     pub decoded: CoordinateSums,
@@ -35,6 +37,8 @@ pub struct Assessment<'a> {
     pub linearised: Vec<Option<LinearisedPhase>>,
     /// Of walks.
     pub stride: Option<StrideGrowth>,
+    /// Of walks: residuals of the model, of a constant velocity and of a constant latent velocity, restarted every stride.
+    pub over_stride: Option<[CoordinateSums; 3]>,
     pub lift: LiftSums,
     pub active_terms: usize,
     pub remarks: Vec<String>,
@@ -68,6 +72,7 @@ impl<'a> Assessment<'a> {
         };
         let full = CoordinateSums::new(model)?;
         let rule = model.input_rule()?;
+        let stride = stride_s(recorded.iter().copied()).map(Restart::Every);
         let mut assessment = Self {
             names,
             units,
@@ -76,7 +81,9 @@ impl<'a> Assessment<'a> {
             recorded,
             restarted: full.clone(),
             constant_velocity: [full.clone(), full.clone()],
+            constant_latent_velocity: [full.clone(), full.clone()],
             decoded: full.clone(),
+            over_stride: stride.map(|_| [(); 3].map(|()| full.clone())),
             full,
             pointwise: PointwiseSums::new(model),
             baselines: Baseline::all(&rule, &segments)?,
@@ -97,6 +104,18 @@ impl<'a> Assessment<'a> {
             let constant = assessment.constant_velocity.iter_mut();
             for (sums, rollout) in constant.zip([&full, &restarted]) {
                 sums.add_constant_velocity(segment, &latent, rollout);
+            }
+            let constant = assessment.constant_latent_velocity.iter_mut();
+            for (sums, rollout) in constant.zip([&full, &restarted]) {
+                sums.add_constant_latent_velocity(model, segment, &latent, rollout)?;
+            }
+            if let Some((restart, [own, constant, in_latent])) =
+                stride.zip(assessment.over_stride.as_mut())
+            {
+                let rollout = rollout(&compiled, &latent, restart);
+                own.add_rollout(model, segment, &latent, &rollout)?;
+                constant.add_constant_velocity(segment, &latent, &rollout);
+                in_latent.add_constant_latent_velocity(model, segment, &latent, &rollout)?;
             }
             assessment.pointwise.add(model, segment, &latent)?;
             assessment.decoded.add_decoded(model, segment, &latent)?;

@@ -5,7 +5,7 @@ use super::prediction::{prediction_error, recorded_stages, uninformed};
 use super::verdict::failure;
 use super::*;
 use crate::mpc::problem::has_links_or_cones;
-use crate::mpc::{Bounds, structured::MAX_STRUCTURED_DIM};
+use crate::mpc::{Bounds, Legs, structured::MAX_STRUCTURED_DIM};
 
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct StepTimes {
@@ -189,9 +189,10 @@ pub fn control_metrics(
     Ok(metrics)
 }
 
-/// Default settings, but at the rate of the slowest recording where that has fewer samples than a default stage.
-pub fn usual_settings(recordings: &[Recording]) -> MpcSettings {
-    let default = MpcSettings::default();
+/// Settings of a walk for a model with strides, otherwise the default ones; at the rate of the slowest recording where that
+/// has fewer samples than a default stage.
+pub fn usual_settings(model: &ReducedModel, recordings: &[Recording]) -> MpcSettings {
+    let default = crate::mpc::settings_for(model);
     let segments = recordings.iter().flat_map(|recording| &recording.segments);
     let steps = segments.filter(|segment| segment.len() >= 2);
     let slowest_s = steps.map(Segment::mean_step_s).fold(0.0, f64::max);
@@ -244,10 +245,11 @@ pub(super) fn recovery(
     for segment in recording.segments.iter().filter(|s| s.len() >= 2) {
         set_reference(controller, segment, ReferenceInput::Recorded)?;
         let samples = control_samples(&segment.time_s, step_s);
-        // Every foot that is on the ground stays there for the time of a window.
+        // Every foot that is on the ground stays there for the time of a window; a walk changes its feet.
+        let walks = controller.settings().legs == Legs::Reference;
         let stands = |window: &&[usize]| {
             let feet = &segment.feet[window[0]..=window[window_steps]];
-            feet[0].contains(&true) && feet.iter().all(|other| *other == feet[0])
+            feet[0].contains(&true) && (walks || feet.iter().all(|other| *other == feet[0]))
         };
         let windows = samples.windows(window_steps + 1).step_by(steps_between);
         let windows: Vec<&[usize]> = windows.filter(stands).collect();

@@ -131,6 +131,24 @@ impl CoordinateSums {
         self.windows += rollout.windows.len();
     }
 
+    /// The same of latent coordinates that keep the velocity at the start of each window, decoded: maps without dynamics.
+    pub(super) fn add_constant_latent_velocity(
+        &mut self,
+        model: &ReducedModel,
+        segment: &Segment,
+        latent: &LatentSegment,
+        rollout: &Rollout,
+    ) -> Result<(), ModelError> {
+        for (sample, window, _) in rollout.predictions() {
+            let start = window.samples.start;
+            let passed_s = latent.time_s[sample] - latent.time_s[start];
+            let z = latent.z.column(start) + latent.dz.column(start) * passed_s;
+            self.add(segment, sample, latent.phase[sample], &model.decode(&z)?);
+        }
+        self.windows += rollout.windows.len();
+        Ok(())
+    }
+
     pub(super) fn add(&mut self, segment: &Segment, sample: usize, phase: usize, x: &DVector<f64>) {
         for (row, y_hat) in x.iter().enumerate() {
             self.add_one(segment, sample, phase, (row, *y_hat));

@@ -13,12 +13,14 @@ const LEAST_RANK: usize = 2; // latent directions in which inputs act on the gro
 /// Of pitch and legs decoded from the encoded state: below it, the latent state does not represent them.
 const REPRESENTED_R2: f64 = 0.9;
 const WHOLE: &str = "whole motion";
+const STRIDE: &str = "a stride";
 const TORQUES: &str = "torques";
 const CONTROL: &str = "control";
 pub const TORQUES_IN_CONTACT: &str = "R^2 of torques in contact";
 pub const AFTER_A_PUSH: &str = "deviation after a push";
 const ONE_STAGE: &str = "error one stage ahead as a share of the baseline's";
 const CONSTANT_VELOCITY: &str = "constant velocity";
+const CONSTANT_LATENT_VELOCITY: &str = "constant latent velocity";
 const NO_DYNAMICS: &str = "no dynamics";
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -115,7 +117,7 @@ impl VerdictRow {
     }
 }
 
-/// Uses are `0.1 s` (predictions between restarts, by their time), `whole motion`, `torques` (those that the controller
+/// Uses are `0.1 s` (predictions between restarts, by their time), `whole motion`, of walks `a stride` instead, `torques` (those that the controller
 /// finds itself) and `control`; one that is not measured is in neither list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Verdict {
@@ -150,7 +152,7 @@ pub fn verdict(
     without_predictions(&mut of_control, fails_soon);
     rows.extend(of_control);
     let mut verdict = Verdict::default();
-    for of in [&short, WHOLE, TORQUES, CONTROL] {
+    for of in [&short, WHOLE, STRIDE, TORQUES, CONTROL] {
         let mut counted = rows.iter().filter(|row| row.of == of && row.counts);
         if counted.clone().any(VerdictRow::is_failed) {
             verdict.failed.push(of.to_owned());
@@ -167,7 +169,7 @@ pub fn verdict_by_default(
     recordings: &[Recording],
     assessment: &Assessment<'_>,
 ) -> (Verdict, Option<EvaluateError>) {
-    let settings = usual_settings(recordings);
+    let settings = usual_settings(model, recordings);
     let measured = recordings.iter();
     let measured = measured.map(|recording| control_metrics(model, recording, settings));
     match measured.collect::<Result<Vec<_>, _>>() {
@@ -181,31 +183,42 @@ pub fn verdict_by_default(
 
 fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> {
     let [whole, restarted] = &assessment.constant_velocity;
-    let shares = [(NO_BETTER, SHORT_SHARE), (WHOLE_SHARE, f64::INFINITY)];
-    let horizons = [
-        (short, &assessment.restarted, restarted),
-        (WHOLE, &assessment.full, whole),
-    ];
+    let [latent_whole, latent_restarted] = &assessment.constant_latent_velocity;
+    let soon = (NO_BETTER, SHORT_SHARE);
+    let long = match &assessment.over_stride {
+        // Without feedback the least deviation decides after a few strides where a walk is.
+        Some([own, constant, in_latent]) => ((STRIDE, own, [constant, in_latent]), soon),
+        None => (
+            (WHOLE, &assessment.full, [whole, latent_whole]),
+            (WHOLE_SHARE, f64::INFINITY),
+        ),
+    };
+    let constant = [restarted, latent_restarted];
+    let horizons = [((short, &assessment.restarted, constant), soon), long];
     let mut rows = Vec::new();
-    for ((of, own, constant), (of_own, of_both)) in horizons.into_iter().zip(shares) {
+    for ((of, own, [constant, in_latent]), (of_own, of_both)) in horizons {
         let rms = |sums: &CoordinateSums, names: &[&str]| joint_rms(assessment, sums, names);
         let [x, z] = ["body.x", "body.z"].map(|name| rms(constant, &[name]).unwrap_or(0.0));
         let row = |name: &str, names: &[&str], unit, limit: &dyn Fn(f64) -> f64| {
             let (value, baseline) = (rms(own, names)?, rms(constant, names)?);
+            let (name_of, baseline) = match rms(in_latent, names) {
+                Some(less) if less < baseline => (CONSTANT_LATENT_VELOCITY, less),
+                _ => (CONSTANT_VELOCITY, baseline),
+            };
             let value = match own.diverged {
                 0 => Some(value).filter(|_| x.hypot(z) > STILL_M),
                 _ => Some(f64::INFINITY),
             };
             let the = if of == WHOLE { "the " } else { "" };
             let name = format!("error of {name} over {the}{of}");
-            let against = (CONSTANT_VELOCITY, Some(baseline));
+            let against = (name_of, Some(baseline));
             let bound = (Bound::AtMost, limit(baseline));
             Some(VerdictRow::new((of, &name, unit), value, against, bound))
         };
         let limit = |baseline: f64| (of_own * baseline).min(of_both * x.hypot(z));
         let body = ["body.x", "body.z"].map(|name| row(name, &[name], "m", &limit));
         rows.extend(body.into_iter().flatten());
-        if of == WHOLE {
+        if of != short {
             continue; // open loop, the least difference at take-off decides where pitch and legs end
         }
         let in_plane = |name: &&str| name.ends_with(".hy") || name.ends_with(".kn");

@@ -17,4 +17,4 @@ pub use crate::online::*;
 pub use of_model::{
     LIFTS, MpcError, SOLVERS, STEP_SLACK, control_model, controller, words_of_setting,
 };
-pub use strides::{walk_settings, walk_strides};
+pub use strides::{settings_for, walk_settings, walk_strides};

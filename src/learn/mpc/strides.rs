@@ -19,6 +19,14 @@ pub fn walk_settings(robot: &Robot) -> MpcSettings {
     }
 }
 
+/// Settings of a walk for a model with strides, otherwise the default ones.
+pub fn settings_for(model: &ReducedModel) -> MpcSettings {
+    match (model.stride_prior(), model.robot()) {
+        (Ok(_), Ok(robot)) => walk_settings(robot),
+        _ => MpcSettings::default(),
+    }
+}
+
 /// The model's strides at the training's mean frequency, duty and height, which are affine in the velocity. A stand has the
 /// mean posture of each leg on the ground and the mean input.
 ///

@@ -10,7 +10,7 @@ use crate::recording::RecordingError;
 pub enum TrainError {
     #[error("no training recording was given")]
     NoRecording,
-    #[error("{found} jumps cannot be divided into {expected} sets")]
+    #[error("{found} motions cannot be divided into {expected} sets")]
     Split { found: usize, expected: usize },
     #[error(
         "{path}: {found} samples in a segment starting at row {row}, expected at least {expected}"

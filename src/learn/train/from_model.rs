@@ -55,7 +55,7 @@ struct Notes {
 const NO_SAMPLES: &str = "too few samples of the phase";
 const NO_BETTER: &str = "no change predicts left-out parts better";
 const ROLLOUTS: &str =
-    "with its changes, predictions over 0.1 s get no better, or whole jumps diverge";
+    "with its changes, predictions over 0.1 s get no better, or whole motions diverge";
 
 /// Refines `model` on recordings of `robot`, whose joints have the losses `actuators`.
 ///
