@@ -2,7 +2,7 @@
 
 use super::convert::write_recording;
 use super::*;
-use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict, WalkGoal, WalkPlan};
+use crate::plan::{self, Goal, GoalMap, Plan, PlanSettings, Verdict, WalkGoal, WalkMap, WalkPlan};
 
 const DURATION_S: f64 = 5.0; // of a walk
 
@@ -45,6 +45,13 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     let settings = settings.map(|path| read_settings(path, PlanSettings::check));
     let settings = settings.transpose()?.unwrap_or_default();
     let figures = arguments.figures.as_deref();
+    if arguments.reach && model.jump_prior().is_err() && model.stride_prior().is_ok() {
+        let map = plan::walk_reach(&model)?;
+        let mut answer = walk_reach_answer(arguments, &map);
+        let drawn = || Ok(vec![walk_reach_figure(&map)]);
+        inputs.write_figures(figures, drawn, arguments.force, &mut answer)?;
+        return Ok(answer);
+    }
     if arguments.reach {
         let bar = progress_bar("planning a grid of goals");
         let progress = |done, total| show_progress(&bar, done, total);
@@ -193,6 +200,35 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     extend(&mut json, plan_json(planned));
     json["output"] = json!(shown(&arguments.output));
     Answer::new(text, json)
+}
+
+fn walk_reach_answer(arguments: &PlanArguments, map: &WalkMap) -> Answer {
+    let speeds = map.speeds_m_s.iter().map(|speed| format!("{speed:.2}"));
+    let corner = "yaw rate, rad/s \\ speed, m/s".to_owned();
+    let mut table = Table::new(std::iter::once(corner).chain(speeds));
+    let rows = map.points.chunks_exact(map.speeds_m_s.len());
+    for (yaw_rate, row) in map.yaw_rates_rad_s.iter().zip(rows).rev() {
+        let cells = row.iter().map(|point| match point.status {
+            "trusted" => format!("{:.0}", 100.0 * point.torque_share),
+            _ => format!("({:.0})", 100.0 * point.torque_share),
+        });
+        table.row(std::iter::once(format!("{yaw_rate:.2}")).chain(cells));
+    }
+    let points = map.points.iter().map(|point| {
+        json!({
+            "speed_m_s": point.speed_m_s,
+            "yaw_rate_rad_s": point.yaw_rate_rad_s,
+            "status": point.status,
+            "torque_share": point.torque_share,
+        })
+    });
+    let model = arguments.model.display().to_string();
+    let text = format!(
+        "{model}: largest torque of planned walks, % of its limit\n\n{table}\nin brackets: beyond the recorded \
+         walks; farther ones are refused\n"
+    );
+    let points = points.collect::<Vec<_>>();
+    Answer::new(text, json!({ "model": model, "reach": points }))
 }
 
 fn reach_answer(arguments: &PlanArguments, reach: &GoalMap) -> Answer {

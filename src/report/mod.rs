@@ -23,7 +23,7 @@ pub(crate) use figures::{Figure, figure_files, range};
 pub(crate) use introduction::{Introduction, introduction};
 pub(crate) use log::{LogFacts, log_figures, log_page};
 pub(crate) use page::{PageOptions, page};
-pub(crate) use plan::{plan_figures, reach_figure};
+pub(crate) use plan::{plan_figures, reach_figure, walk_reach_figure};
 pub(crate) use tables::{
     NamedRun, baseline_table, body_rms, control_table, coordinate_table, dynamics_table,
     failed_runs, failures, horizon_json, horizon_table, invariance_table, phase_table, run_table,
@@ -47,7 +47,7 @@ use crate::evaluate::{
     TORQUES_IN_CONTACT, Verdict,
 };
 use crate::model::{JumpPrior, ModelError, ReducedModel};
-use crate::plan::{GoalMap, Plan};
+use crate::plan::{GoalMap, MappedWalk, Plan, WalkMap};
 use crate::recording::{Segment, stretches};
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot, STATE_DIM};
 use crate::typeset::mathml::{HTML, HtmlProse, HtmlText, system};

@@ -124,6 +124,33 @@ pub(crate) fn reach_figure(reach: &GoalMap, prior: &JumpPrior) -> Figure {
     figure.over("distance, m").in_columns(1, (420.0, 280.0))
 }
 
+/// Largest torques of planned walks over the speed: straight on, and turning as much as was recorded.
+pub(crate) fn walk_reach_figure(map: &WalkMap) -> Figure {
+    let line = |role, yaw_rate: f64| {
+        let near = |point: &&MappedWalk| (point.yaw_rate_rad_s - yaw_rate).abs() < 1e-9;
+        let points = map.points.iter().filter(near);
+        let points = points.map(|point| (point.speed_m_s, Some(100.0 * point.torque_share)));
+        Series::through(role, points)
+    };
+    let rates = &map.yaw_rates_rad_s;
+    let (middle, last) = (rates.len() / 2, rates.len() - 1);
+    let roles = [
+        (Role::Restarted, 0),
+        (Role::Full, middle),
+        (Role::Recorded, last),
+    ];
+    let names = roles.map(|(role, k)| (role, format!("{:.2} rad/s", rates[k])));
+    let legend: Vec<(Role, &str)> = names
+        .iter()
+        .map(|(role, name)| (*role, name.as_str()))
+        .collect();
+    let series = roles.map(|(role, k)| line(role, rates[k])).into();
+    let caption = "Largest torque of walks that can be planned, by speed and yaw rate.";
+    let panels = vec![Panel::lines("torque, % of its limit", series)];
+    let figure = Figure::over_time("plan_walk_reach", caption, panels, &legend);
+    figure.over("speed, m/s").in_columns(1, (420.0, 280.0))
+}
+
 fn border(reach: &GoalMap, role: Role, words: &[&str]) -> Series {
     let rows = reach.points.chunks_exact(reach.distances_m.len());
     let stretches = rows.zip(&reach.apexes_m).filter_map(|(row, apex)| {

@@ -147,3 +147,22 @@ fn walk_is_written_with_the_settings_of_its_controller_or_refused() {
         "{fine}"
     );
 }
+
+#[test]
+fn torques_of_planned_walks_grow_with_speed_and_turning_and_the_ends_extrapolate() {
+    let model = romc::artifact::read(Path::new(&trot())).expect("shipped");
+    let map = romc::plan::walk_reach(&model).expect("strides");
+    let (columns, rows) = (map.speeds_m_s.len(), map.yaw_rates_rad_s.len());
+    assert_eq!(map.points.len(), columns * rows);
+    let at = |row: usize, column: usize| &map.points[row * columns + column];
+    let middle = rows / 2;
+    assert_eq!(at(middle, columns / 2).status, "trusted");
+    for corner in [at(0, 0), at(0, columns - 1), at(rows - 1, columns - 1)] {
+        assert_eq!(corner.status, "extrapolates");
+    }
+    for column in 1..columns {
+        let [slower, faster] = [column - 1, column].map(|k| at(middle, k).torque_share);
+        assert!(slower < faster && faster < 1.0, "{slower} {faster}");
+        assert!(at(middle, column).torque_share < at(0, column).torque_share);
+    }
+}

@@ -305,7 +305,7 @@ pub(crate) struct PlanArguments {
     /// Folder for figures of posture, body path, torques and phases, or of the reach: SVG, PDF, CSV
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
-    /// Plan a grid of distances and apexes instead, and say which can be reached
+    /// Plan a grid of distances and apexes instead, of walks of speeds and yaw rates, and say which can be reached
     #[arg(long, conflicts_with_all = ["distance", "apex", "start", "output"])]
     pub reach: bool,
     /// Weights and bounds of the plan, a TOML file with the names of `docs/planning.md`

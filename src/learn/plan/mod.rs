@@ -24,7 +24,7 @@ mod walk;
 pub use settings::{Goal, PlanError, PlanSettings};
 pub use solve::{GoalMap, MappedGoal, Plan, PlannedPart, plan, reach};
 pub use verdict::Verdict;
-pub use walk::{WalkGoal, WalkPlan, walk};
+pub use walk::{MappedWalk, WalkGoal, WalkMap, WalkPlan, walk, walk_reach};
 
 type Result<T, E = PlanError> = std::result::Result<T, E>;
 

@@ -5,6 +5,9 @@ use crate::model::{GAIT_DIM, StridePrior};
 
 const SOURCE: &str = "plan";
 const MOST_SAMPLES: f64 = 1e6;
+const SPEEDS: usize = 8; // of a map
+const YAW_RATES: usize = 7;
+const STRIDES: f64 = 2.0; // of each of its walks
 const SMOOTHED: usize = 2; // samples beside each that velocities are averaged over
 const NAMES: [(&str, &str); 3] = [
     ("speed", "m/s"),
@@ -32,6 +35,69 @@ pub struct WalkPlan {
     pub duty: f64,
     pub height_m: f64,
     pub verdict: Verdict,
+}
+
+/// Walks over a grid of speeds and yaw rates, a row a yaw rate.
+#[derive(Clone, Debug)]
+pub struct WalkMap {
+    pub speeds_m_s: Vec<f64>,
+    pub yaw_rates_rad_s: Vec<f64>,
+    pub points: Vec<MappedWalk>,
+}
+
+#[derive(Clone, Debug)]
+pub struct MappedWalk {
+    pub speed_m_s: f64,
+    pub yaw_rate_rad_s: f64,
+    pub status: &'static str,
+    /// Largest torque of a motor, as a share of its limit.
+    pub torque_share: f64,
+}
+
+/// Plans walks up to the ends of what is planned for at all.
+///
+/// # Errors
+/// Those of [`walk`].
+pub fn walk_reach(model: &ReducedModel) -> Result<WalkMap> {
+    let (prior, limits) = (model.stride_prior()?, model.robot()?.torque_limit_nm());
+    let [speeds_m_s, yaw_rates_rad_s] = [(0, SPEEDS), (2, YAW_RATES)].map(|(axis, count)| {
+        let [least, most] = prior.gait[axis].reach();
+        let share = |k: usize| k as f64 / (count - 1) as f64;
+        (0..count)
+            .map(|k| least + share(k) * (most - least))
+            .collect::<Vec<f64>>()
+    });
+    let mut points = Vec::with_capacity(SPEEDS * YAW_RATES);
+    for &yaw_rate_rad_s in &yaw_rates_rad_s {
+        for &speed_m_s in &speeds_m_s {
+            let goal = WalkGoal {
+                speed_m_s,
+                yaw_rate_rad_s,
+                duration_s: STRIDES / prior.gait[3].mean,
+            };
+            let planned = walk(model, &goal)?;
+            let torques = planned.motion.torque_nm.column_iter();
+            let shares = torques.flat_map(|column| {
+                let pairs: Vec<f64> = column
+                    .iter()
+                    .zip(limits)
+                    .map(|(t, limit)| t.abs() / limit)
+                    .collect();
+                pairs
+            });
+            points.push(MappedWalk {
+                speed_m_s,
+                yaw_rate_rad_s,
+                status: planned.verdict.word(),
+                torque_share: shares.fold(0.0, f64::max),
+            });
+        }
+    }
+    Ok(WalkMap {
+        speeds_m_s,
+        yaw_rates_rad_s,
+        points,
+    })
 }
 
 /// A stride of the goal's gait, over and over: half a stride as the prior has it, half as the mirror image of the gait turning
