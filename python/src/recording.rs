@@ -283,6 +283,7 @@ pub fn from_arrays(py: Python<'_>, name: &str, arrays: Arrays<'_>) -> PyResult<R
             .collect(),
         time_s: t.as_array().to_vec(),
         body_wrench: None,
+        is_walk: false,
     };
     let recording = romc::recording::Recording {
         path: PathBuf::from(name),

@@ -74,6 +74,7 @@ fn hop(phase: f64) -> Segment {
         torque_nm: DMatrix::zeros(JOINT_DIM, N),
         feet: (0..N).map(feet).collect(),
         body_wrench: None,
+        is_walk: false,
     };
     for sample in 0..N {
         let t = segment.time_s[sample];

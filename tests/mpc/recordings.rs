@@ -25,6 +25,7 @@ fn recording(trajectory: &Trajectory) -> Recording {
         torque_nm: input.rows(0, 12).into_owned(),
         feet: trajectory.feet.clone(),
         body_wrench: Some(input.rows(12, 6).into_owned()),
+        is_walk: false,
     };
     Recording {
         path: "synthetic.csv".into(),

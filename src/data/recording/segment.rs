@@ -3,6 +3,7 @@
 use super::preprocess::moving_average;
 use super::*;
 
+const WALK_WINDOW_S: f64 = 0.01; // the same in walks
 const ACCELERATION_WINDOW_S: f64 = 0.02; // joint accelerations are averaged over it before motor inertia counts
 
 pub(crate) type Rows = DMatrix<f64>; // quantities by row, one column a sample
@@ -63,6 +64,8 @@ pub struct Segment {
     pub feet: Vec<ContactFlags>,
     /// `[F_lin; F_ang]`, 6 x n (N, N m), when the file carries it.
     pub body_wrench: Option<DMatrix<f64>>,
+    /// Whether it is part of a walk, whose feet stand for a tenth of a second each.
+    pub is_walk: bool,
 }
 
 /// The longest stretches of samples in which each is like the one before it, by `alike(before, sample)`.
@@ -103,6 +106,7 @@ impl Segment {
             torque_nm: zeros(JOINT_DIM),
             feet: vec![[true; 4]; time_s.len()],
             body_wrench: None,
+            is_walk: false,
             time_s,
         }
     }
@@ -125,6 +129,7 @@ impl Segment {
             torque_nm: samples(&self.torque_nm),
             feet,
             body_wrench: self.body_wrench.as_ref().map(samples),
+            is_walk: self.is_walk,
         }
     }
 
@@ -204,15 +209,29 @@ impl Segment {
     }
 
     /// Accelerations, 18 x n: [`Self::ddx`] averaged over 20 ms within stretches of equal contact (a foot down, or none),
-    /// so that noise and the spikes of landings do not become torques.
+    /// so that noise and the spikes of landings do not become torques; of a walk over 10 ms within stretches of the same feet:
+    /// the spike of a touchdown belongs to the stance that it begins.
     fn smoothed_accelerations(&self) -> DMatrix<f64> {
+        let (window_s, stretches) = match self.is_walk {
+            true => (
+                WALK_WINDOW_S,
+                stretches(0..self.len(), |a, b| self.feet[a] == self.feet[b]),
+            ),
+            false => (
+                ACCELERATION_WINDOW_S,
+                self.contacts()
+                    .into_iter()
+                    .map(|(stretch, _)| stretch)
+                    .collect(),
+            ),
+        };
         let half = match self.mean_step_s() {
-            step if step > 0.0 => (0.5 * ACCELERATION_WINDOW_S / step).round() as usize,
+            step if step > 0.0 => (0.5 * window_s / step).round() as usize,
             _ => 0,
         };
         let window = 2 * half.min(self.len()) + 1;
         let mut out = DMatrix::zeros(STATE_DIM, self.len());
-        for (stretch, _) in self.contacts() {
+        for stretch in stretches {
             let own = self.ddx.columns_range(stretch.clone()).into_owned();
             (out.columns_range_mut(stretch)).copy_from(&moving_average(&own, window));
         }
@@ -349,6 +368,7 @@ pub(super) fn divided(mut whole: Segment, has_acceleration: bool) -> Outcome<Vec
             let fault = RecordingFault::number(&found, "a finite number");
             return Err(fault.in_cell(&segment.path, row + place / STATE_DIM, &column));
         }
+        segment.is_walk = stride_s(std::iter::once(&*segment)).is_some();
     }
     Ok(segments)
 }

@@ -131,6 +131,7 @@ pub fn walk(model: &ReducedModel, goal: &WalkGoal) -> Result<WalkPlan> {
     let count = steps as usize + 1;
     let times = (0..count).map(|sample| sample as f64 * sample_time_s);
     let mut motion = Segment::still(SOURCE, times.collect());
+    motion.is_walk = true;
     let mut net = DMatrix::zeros(JOINT_DIM, count);
     for sample in 0..count {
         let time_s = motion.time_s[sample];
