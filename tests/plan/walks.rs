@@ -166,3 +166,39 @@ fn torques_of_planned_walks_grow_with_speed_and_turning_and_the_ends_extrapolate
         assert!(at(middle, column).torque_share < at(0, column).torque_share);
     }
 }
+
+/// A walk that repeats the mean stride is predicted by it, and not by a constant velocity.
+#[test]
+fn mean_stride_predicts_a_planned_walk() {
+    use romc::evaluate::{Assessment, Horizon};
+    use romc::recording::Recording;
+
+    let model = romc::artifact::read(Path::new(&trot())).expect("shipped");
+    let goal = WalkGoal {
+        speed_m_s: 0.5,
+        yaw_rate_rad_s: 0.0,
+        duration_s: 3.0,
+    };
+    let recordings = [Recording {
+        path: "walk.csv".into(),
+        segments: vec![walk(&model, &goal).expect("strides").motion],
+        ignored_columns: Vec::new(),
+    }];
+    let assessment = Assessment::over(&model, &recordings, 0.1).expect("encodes");
+    let horizons = Horizon::all(&model, &assessment).expect("a walk");
+    let stride = horizons
+        .iter()
+        .find(|horizon| horizon.name.starts_with("stride"));
+    let rms = |of: &str| {
+        let predictors = &stride.expect("a stride").predictors;
+        let (_, sums) = predictors
+            .iter()
+            .find(|(name, _)| *name == of)
+            .expect("of walks");
+        let [x, z] =
+            ["body.x", "body.z"].map(|name| assessment.fit(sums, name).expect("varies").rms);
+        x.hypot(z)
+    };
+    let [mean, constant] = ["mean stride", "constant velocity"].map(rms);
+    assert!(mean < 5e-4 && mean < 0.1 * constant, "{mean} {constant}");
+}

@@ -1,5 +1,5 @@
 //! Prediction errors of all coordinates over several horizons, compared with baselines: a constant velocity, a robot at
-//! rest, the mean training jump, a rigid body, and of walks a linear inverted pendulum.
+//! rest, the mean training jump, a rigid body, and of walks the mean training stride and a linear inverted pendulum.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -14,6 +14,7 @@ const MODEL: &str = "model";
 const CONSTANT_VELOCITY: &str = "constant velocity";
 const AT_REST: &str = "at rest";
 const MEAN_JUMP: &str = "mean training jump";
+const MEAN_STRIDE: &str = "mean stride";
 const RIGID_BODY: &str = "rigid body";
 const PENDULUM: &str = "pendulum";
 
@@ -23,6 +24,7 @@ struct Motion<'a> {
     latent: Cow<'a, LatentSegment>,
     rigid_body: Option<DMatrix<f64>>, // 6 x n
     pendulum: Option<Pendulum>,
+    stride: Option<MeanStride>,
 }
 
 impl<'a> Horizon {
@@ -40,6 +42,8 @@ impl<'a> Horizon {
         let names = names.chain(baselines.mean_jump.as_ref().map(|_| MEAN_JUMP));
         let names = names.chain(baselines.rigid_body.as_ref().map(|_| RIGID_BODY));
         let names = names.chain(stride_s.map(|_| PENDULUM));
+        let has_strides = stride_s.is_some() && model.stride_prior().is_ok();
+        let names = names.chain(has_strides.then_some(MEAN_STRIDE));
         let sums = CoordinateSums::new(model)?;
         let predictors: Vec<_> = names.map(|name| (name, sums.clone())).collect();
         let motion = |segment: Cow<'a, Segment>, latent: Cow<'a, LatentSegment>| {
@@ -51,6 +55,7 @@ impl<'a> Horizon {
                     .map(|body| body.accelerations(&segment))
                     .transpose()?,
                 pendulum,
+                stride: stride_s.and_then(|stride_s| MeanStride::of(model, &segment, stride_s)),
                 segment,
                 latent,
             })
@@ -133,6 +138,10 @@ impl<'a> Horizon {
                             from + after - before
                         })
                     }
+                    MEAN_STRIDE => (motion.stride.as_ref()).map(|stride| {
+                        let [before, after] = [start, sample].map(|k| segment.time_s[k]);
+                        from + stride.at(after) - stride.at(before)
+                    }),
                     PENDULUM => {
                         let pendulum = motion.pendulum.as_ref();
                         let moved = pendulum.map(|of| of.moved(segment, start..sample));
@@ -215,6 +224,63 @@ impl MeanJump {
     fn at(&self, time_s: f64) -> DVector<f64> {
         let (left, right, share) = between(&self.time_s, time_s);
         self.x[left].lerp(&self.x[right], share)
+    }
+}
+
+/// The training's mean stride at the speed, yaw rate and height that a motion has in the mean, in step with its touchdowns. A
+/// prediction is the change along it.
+struct MeanStride {
+    nodes: DMatrix<f64>, // n x 40, see StridePrior
+    stride_s: f64,
+    touchdown_s: f64,
+    velocity: [(usize, f64); 3],
+}
+
+impl MeanStride {
+    /// None for a model without strides, and for a motion in which no pair of feet comes down.
+    fn of(model: &ReducedModel, segment: &Segment, stride_s: f64) -> Option<Self> {
+        let (prior, robot) = (model.stride_prior().ok()?, model.robot().ok()?);
+        // The stride begins with the front right foot and the one across it; the others come half a stride later.
+        let pairs = [([0, 3], 0.0), ([1, 2], 0.5 * stride_s)];
+        let touchdown = |sample: usize| {
+            let is_up = |sample: usize, pair: [usize; 2]| {
+                !pair.iter().any(|&foot| segment.feet[sample][foot])
+            };
+            let comes =
+                |(pair, _): &([usize; 2], f64)| is_up(sample - 1, *pair) && !is_up(sample, *pair);
+            let late_s = pairs.iter().find(|pair| comes(pair))?.1;
+            Some(segment.time_s[sample] - late_s)
+        };
+        let touchdown_s = (1..segment.len()).find_map(touchdown)?;
+        let (last, duration_s) = (segment.len() - 1, segment.duration_s());
+        let velocity = [BODY_X, BODY_X + 1, BODY_X + 5].map(|row| {
+            (
+                row,
+                (segment.x[(row, last)] - segment.x[(row, 0)]) / duration_s,
+            )
+        });
+        let [forward, left, turn] = velocity.map(|(_, rate)| rate);
+        let (duty, height) = (prior.gait[4].mean, segment.x.row(BODY_Z).mean());
+        let gait = [forward, left, turn, 1.0 / stride_s, duty, height];
+        Some(Self {
+            nodes: prior.stride(robot, &gait),
+            stride_s,
+            touchdown_s,
+            velocity,
+        })
+    }
+
+    fn at(&self, time_s: f64) -> DVector<f64> {
+        let count = self.nodes.nrows();
+        let passed_s = time_s - self.touchdown_s;
+        let place = (passed_s / self.stride_s).rem_euclid(1.0) * count as f64;
+        let (node, share) = (place as usize % count, place.fract());
+        let [from, to] = [node, (node + 1) % count].map(|node| self.nodes.row(node));
+        let mut x = DVector::from_fn(STATE_DIM, |i, _| from[i] + share * (to[i] - from[i]));
+        for (row, rate) in self.velocity {
+            x[row] += rate * passed_s;
+        }
+        x
     }
 }
 
