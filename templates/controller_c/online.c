@@ -217,7 +217,7 @@ static const real ONLINE_WEIGHTS[4] = {(real)(1.0 / 6.0), (real)(1.0 / 3.0), (re
 
 /* Lower Cholesky factor of a row-major symmetric matrix in place of its lower triangle; false if it is not positive
  * definite. */
-static inline MAYBE_UNUSED bool online_factorise(real *matrix, int dim)
+static MAYBE_UNUSED bool online_factorise(real *matrix, int dim)
 {
     for (int i = 0; i < dim; ++i) {
         for (int j = 0; j <= i; ++j) {
@@ -238,7 +238,7 @@ static inline MAYBE_UNUSED bool online_factorise(real *matrix, int dim)
 }
 
 /* L^-1 b in place of b. */
-static inline MAYBE_UNUSED void online_solve_lower(const real *factor, int dim, real *restrict b)
+static MAYBE_UNUSED void online_solve_lower(const real *factor, int dim, real *restrict b)
 {
     for (int i = 0; i < dim; ++i) {
         for (int k = 0; k < i; ++k) {
@@ -249,7 +249,7 @@ static inline MAYBE_UNUSED void online_solve_lower(const real *factor, int dim, 
 }
 
 /* L^-T b in place of b. */
-static inline MAYBE_UNUSED void online_solve_upper(const real *factor, int dim, real *restrict b)
+static MAYBE_UNUSED void online_solve_upper(const real *factor, int dim, real *restrict b)
 {
     for (int i = dim - 1; i >= 0; --i) {
         for (int k = i + 1; k < dim; ++k) {
@@ -260,7 +260,7 @@ static inline MAYBE_UNUSED void online_solve_upper(const real *factor, int dim, 
 }
 
 /* sum += factor values. */
-static inline MAYBE_UNUSED void online_add_scaled(real factor, const real *values, int dim, real *restrict sum)
+static MAYBE_UNUSED void online_add_scaled(real factor, const real *values, int dim, real *restrict sum)
 {
     for (int i = 0; i < dim; ++i) {
         sum[i] += factor * values[i];
@@ -269,8 +269,8 @@ static inline MAYBE_UNUSED void online_add_scaled(real factor, const real *value
 
 /* Adds S B^T (B S B^T + R)^-1 y to an input, unless the sum in brackets is not positive definite. Matrices are
  * row-major; y is overwritten. */
-static inline MAYBE_UNUSED void online_add_correction(const real *gain, const real *covariance, const real *residual,
-        int d, real *restrict unexplained, real *restrict input)
+static MAYBE_UNUSED void online_add_correction(const real *gain, const real *covariance, const real *residual, int d,
+        real *restrict unexplained, real *restrict input)
 {
     real spread[D * D] = {0};
     real square[D * D] = {0};
@@ -307,7 +307,7 @@ static inline MAYBE_UNUSED void online_add_correction(const real *gain, const re
 
 /* Turns a leg whose foot is along the normal where it should be; of sines and cosines the third is that of the
  * calf's angle, the sum of the second and third joint's. */
-static inline MAYBE_UNUSED void online_posture_turn(online_posture *restrict self, const online_leg_shape *leg,
+static MAYBE_UNUSED void online_posture_turn(online_posture *restrict self, const online_leg_shape *leg,
         const real *sine, const real *cosine)
 {
     for (int k = 0; k < 3; ++k) {
@@ -328,7 +328,7 @@ static inline MAYBE_UNUSED void online_posture_turn(online_posture *restrict sel
 }
 
 /* Turns a leg by the angles of its joints, rad. */
-static inline MAYBE_UNUSED void online_posture_bend(online_posture *restrict self, const online_leg_shape *leg,
+static MAYBE_UNUSED void online_posture_bend(online_posture *restrict self, const online_leg_shape *leg,
         const real *q)
 {
     const real calf = q[1] + leg->knee * q[2];
@@ -339,7 +339,7 @@ static inline MAYBE_UNUSED void online_posture_bend(online_posture *restrict sel
 }
 
 /* A leg at the angles of its joints, rad. */
-static inline MAYBE_UNUSED online_posture online_posture_bent(const online_leg_shape *leg, const real *q)
+static MAYBE_UNUSED online_posture online_posture_bent(const online_leg_shape *leg, const real *q)
 {
     online_posture posture = {.frame = {{0}}, .foot = {0}, .by_first = {0}, .limb = {0}, .calf = {0}};
     online_posture_bend(&posture, leg, q);
@@ -347,8 +347,7 @@ static inline MAYBE_UNUSED online_posture online_posture_bent(const online_leg_s
 }
 
 /* Writes a vector of the frame in the body's axes. */
-static inline MAYBE_UNUSED void online_posture_write_in_body(online_posture *self, const real *vector,
-        real out[restrict 3])
+static MAYBE_UNUSED void online_posture_write_in_body(online_posture *self, const real *vector, real out[restrict 3])
 {
     for (int i = 0; i < 3; ++i) {
         out[i] = self->frame[0][i] * vector[0] + self->frame[1][i] * vector[1] + self->frame[2][i] * vector[2];
@@ -356,19 +355,19 @@ static inline MAYBE_UNUSED void online_posture_write_in_body(online_posture *sel
 }
 
 /* Area that thigh and calf span, with its sign, m^2. */
-static inline MAYBE_UNUSED real online_posture_area(online_posture *self)
+static MAYBE_UNUSED real online_posture_area(online_posture *self)
 {
     return self->limb[1] * self->calf[0] - self->limb[0] * self->calf[1];
 }
 
 /* Lever of the first joint along the normal, m; times the area it is det J, up to the sign. */
-static inline MAYBE_UNUSED real online_posture_lever(online_posture *self)
+static MAYBE_UNUSED real online_posture_lever(online_posture *self)
 {
     return -self->by_first[1];
 }
 
 /* Writes J[i][j] = d p_i / d q_j of the foot in the body's axes, m. */
-static inline MAYBE_UNUSED void online_posture_write_jacobian(online_posture *self, const online_leg_shape *leg,
+static MAYBE_UNUSED void online_posture_write_jacobian(online_posture *self, const online_leg_shape *leg,
         real jacobian[restrict 3][3])
 {
     real first[3] = {0};
@@ -383,7 +382,7 @@ static inline MAYBE_UNUSED void online_posture_write_jacobian(online_posture *se
 }
 
 /* Writes -J^-T by cofactors; false if there is none. */
-static inline MAYBE_UNUSED bool online_minus_inverse_transpose(real j[3][3], real out[restrict 3][3])
+static MAYBE_UNUSED bool online_minus_inverse_transpose(real j[3][3], real out[restrict 3][3])
 {
     const real minor_0 = j[1][1] * j[2][2] - j[1][2] * j[2][1];
     const real minor_1 = j[0][1] * j[2][2] - j[0][2] * j[2][1];
@@ -405,7 +404,7 @@ static inline MAYBE_UNUSED bool online_minus_inverse_transpose(real j[3][3], rea
 }
 
 /* 1 / d, but d / least^2 where |d| is below the least. */
-static inline MAYBE_UNUSED real online_damped_reciprocal(real d, real least)
+static MAYBE_UNUSED real online_damped_reciprocal(real d, real least)
 {
     const real square = d * d;
     const real smallest = least * least;
@@ -413,7 +412,7 @@ static inline MAYBE_UNUSED real online_damped_reciprocal(real d, real least)
 }
 
 /* Writes -J^-T with damped levers. */
-static inline MAYBE_UNUSED void online_posture_write_damped(online_posture *self, const online_leg_shape *leg,
+static MAYBE_UNUSED void online_posture_write_damped(online_posture *self, const online_leg_shape *leg,
         real map[restrict 3][3])
 {
     const real of_area = online_damped_reciprocal(online_posture_area(self), leg->least[0]);
@@ -436,7 +435,7 @@ static inline MAYBE_UNUSED void online_posture_write_damped(online_posture *self
 
 /* Writes -J^-T of a leg, which takes its torques (N m) to its force on the body (N), and where its foot is from the
  * first joint, m. With levers that are never shorter than the least; or exact, then false where the leg is stretched. */
-static inline MAYBE_UNUSED bool online_write_force_map(const online_leg_shape *leg, const real *q, bool is_exact,
+static MAYBE_UNUSED bool online_write_force_map(const online_leg_shape *leg, const real *q, bool is_exact,
         real map[restrict 3][3], real foot[restrict 3])
 {
     online_posture posture = online_posture_bent(leg, q);
@@ -456,7 +455,7 @@ static inline MAYBE_UNUSED bool online_write_force_map(const online_leg_shape *l
 }
 
 /* Writes the moment of a force at a foot about where its hip is from. */
-static inline MAYBE_UNUSED void online_write_moment(const real *hip, const real *foot, const real *force,
+static MAYBE_UNUSED void online_write_moment(const real *hip, const real *foot, const real *force,
         real *restrict moment)
 {
     real arm[3] = {hip[0] + foot[0], hip[1] + foot[1], hip[2] + foot[2]};
@@ -467,7 +466,7 @@ static inline MAYBE_UNUSED void online_write_moment(const real *hip, const real 
 
 /* Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false
  * if the torques are not finite or the leg has no force map. The angles must be finite. */
-static inline MAYBE_UNUSED bool online_add_wrench(const online_leg_shape *leg, const real *hip, const real *q,
+static MAYBE_UNUSED bool online_add_wrench(const online_leg_shape *leg, const real *hip, const real *q,
         const real *torque, real *restrict wrench)
 {
     real map[3][3] = {{0}};
@@ -491,7 +490,7 @@ static inline MAYBE_UNUSED bool online_add_wrench(const online_leg_shape *leg, c
 }
 
 /* Writes row C. */
-static inline MAYBE_UNUSED void online_by_deviation(const real *row, const real *deviation, real *restrict out)
+static MAYBE_UNUSED void online_by_deviation(const real *row, const real *deviation, real *restrict out)
 {
     for (int j = 0; j < 12; ++j) {
         out[j] = 0;
@@ -502,7 +501,7 @@ static inline MAYBE_UNUSED void online_by_deviation(const real *row, const real 
 }
 
 /* Rows on the torques become rows on v. */
-static inline MAYBE_UNUSED void online_change_rows(const real *hessian, const real *deviation, int count,
+static MAYBE_UNUSED void online_change_rows(const real *hessian, const real *deviation, int count,
         real *restrict rows)
 {
     real changed[12] = {0};
@@ -516,13 +515,13 @@ static inline MAYBE_UNUSED void online_change_rows(const real *hessian, const re
 }
 
 /* The torque within a limit that is nearest to this one; zero for what is not a number. */
-static inline MAYBE_UNUSED real online_clamped_torque(real torque, real limit)
+static MAYBE_UNUSED real online_clamped_torque(real torque, real limit)
 {
     return torque >= -limit ? (torque > limit ? limit : torque) : torque < 0 ? -limit : 0;
 }
 
 /* The first of these numbers that is infinite or undefined; count without one. */
-static inline MAYBE_UNUSED int online_first_undefined(const real *values, int count)
+static MAYBE_UNUSED int online_first_undefined(const real *values, int count)
 {
     for (int i = 0; i < count; ++i) {
         if (!solver_is_finite_number(values[i])) {
@@ -533,7 +532,7 @@ static inline MAYBE_UNUSED int online_first_undefined(const real *values, int co
 }
 
 /* Height of a leg's foot at a state of the robot, m; q are the leg's angles. */
-static inline MAYBE_UNUSED real online_foot_height(const online_leg_shape *leg, const real *hip, const real *x,
+static MAYBE_UNUSED real online_foot_height(const online_leg_shape *leg, const real *hip, const real *x,
         const real *q)
 {
     online_posture posture = online_posture_bent(leg, q);
@@ -545,7 +544,7 @@ static inline MAYBE_UNUSED real online_foot_height(const online_leg_shape *leg, 
 }
 
 /* Writes A and y_0; false if a number is not finite. wrench is G; matrices are row-major. */
-static inline MAYBE_UNUSED bool online_free_optimum(const real *projection, const real *wrench, const real *mean,
+static MAYBE_UNUSED bool online_free_optimum(const real *projection, const real *wrench, const real *mean,
         const real *deviation, const real *u_lat, real prior_weight, int d, real *restrict scaled_map,
         real *restrict y)
 {
@@ -594,14 +593,14 @@ static inline MAYBE_UNUSED bool online_free_optimum(const real *projection, cons
 }
 
 /* Whether times are the same but for rounding. */
-static inline MAYBE_UNUSED bool online_is_same_time(double time_s, double other_s)
+static MAYBE_UNUSED bool online_is_same_time(double time_s, double other_s)
 {
     const double off_s = time_s - other_s;
     return off_s < ONLINE_TIME_TOLERANCE_S && off_s > -ONLINE_TIME_TOLERANCE_S;
 }
 
 /* Moves torques that are with the losses beyond the limits to these. */
-static inline MAYBE_UNUSED void online_keep_limits(const real *limit_nm, const real *losses_nm, real *restrict torque)
+static MAYBE_UNUSED void online_keep_limits(const real *limit_nm, const real *losses_nm, real *restrict torque)
 {
     for (int i = 0; i < 12; ++i) {
         const real least = -limit_nm[i] - losses_nm[i];
@@ -612,20 +611,20 @@ static inline MAYBE_UNUSED void online_keep_limits(const real *limit_nm, const r
 }
 
 /* The larger of two numbers; the second if the first is not one. */
-static inline MAYBE_UNUSED real online_greater(real value, real other)
+static MAYBE_UNUSED real online_greater(real value, real other)
 {
     return value > other ? value : other;
 }
 
 /* The smaller of two numbers; the second if the first is not one. */
-static inline MAYBE_UNUSED real online_smaller(real value, real other)
+static MAYBE_UNUSED real online_smaller(real value, real other)
 {
     return value < other ? value : other;
 }
 
 /* Legs in the air keep the torques of the reference, or none at the links where those are not known, within the limits. */
-static inline MAYBE_UNUSED void online_keep_swing(bool *is_down, bool is_known, const real *limit_nm,
-        const real *losses_nm, real *restrict mean, real *restrict deviation)
+static MAYBE_UNUSED void online_keep_swing(bool *is_down, bool is_known, const real *limit_nm, const real *losses_nm,
+        real *restrict mean, real *restrict deviation)
 {
     for (int joint = 0; joint < 12; ++joint) {
         if (!is_down[joint / 3]) {
@@ -641,14 +640,14 @@ static inline MAYBE_UNUSED void online_keep_swing(bool *is_down, bool is_known, 
 }
 
 /* b dq + c tanh(dq / v) + I ddq of a joint with these b, c and I, N m, at dq (rad/s) and ddq (rad/s^2). */
-static inline MAYBE_UNUSED real online_joint_loss(const real *of, real dq, real ddq)
+static MAYBE_UNUSED real online_joint_loss(const real *of, real dq, real ddq)
 {
     return of[0] * dq + of[1] * TANH(dq / ONLINE_DRY_SPEED_RAD_S) + of[2] * ddq;
 }
 
 /* Loss of a joint over a time, N m, at the mean of its velocities at both ends with their difference as acceleration; at
  * most the limit. */
-static inline MAYBE_UNUSED real online_planned_loss(const real *of, real before, real after, real step_s, real limit)
+static MAYBE_UNUSED real online_planned_loss(const real *of, real before, real after, real step_s, real limit)
 {
     const real dq = (real)0.5 * (before + after);
     const real ddq = (after - before) / step_s;
@@ -657,7 +656,7 @@ static inline MAYBE_UNUSED real online_planned_loss(const real *of, real before,
 
 /* Returns the limit by which unit rows are divided; for cones the friction coefficient; 0 if the settings do not ask for
  * the kind. */
-static inline MAYBE_UNUSED real online_row_size(online_row_kind kind, const online_settings *settings)
+static MAYBE_UNUSED real online_row_size(online_row_kind kind, const online_settings *settings)
 {
     /* The consistent lift keeps the torque limits by itself. */
     if (kind == ONLINE_TORQUE_LIMIT && settings->lift != (int)ONLINE_CONSISTENT) {
@@ -677,7 +676,7 @@ static inline MAYBE_UNUSED real online_row_size(online_row_kind kind, const onli
 
 /* Writes sigma^-1 A sigma, sigma^-1 B C_p and sigma^-1 defect of derivatives (A B), 2d x 3d; all row-major but C_p, lower
  * triangular, column by column. */
-static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *defect, const real *root,
+static MAYBE_UNUSED void online_scale_dynamics(const real *by, const real *defect, const real *root,
         const real *deviation, int d, real *restrict a, real *restrict b, real *restrict c)
 {
     for (int i = 0; i < 2 * d; ++i) {
@@ -698,7 +697,7 @@ static inline MAYBE_UNUSED void online_scale_dynamics(const real *by, const real
 }
 
 /* Writes row C_p; returns row . input. */
-static inline MAYBE_UNUSED real online_scale_row(const real *row, const real *root, const real *input, int d,
+static MAYBE_UNUSED real online_scale_row(const real *row, const real *root, const real *input, int d,
         real *restrict out)
 {
     real at_reference = 0;
@@ -714,7 +713,7 @@ static inline MAYBE_UNUSED real online_scale_row(const real *row, const real *ro
 }
 
 /* By how many of its stages a horizon that begins at a time moves on to begin at another: 0 unless they are whole. */
-static inline MAYBE_UNUSED int online_stages_between(double from_s, double to_s, double step_s, int horizon)
+static MAYBE_UNUSED int online_stages_between(double from_s, double to_s, double step_s, int horizon)
 {
     const double passed = (to_s - from_s) / step_s;
     const double whole = FLOOR(passed + 0.5);
@@ -725,8 +724,8 @@ static inline MAYBE_UNUSED int online_stages_between(double from_s, double to_s,
 
 /* Makes a defect that of a reference which is itself a trajectory: none about it, else less what nominal, the model's
  * step from the reference, leaves of its end. */
-static inline MAYBE_UNUSED void online_trust_reference(bool is_about_plan, const real *nominal, const real *end,
-        int d, real *restrict defect)
+static MAYBE_UNUSED void online_trust_reference(bool is_about_plan, const real *nominal, const real *end, int d,
+        real *restrict defect)
 {
     for (int i = 0; i < 2 * d; ++i) {
         const real left = defect[i] + (end[i] - nominal[i]);
@@ -735,7 +734,7 @@ static inline MAYBE_UNUSED void online_trust_reference(bool is_about_plan, const
 }
 
 /* Writes the rows (mu F_z, F_x, F_y) of a force along x, y and z turned by a rotation, row-major. */
-static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const real *x, const real *y, const real *z,
+static MAYBE_UNUSED void online_turn_force(const real *rotation, const real *x, const real *y, const real *z,
         real coefficient, int d, real *restrict out)
 {
     for (int row = 0; row < 3; ++row) {
@@ -752,8 +751,7 @@ static inline MAYBE_UNUSED void online_turn_force(const real *rotation, const re
 /* Turns the foot of a leg about the body's origin by the opposite of an error e of pitch (rad), because nothing holds
  * the pitch of a body in the air and its feet would land elsewhere than planned. To first order in the joints, q + J^-1
  * (R_y(-e) - 1) (h + p(q)) with the hip h; a foot that cannot be moved stays. */
-static inline MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, const real *hip, real error,
-        real *restrict q)
+static MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, const real *hip, real error, real *restrict q)
 {
     real map[3][3] = {{0}};
     real foot[3] = {0};
@@ -777,7 +775,7 @@ static inline MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, con
 
 /* Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to
  * the generalised moments of roll, pitch and yaw, which are the angles (rad). */
-static inline MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turned[restrict 3][3],
+static MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turned[restrict 3][3],
         real rates[restrict 3][3])
 {
     const real sr = SIN(attitude[0]);
@@ -808,7 +806,7 @@ static inline MAYBE_UNUSED void online_write_world_axes(const real *attitude, re
 
 /* Turns count columns of forces and moments in the body's axes into generalised forces of position and of roll, pitch
  * and yaw, the attitude (rad): [R F; E^T M] with the angular velocity E (d roll, d pitch, d yaw) in the body's axes. */
-static inline MAYBE_UNUSED void online_turn_to_world(const real *attitude, int count, real *restrict wrench)
+static MAYBE_UNUSED void online_turn_to_world(const real *attitude, int count, real *restrict wrench)
 {
     real turned[3][3] = {{0}};
     real rates[3][3] = {{0}};
@@ -825,8 +823,8 @@ static inline MAYBE_UNUSED void online_turn_to_world(const real *attitude, int c
 }
 
 /* Writes a stage's latent input u_r + C_p v and the latent state at its end x_r + sigma x of a solution. */
-static inline MAYBE_UNUSED void online_unscale(const real *root, const real *deviation, int d, const real *v,
-        const real *x, real *restrict input, real *restrict end)
+static MAYBE_UNUSED void online_unscale(const real *root, const real *deviation, int d, const real *v, const real *x,
+        real *restrict input, real *restrict end)
 {
     for (int i = 0; i < d; ++i) {
         real sum = 0;
@@ -841,7 +839,7 @@ static inline MAYBE_UNUSED void online_unscale(const real *root, const real *dev
 }
 
 /* The largest violation of a limit by joint positions, in half ranges, or largest if that is more. */
-static inline MAYBE_UNUSED real online_violation(const real *q, const real *lower, const real *upper, real largest)
+static MAYBE_UNUSED real online_violation(const real *q, const real *lower, const real *upper, real largest)
 {
     for (int i = 0; i < 12; ++i) {
         const real outside = online_greater(q[i] - upper[i], lower[i] - q[i]);
@@ -851,7 +849,7 @@ static inline MAYBE_UNUSED real online_violation(const real *q, const real *lowe
 }
 
 /* Writes what is between two states of the robot, or what else changes along a straight line. */
-static inline MAYBE_UNUSED void online_write_between(const real *earlier, const real *later, real share, int count,
+static MAYBE_UNUSED void online_write_between(const real *earlier, const real *later, real share, int count,
         real *restrict state)
 {
     for (int i = 0; i < count; ++i) {
@@ -861,7 +859,7 @@ static inline MAYBE_UNUSED void online_write_between(const real *earlier, const 
 
 /* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that
  * goes to end: next + A (state - x) + B (input - u) - end. */
-static inline MAYBE_UNUSED void online_write_defect(const real *next, const real *by, const real *x, const real *u,
+static MAYBE_UNUSED void online_write_defect(const real *next, const real *by, const real *x, const real *u,
         const real *state, const real *input, const real *end, int d, real *restrict defect)
 {
     for (int i = 0; i < 2 * d; ++i) {
@@ -878,8 +876,8 @@ static inline MAYBE_UNUSED void online_write_defect(const real *next, const real
 }
 
 /* Writes torques, N m, of a joint PD with two gains that holds a posture and, behind it, joint velocities. */
-static inline MAYBE_UNUSED void online_write_drives(const real *gains, const real *held, const real *x,
-        const real *dx, real *restrict torque)
+static MAYBE_UNUSED void online_write_drives(const real *gains, const real *held, const real *x, const real *dx,
+        real *restrict torque)
 {
     for (int i = 0; i < 12; ++i) {
         torque[i] = gains[0] * (held[i] - x[i]) + gains[1] * (held[12 + i] - dx[i]);
@@ -887,8 +885,7 @@ static inline MAYBE_UNUSED void online_write_drives(const real *gains, const rea
 }
 
 /* Writes m = M [1; z; dz]. */
-static inline MAYBE_UNUSED void online_write_expected(const real *given, const real *state, int d,
-        real *restrict input)
+static MAYBE_UNUSED void online_write_expected(const real *given, const real *state, int d, real *restrict input)
 {
     for (int i = 0; i < d; ++i) {
         const real *row = given + i * (1 + 2 * d);
@@ -900,8 +897,8 @@ static inline MAYBE_UNUSED void online_write_expected(const real *given, const r
 }
 
 /* Writes the pyramid |F_x|, |F_y| <= mu F_z / √2 of a foot with its force by the leg's torques, 3 x 3 row-major. */
-static inline MAYBE_UNUSED void online_write_foot(const real *force, real friction, real weight_n,
-        const real *torque, int leg, real *restrict rows, real *restrict bounds)
+static MAYBE_UNUSED void online_write_foot(const real *force, real friction, real weight_n, const real *torque,
+        int leg, real *restrict rows, real *restrict bounds)
 {
     for (int side = 0; side < 4; ++side) {
         const real sign = side % 2 == 0 ? 1 : -1;
@@ -920,7 +917,7 @@ static inline MAYBE_UNUSED void online_write_foot(const real *force, real fricti
 }
 
 /* Writes L; false if a number is not finite. */
-static inline MAYBE_UNUSED bool online_write_hessian(const real *scaled_map, int d, real *restrict hessian)
+static MAYBE_UNUSED bool online_write_hessian(const real *scaled_map, int d, real *restrict hessian)
 {
     for (int i = 0; i < 12; ++i) {
         for (int j = 0; j <= i; ++j) {
@@ -935,7 +932,7 @@ static inline MAYBE_UNUSED bool online_write_hessian(const real *scaled_map, int
 }
 
 /* Writes both sides of the torque limits as rows on the torques, and the room that torque leaves. */
-static inline MAYBE_UNUSED void online_write_limits(const real *limit_nm, const real *losses_nm, const real *torque,
+static MAYBE_UNUSED void online_write_limits(const real *limit_nm, const real *losses_nm, const real *torque,
         real *restrict rows, real *restrict bounds)
 {
     for (int number = 0; number < 24; ++number) {
@@ -951,7 +948,7 @@ static inline MAYBE_UNUSED void online_write_limits(const real *limit_nm, const 
 
 /* Writes the friction pyramid of a force with rows (mu F_z, F_x, F_y), all zero without contact, where slacks are
  * strictly inside. */
-static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const real *root, const real *input, int d,
+static MAYBE_UNUSED void online_write_pyramid(const real *force, const real *root, const real *input, int d,
         real *restrict rows, real *restrict bounds)
 {
     real row[D] = {0};
@@ -970,7 +967,7 @@ static inline MAYBE_UNUSED void online_write_pyramid(const real *force, const re
 
 /* Scale of (z, dz) for a trajectory that stands still: the change of each latent alone that moves some joint by
  * STILL_SHARE of half its range, and that change within STILL_TIME_S; decoder has d columns. */
-static inline MAYBE_UNUSED void online_write_still(const real *decoder, const real *lower, const real *upper, int d,
+static MAYBE_UNUSED void online_write_still(const real *decoder, const real *lower, const real *upper, int d,
         real *restrict still)
 {
     for (int i = 0; i < d; ++i) {
@@ -986,7 +983,7 @@ static inline MAYBE_UNUSED void online_write_still(const real *decoder, const re
 
 /* Writes the torques with which a leg, at a state of the robot, presses on the ground with a vertical force, N m: the
  * force times minus the gradient of the foot's height. */
-static inline MAYBE_UNUSED void online_write_support(const online_leg_shape *leg, const real *hip, const real *x,
+static MAYBE_UNUSED void online_write_support(const online_leg_shape *leg, const real *hip, const real *x,
         const real *q, real force, real *restrict torque)
 {
     real turned[3] = {q[0], q[1], q[2]};
@@ -1001,7 +998,7 @@ static inline MAYBE_UNUSED void online_write_support(const online_leg_shape *leg
 }
 
 /* Writes m + C y. */
-static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real *deviation, const real *y,
+static MAYBE_UNUSED void online_write_torque(const real *mean, const real *deviation, const real *y,
         real *restrict torque)
 {
     for (int i = 0; i < 12; ++i) {
@@ -1013,7 +1010,7 @@ static inline MAYBE_UNUSED void online_write_torque(const real *mean, const real
 }
 
 /* Writes the rotation R_y(pitch) R_x(roll) from the body frame to an upright frame with the same heading. */
-static inline MAYBE_UNUSED void online_write_upright(const real *attitude, real rotation[restrict 3][3])
+static MAYBE_UNUSED void online_write_upright(const real *attitude, real rotation[restrict 3][3])
 {
     const real sr = SIN(attitude[0]);
     const real cr = COS(attitude[0]);
@@ -1025,8 +1022,7 @@ static inline MAYBE_UNUSED void online_write_upright(const real *attitude, real 
 
 /* Writes weights of squared deviations of positions and velocities in units of deviation: one, and of velocities
  * weight where these have the units of the positions. */
-static inline MAYBE_UNUSED void online_write_weights(const real *deviation, real weight, int d,
-        real *restrict weights)
+static MAYBE_UNUSED void online_write_weights(const real *deviation, real weight, int d, real *restrict weights)
 {
     for (int i = 0; i < d; ++i) {
         const real ratio = deviation[d + i] / deviation[i];
@@ -1037,7 +1033,7 @@ static inline MAYBE_UNUSED void online_write_weights(const real *deviation, real
 
 /* Writes force and moment on the body by each torque of a leg into its columns of a matrix of twelve; false if the leg
  * has no force map. The angles must be finite. */
-static inline MAYBE_UNUSED bool online_write_wrench_map(const online_leg_shape *leg, const real *hip, const real *q,
+static MAYBE_UNUSED bool online_write_wrench_map(const online_leg_shape *leg, const real *hip, const real *q,
         real *restrict out)
 {
     real map[3][3] = {{0}};
@@ -1059,9 +1055,8 @@ static inline MAYBE_UNUSED bool online_write_wrench_map(const online_leg_shape *
 
 /* Writes F(x, u) and (A B), row by row, for a stage of step_s. The memory has room for two states, two matrices
  * of the size of (A B) and the entries of a Jacobian. */
-static inline MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynamics *restrict self, int phase,
-        const real *x, const real *u, int d, real step_s, real *restrict next, real *restrict by,
-        real *restrict memory)
+static MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynamics *restrict self, int phase, const real *x,
+        const real *u, int d, real step_s, real *restrict next, real *restrict by, real *restrict memory)
 {
     const int width = 3 * d;
     real *state = memory;
@@ -1124,7 +1119,7 @@ static inline MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynami
 }
 
 /* Writes ∂ddz/∂u, row by row, of so many entries. */
-static inline MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_dynamics *self, int phase, int count,
+static MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_dynamics *self, int phase, int count,
         const real *entries, int d, real *restrict gain)
 {
     for (int i = 0; i < d * d; ++i) {
@@ -1139,7 +1134,7 @@ static inline MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_
 }
 
 /* Takes the joint velocities of a measurement, if no number of it is undefined or absurd; whether none is. */
-static inline MAYBE_UNUSED bool online_memory_accepts(online_memory *restrict self, double time_s, const real *x,
+static MAYBE_UNUSED bool online_memory_accepts(online_memory *restrict self, double time_s, const real *x,
         const real *dx)
 {
     bool is_accepted = is_finite_double(time_s);
@@ -1154,7 +1149,7 @@ static inline MAYBE_UNUSED bool online_memory_accepts(online_memory *restrict se
 }
 
 /* Time since the last command, at most one stage, and one stage where it is not known or the clock stands still. */
-static inline MAYBE_UNUSED double online_memory_since_command(online_memory *self, double time_s, double step_s)
+static MAYBE_UNUSED double online_memory_since_command(online_memory *self, double time_s, double step_s)
 {
     const double passed_s = time_s - self->command_s;
     const bool is_known = self->has_command && passed_s > 0.0 && passed_s <= step_s;
@@ -1162,9 +1157,9 @@ static inline MAYBE_UNUSED double online_memory_since_command(online_memory *sel
 }
 
 /* Writes what holds the posture, without one the middle of the ranges: fading torques that damp the joints. */
-static inline MAYBE_UNUSED void online_memory_hold(online_memory *restrict self,
-        const online_fallback_settings *fallback, double time_s, double step_s, const real *limit, const real *lower,
-        const real *upper, real *restrict torque, real *restrict joints)
+static MAYBE_UNUSED void online_memory_hold(online_memory *restrict self, const online_fallback_settings *fallback,
+        double time_s, double step_s, const real *limit, const real *lower, const real *upper, real *restrict torque,
+        real *restrict joints)
 {
     const real fade = EXP(-(real)online_memory_since_command(self, time_s, step_s) / fallback->torque_decay_s);
     for (int i = 0; i < 12; ++i) {
@@ -1178,13 +1173,13 @@ static inline MAYBE_UNUSED void online_memory_hold(online_memory *restrict self,
 }
 
 /* The position within the limits that is nearest to this one; the lower limit for what is not a number. */
-static inline MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
+static MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
 {
     return online_smaller(online_greater(position, lower), upper);
 }
 
 /* Stores the commanded joint positions (rad), clamped to the joint limits. */
-static inline MAYBE_UNUSED void online_memory_keep_posture(online_memory *restrict self, const real *joints,
+static MAYBE_UNUSED void online_memory_keep_posture(online_memory *restrict self, const real *joints,
         const real *lower, const real *upper)
 {
     for (int i = 0; i < 12; ++i) {
@@ -1194,7 +1189,7 @@ static inline MAYBE_UNUSED void online_memory_keep_posture(online_memory *restri
 }
 
 /* A time, or where it is not known that of the last command, if there was one, and one stage. */
-static inline MAYBE_UNUSED double online_memory_now_s(online_memory *self, double time_s, double step_s)
+static MAYBE_UNUSED double online_memory_now_s(online_memory *self, double time_s, double step_s)
 {
     const double next_s = self->command_s + step_s;
     const bool is_known = is_finite_double(time_s) || !self->has_command;
@@ -1202,7 +1197,7 @@ static inline MAYBE_UNUSED double online_memory_now_s(online_memory *self, doubl
 }
 
 /* Keeps the time of a command and awaits the next measurement. */
-static inline MAYBE_UNUSED void online_memory_keep_time(online_memory *self, double time_s, double step_s)
+static MAYBE_UNUSED void online_memory_keep_time(online_memory *self, double time_s, double step_s)
 {
     self->command_s = online_memory_now_s(self, time_s, step_s);
     self->has_command = is_finite_double(self->command_s);
@@ -1210,8 +1205,8 @@ static inline MAYBE_UNUSED void online_memory_keep_time(online_memory *self, dou
 }
 
 /* Stores a share of the commanded torques (N m), within the motors' limits. */
-static inline MAYBE_UNUSED void online_memory_keep_torque(online_memory *restrict self, const real *torque,
-        real share, const real *limit)
+static MAYBE_UNUSED void online_memory_keep_torque(online_memory *restrict self, const real *torque, real share,
+        const real *limit)
 {
     for (int i = 0; i < 12; ++i) {
         self->feed_forward_nm[i] = online_clamped_torque(share * torque[i], limit[i]);
@@ -1219,7 +1214,7 @@ static inline MAYBE_UNUSED void online_memory_keep_torque(online_memory *restric
 }
 
 /* Whether a measurement is not believed: it jumps, and few did before. Its velocities must not become torques. */
-static inline MAYBE_UNUSED bool online_memory_refuses(online_memory *self, bool is_jump, int patience)
+static MAYBE_UNUSED bool online_memory_refuses(online_memory *self, bool is_jump, int patience)
 {
     if (!is_jump || self->disbelieved >= patience) {
         self->disbelieved = 0;
@@ -1231,7 +1226,7 @@ static inline MAYBE_UNUSED bool online_memory_refuses(online_memory *self, bool 
 }
 
 /* Stages that have passed at a time; -1 without a plan. */
-static inline MAYBE_UNUSED double online_plan_time_passed(online_plan_time *self, double time_s)
+static MAYBE_UNUSED double online_plan_time_passed(online_plan_time *self, double time_s)
 {
     const double passed = (time_s - self->start_s) / self->step_s;
     return self->is_made ? passed : -1.0;
@@ -1239,7 +1234,7 @@ static inline MAYBE_UNUSED double online_plan_time_passed(online_plan_time *self
 
 /* Whether a measured state differs from the planned one, interpolated to its time, by more than most standard
  * deviations in any coordinate. False outside the plan. */
-static inline MAYBE_UNUSED bool online_plan_time_is_jump(online_plan_time *self, double time_s, const real *states,
+static MAYBE_UNUSED bool online_plan_time_is_jump(online_plan_time *self, double time_s, const real *states,
         int horizon, const real *measured, const real *deviation, int d, real most)
 {
     const double passed = online_plan_time_passed(self, time_s);
@@ -1260,21 +1255,21 @@ static inline MAYBE_UNUSED bool online_plan_time_is_jump(online_plan_time *self,
 }
 
 /* The instant whose posture is commanded at a time for held_s, s. */
-static inline MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, double now_s, double held_s)
+static MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, double now_s, double held_s)
 {
     return now_s + (ONLINE_POSTURE_LEAD * self->step_s + 0.5 * held_s);
 }
 
 /* Whether a time is in a stage or beyond the last. Up to half a stage before the first, as where a clock jitters, it
  * belongs to the first. */
-static inline MAYBE_UNUSED bool online_plan_time_reaches(online_plan_time *self, double time_s)
+static MAYBE_UNUSED bool online_plan_time_reaches(online_plan_time *self, double time_s)
 {
     return online_plan_time_passed(self, time_s) > -0.5;
 }
 
 /* The stage that a time belongs to, or otherwise for a time that is not in the stages before that one or has no plan:
  * the last stage stands for all that is later, the number of stages means none. */
-static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self, double time_s, int otherwise)
+static MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self, double time_s, int otherwise)
 {
     /* A time that is a stage's beginning but for rounding belongs to that stage. */
     const double passed = online_plan_time_passed(self, time_s) + 1e-6;
@@ -1283,13 +1278,13 @@ static inline MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self,
 }
 
 /* Beginning of a stage, s. */
-static inline MAYBE_UNUSED double online_plan_time_stage_s(online_plan_time *self, int stage)
+static MAYBE_UNUSED double online_plan_time_stage_s(online_plan_time *self, int stage)
 {
     return self->start_s + (double)stage * self->step_s;
 }
 
 /* Whether a motion that is done has left the body still on four feet for long enough. */
-static inline MAYBE_UNUSED bool online_routine_rests(online_routine *restrict self, const online_timing *timing,
+static MAYBE_UNUSED bool online_routine_rests(online_routine *restrict self, const online_timing *timing,
         double time_s, bool is_done, const real *dx, bool *is_down)
 {
     bool is_still = is_done;
@@ -1307,8 +1302,8 @@ static inline MAYBE_UNUSED bool online_routine_rests(online_routine *restrict se
 }
 
 /* The mode after a measurement of a robot that follows the reference, which may be over. */
-static inline MAYBE_UNUSED online_mode online_routine_after_jump(online_routine *restrict self,
-        const online_timing *timing, double time_s, bool is_over, const real *dx, bool *is_down)
+static MAYBE_UNUSED online_mode online_routine_after_jump(online_routine *restrict self, const online_timing *timing,
+        double time_s, bool is_over, const real *dx, bool *is_down)
 {
     int down = 0;
     for (int foot = 0; foot < 4; ++foot) {
@@ -1327,7 +1322,7 @@ static inline MAYBE_UNUSED online_mode online_routine_after_jump(online_routine 
 
 /* The mode after a measurement of joints that move to the stand: Mode::Ready when they are there,
  * Mode::Damp if they do not arrive. */
-static inline MAYBE_UNUSED online_mode online_routine_after_standing(online_routine *restrict self,
+static MAYBE_UNUSED online_mode online_routine_after_standing(online_routine *restrict self,
         const online_bounds *bounds, const online_timing *timing, double time_s, const real *x, const real *dx,
         bool *is_down)
 {
@@ -1348,7 +1343,7 @@ static inline MAYBE_UNUSED online_mode online_routine_after_standing(online_rout
 }
 
 /* Begins a mode at a time, from a posture. */
-static inline MAYBE_UNUSED void online_routine_enter(online_routine *restrict self, online_mode mode, double time_s,
+static MAYBE_UNUSED void online_routine_enter(online_routine *restrict self, online_mode mode, double time_s,
         const real *joints)
 {
     self->mode = mode;
@@ -1361,7 +1356,7 @@ static inline MAYBE_UNUSED void online_routine_enter(online_routine *restrict se
 }
 
 /* Begins a jump or a walk: the reference starts now, where the robot stands and looks. */
-static inline MAYBE_UNUSED void online_routine_leap(online_routine *restrict self, online_mode mode, double time_s,
+static MAYBE_UNUSED void online_routine_leap(online_routine *restrict self, online_mode mode, double time_s,
         double start_s, const real *x, const real *start)
 {
     online_routine_enter(self, mode, time_s, x);
@@ -1380,7 +1375,7 @@ static inline MAYBE_UNUSED void online_routine_leap(online_routine *restrict sel
 }
 
 /* Writes a state and its velocity in the frame of the reference. */
-static inline MAYBE_UNUSED void online_routine_write_in_frame(online_routine *self, const real *x, const real *dx,
+static MAYBE_UNUSED void online_routine_write_in_frame(online_routine *self, const real *x, const real *dx,
         real *restrict framed_x, real *restrict framed_dx)
 {
     for (int i = 0; i < 18; ++i) {
@@ -1398,7 +1393,7 @@ static inline MAYBE_UNUSED void online_routine_write_in_frame(online_routine *se
 
 /* Writes where the joints should be at a time, rad, and how fast they should move, rad/s; the share of the weight
  * that they carry. */
-static inline MAYBE_UNUSED real online_routine_write_posture(online_routine *self, const online_timing *timing,
+static MAYBE_UNUSED real online_routine_write_posture(online_routine *self, const online_timing *timing,
         double time_s, real *restrict joints, real *restrict velocity)
 {
     const bool moves = self->mode == ONLINE_STAND_UP || self->mode == ONLINE_RECOVER;
@@ -1415,7 +1410,7 @@ static inline MAYBE_UNUSED real online_routine_write_posture(online_routine *sel
     return self->mode == ONLINE_STAND_UP ? share : 1;
 }
 
-static inline MAYBE_UNUSED online_share online_share_unknown(void)
+static MAYBE_UNUSED online_share online_share_unknown(void)
 {
     return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
 }
@@ -1423,7 +1418,7 @@ static inline MAYBE_UNUSED online_share online_share_unknown(void)
 /* Updates the estimate from a measurement at passed stages into the plan, up to 1.1. states are those at the
  * beginning and end of the first stage, input is its input; at_command and drives are the latent inputs that
  * the drives had at the command and have now. */
-static inline MAYBE_UNUSED void online_share_update(online_share *restrict self, double passed, real step_s,
+static MAYBE_UNUSED void online_share_update(online_share *restrict self, double passed, real step_s,
         real time_constant_s, const real *by_input, const real *input, const real *states, const real *measured,
         const real *deviation, const real *at_command, const real *drives, int d)
 {
@@ -1468,7 +1463,7 @@ static inline MAYBE_UNUSED void online_share_update(online_share *restrict self,
 
 /* Writes torques that fade from the last ones into the damping of joint velocities, and a posture that fades into
  * the measured one; the share that is left of the joint PD. passed_s is the time since the last command. */
-static inline MAYBE_UNUSED real online_supervisor_fade(online_supervisor *restrict self, const online_bounds *bounds,
+static MAYBE_UNUSED real online_supervisor_fade(online_supervisor *restrict self, const online_bounds *bounds,
         real damping, double passed_s, const real *joints, const real *velocity, const real *limit,
         const real *lower, const real *upper, const real *last_torque, const real *last_posture,
         real *restrict torque, real *restrict posture)
@@ -1487,7 +1482,7 @@ static inline MAYBE_UNUSED real online_supervisor_fade(online_supervisor *restri
 }
 
 /* Forgets measurements, but neither a fault nor the floor. */
-static inline MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self)
+static MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self)
 {
     if (self->fault == ONLINE_NONE) {
         self->faded_s = 0.0;
@@ -1507,7 +1502,7 @@ static inline MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self
 }
 
 /* Adds up steps without a good plan, passed_s after the last one; what is wrong. */
-static inline MAYBE_UNUSED online_fault online_supervisor_judge(online_supervisor *restrict self,
+static MAYBE_UNUSED online_fault online_supervisor_judge(online_supervisor *restrict self,
         const online_bounds *bounds, bool is_poor, double passed_s)
 {
     self->poor_s = is_poor ? self->poor_s + passed_s : 0.0;
@@ -1520,7 +1515,7 @@ static inline MAYBE_UNUSED online_fault online_supervisor_judge(online_superviso
 }
 
 /* Forgets measurements and the fault. */
-static inline MAYBE_UNUSED void online_supervisor_reset(online_supervisor *self)
+static MAYBE_UNUSED void online_supervisor_reset(online_supervisor *self)
 {
     online_supervisor_forget(self);
     self->fault = ONLINE_NONE;
@@ -1528,13 +1523,13 @@ static inline MAYBE_UNUSED void online_supervisor_reset(online_supervisor *self)
 }
 
 /* Takes the height of a foot that the reference has on the ground, m. */
-static inline MAYBE_UNUSED void online_supervisor_take_floor(online_supervisor *self, bool is_first, real height)
+static MAYBE_UNUSED void online_supervisor_take_floor(online_supervisor *self, bool is_first, real height)
 {
     self->floor_m = is_first ? height : online_greater(height, self->floor_m);
 }
 
 /* Whether the clock stands, goes back or leaps. */
-static inline MAYBE_UNUSED online_fault online_supervisor_clock_fault(online_supervisor *restrict self,
+static MAYBE_UNUSED online_fault online_supervisor_clock_fault(online_supervisor *restrict self,
         const online_bounds *bounds, double time_s)
 {
     const double passed_s = time_s - self->time_s;
@@ -1562,8 +1557,8 @@ static inline MAYBE_UNUSED online_fault online_supervisor_clock_fault(online_sup
 }
 
 /* Whether a measurement was the same too often: one that moves, or while the reference does. */
-static inline MAYBE_UNUSED bool online_supervisor_is_frozen(online_supervisor *restrict self,
-        const online_bounds *bounds, const real *x, const real *dx, const real *nominal)
+static MAYBE_UNUSED bool online_supervisor_is_frozen(online_supervisor *restrict self, const online_bounds *bounds,
+        const real *x, const real *dx, const real *nominal)
 {
     bool is_same = true;
     bool moves = false;
@@ -1585,7 +1580,7 @@ static inline MAYBE_UNUSED bool online_supervisor_is_frozen(online_supervisor *r
 }
 
 /* Cosine of the angle between the verticals of two attitudes, each roll and pitch, rad. */
-static inline MAYBE_UNUSED real online_common_height(const real *attitude, const real *other)
+static MAYBE_UNUSED real online_common_height(const real *attitude, const real *other)
 {
     const real turned = COS(attitude[1]) * COS(other[1]);
     const real along = SIN(attitude[1]) * SIN(other[1]);
@@ -1594,7 +1589,7 @@ static inline MAYBE_UNUSED real online_common_height(const real *attitude, const
     return along + aside + above;
 }
 
-static inline MAYBE_UNUSED real online_distance(const real *place, const real *other)
+static MAYBE_UNUSED real online_distance(const real *place, const real *other)
 {
     const real x = place[0] - other[0];
     const real y = place[1] - other[1];
@@ -1603,7 +1598,7 @@ static inline MAYBE_UNUSED real online_distance(const real *place, const real *o
 }
 
 /* Whether a state leaps from its prediction, a time after the last good measurement. */
-static inline MAYBE_UNUSED online_fault online_supervisor_leap(online_supervisor *self, const online_bounds *bounds,
+static MAYBE_UNUSED online_fault online_supervisor_leap(online_supervisor *self, const online_bounds *bounds,
         double passed_s, const real *x, const real *dx)
 {
     if (passed_s > bounds->clock_gap_s) {
@@ -1633,9 +1628,9 @@ static inline MAYBE_UNUSED online_fault online_supervisor_leap(online_supervisor
 }
 
 /* The first bound that a state is beyond. */
-static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_supervisor *self,
-        const online_bounds *bounds, double time_s, const real *x, const real *dx, const real *nominal,
-        const real *lower, const real *upper, const real *speed)
+static MAYBE_UNUSED online_fault online_supervisor_state_fault(online_supervisor *self, const online_bounds *bounds,
+        double time_s, const real *x, const real *dx, const real *nominal, const real *lower, const real *upper,
+        const real *speed)
 {
     if (bounds->tilt_rad < ONLINE_HALF_TURN) {
         const real along = online_common_height(x + 15, nominal + 15);
@@ -1671,7 +1666,7 @@ static inline MAYBE_UNUSED online_fault online_supervisor_state_fault(online_sup
 }
 
 /* Whether the body's velocity contradicts its positions since the last good measurement. */
-static inline MAYBE_UNUSED bool online_supervisor_is_unexplained(online_supervisor *restrict self,
+static MAYBE_UNUSED bool online_supervisor_is_unexplained(online_supervisor *restrict self,
         const online_bounds *bounds, double time_s, const real *x, const real *dx)
 {
     const real passed = (real)(time_s - self->good_s);
@@ -1693,8 +1688,8 @@ static inline MAYBE_UNUSED bool online_supervisor_is_unexplained(online_supervis
 
 /* Whether contacts cannot be for too long: a foot on the ground is above the floor, or a body that no foot holds does
  * not fall. */
-static inline MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor *restrict self,
-        const online_bounds *bounds, double time_s, real rises, const real *heights, bool *is_down)
+static MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor *restrict self, const online_bounds *bounds,
+        double time_s, real rises, const real *heights, bool *is_down)
 {
     bool is_wrong = false;
     bool is_aloft = true;
@@ -1724,18 +1719,16 @@ static inline MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor 
 }
 
 /* Whether a walk has for too long been on just the other feet than measured. */
-static inline MAYBE_UNUSED bool online_supervisor_opposes(online_supervisor *restrict self,
-        const online_bounds *bounds, double time_s, bool *is_down, bool *walks_on)
+static MAYBE_UNUSED bool online_supervisor_opposes(online_supervisor *restrict self, const online_bounds *bounds,
+        double time_s, bool *is_down, bool *walks_on)
 {
     bool is_opposed = true;
-    int on = 0;
+    bool changes = false;
     for (int foot = 0; foot < 4; ++foot) {
         is_opposed = is_opposed && is_down[foot] != walks_on[foot];
-        if (walks_on[foot]) {
-            on += 1;
-        }
+        changes = changes || walks_on[foot] != walks_on[0];
     }
-    is_opposed = is_opposed && on > 0 && on < 4;
+    is_opposed = is_opposed && changes;
     if (is_opposed && !self->is_opposed) {
         self->opposed_s = time_s;
     }
@@ -1745,7 +1738,7 @@ static inline MAYBE_UNUSED bool online_supervisor_opposes(online_supervisor *res
 
 /* Takes a finite measurement of state and velocity, 18 each, with the reference's state, the heights of the feet, m, those
  * on the ground and those that a walk has there (otherwise the measured ones); what is wrong. */
-static inline MAYBE_UNUSED online_fault online_supervisor_watch(online_supervisor *restrict self,
+static MAYBE_UNUSED online_fault online_supervisor_watch(online_supervisor *restrict self,
         const online_bounds *bounds, double time_s, const real *x, const real *dx, const real *nominal,
         const real *heights, bool *is_down, bool *walks_on, const real *lower, const real *upper, const real *speed)
 {
@@ -1792,7 +1785,7 @@ static inline MAYBE_UNUSED online_fault online_supervisor_watch(online_superviso
 
 /* Whether a state within STATE_REACH standard deviations of some state of the trajectory reaches row . z =
  * bound. */
-static inline MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *self, const real *row, real bound,
+static MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *self, const real *row, real bound,
         const real *deviation)
 {
     const int d = online_trajectory_latent_dim(self);
@@ -1814,7 +1807,7 @@ static inline MAYBE_UNUSED bool online_trajectory_comes_near(online_trajectory *
     return farthest + ONLINE_STATE_REACH * SQRT(spread) >= bound;
 }
 
-static inline MAYBE_UNUSED online_instant online_trajectory_locate(online_trajectory *self, double time_s)
+static MAYBE_UNUSED online_instant online_trajectory_locate(online_trajectory *self, double time_s)
 {
     const int count = online_trajectory_count(self);
     int low = 0;
@@ -1842,8 +1835,8 @@ static inline MAYBE_UNUSED online_instant online_trajectory_locate(online_trajec
 }
 
 /* Writes the mean latent input over a time: between two samples their mean, beyond the ends the end's. */
-static inline MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *self, double time_s,
-        double duration_s, real *restrict mean)
+static MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *self, double time_s, double duration_s,
+        real *restrict mean)
 {
     const int d = online_trajectory_latent_dim(self);
     const int last = online_trajectory_count(self) - 1;
@@ -1894,7 +1887,7 @@ static inline MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *
 
 /* Moves an input of the stage from a time on to the part of it for which a command is held, as the trajectory's own
  * input moves. Does nothing for commands that are held for whole stages. */
-static inline MAYBE_UNUSED void online_trajectory_move_input(online_trajectory *self, double stage_s, double step_s,
+static MAYBE_UNUSED void online_trajectory_move_input(online_trajectory *self, double stage_s, double step_s,
         double now_s, double held_s, real *restrict input)
 {
     if (held_s > ONLINE_WHOLE_STAGE * step_s) {
@@ -1909,15 +1902,15 @@ static inline MAYBE_UNUSED void online_trajectory_move_input(online_trajectory *
     }
 }
 
-static inline MAYBE_UNUSED int online_trajectory_phase_at(online_trajectory *self, double time_s)
+static MAYBE_UNUSED int online_trajectory_phase_at(online_trajectory *self, double time_s)
 {
     online_instant at = online_trajectory_locate(self, time_s);
     return online_trajectory_phase(self, at.sample);
 }
 
 /* Writes the phases of the stages from a time on: the trajectory's, changed where the feet disagree. */
-static inline MAYBE_UNUSED online_contact online_trajectory_schedule(online_trajectory *self, double time_s,
-        double step_s, int measured, int horizon, int *restrict phases)
+static MAYBE_UNUSED online_contact online_trajectory_schedule(online_trajectory *self, double time_s, double step_s,
+        int measured, int horizon, int *restrict phases)
 {
     for (int k = 0; k < horizon; ++k) {
         phases[k] = online_trajectory_phase_at(self, time_s + ((double)k + 0.5) * step_s);
@@ -1949,16 +1942,14 @@ static inline MAYBE_UNUSED online_contact online_trajectory_schedule(online_traj
 }
 
 /* Writes (z, dz) of a sample. */
-static inline MAYBE_UNUSED void online_trajectory_write_state(online_trajectory *self, int sample,
-        real *restrict state)
+static MAYBE_UNUSED void online_trajectory_write_state(online_trajectory *self, int sample, real *restrict state)
 {
     online_trajectory_write_position(self, sample, state);
     online_trajectory_write_velocity(self, sample, state + online_trajectory_latent_dim(self));
 }
 
 /* Writes (z, dz) at a time. */
-static inline MAYBE_UNUSED void online_trajectory_state_at(online_trajectory *self, double time_s,
-        real *restrict state)
+static MAYBE_UNUSED void online_trajectory_state_at(online_trajectory *self, double time_s, real *restrict state)
 {
     const int d = online_trajectory_latent_dim(self);
     const int last = online_trajectory_count(self) - 1;
@@ -1979,7 +1970,7 @@ static inline MAYBE_UNUSED void online_trajectory_state_at(online_trajectory *se
 }
 
 /* Whether a sample is in the window around another one: in its phase and near in time. */
-static inline MAYBE_UNUSED bool online_trajectory_is_beside(online_trajectory *self, int sample, int other)
+static MAYBE_UNUSED bool online_trajectory_is_beside(online_trajectory *self, int sample, int other)
 {
     const double off_s = online_trajectory_time_s(self, other) - online_trajectory_time_s(self, sample);
     return online_trajectory_phase(self, other) == online_trajectory_phase(self, sample)
@@ -1987,7 +1978,7 @@ static inline MAYBE_UNUSED bool online_trajectory_is_beside(online_trajectory *s
 }
 
 /* Writes the slope of the straight line through the velocities around a sample, within its phase. */
-static inline MAYBE_UNUSED void online_trajectory_write_acceleration(online_trajectory *self, int sample,
+static MAYBE_UNUSED void online_trajectory_write_acceleration(online_trajectory *self, int sample,
         real *restrict slope)
 {
     const int d = online_trajectory_latent_dim(self);
@@ -2030,7 +2021,7 @@ static inline MAYBE_UNUSED void online_trajectory_write_acceleration(online_traj
 
 /* Writes the standard deviation of each of (z, dz), never below a hundredth of the largest of its kind; still
  * if that is a motion within which the trajectory stands still. */
-static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajectory *self, const real *still,
+static MAYBE_UNUSED void online_trajectory_write_deviations(online_trajectory *self, const real *still,
         real *restrict deviation)
 {
     const int d = online_trajectory_latent_dim(self);
@@ -2071,7 +2062,7 @@ static inline MAYBE_UNUSED void online_trajectory_write_deviations(online_trajec
 
 /* Takes other scales for latent coordinates along x, y and yaw, if they are given: place has for each coordinate how
  * far it moves with each of the three (3 d), SI. */
-static inline MAYBE_UNUSED void online_trajectory_write_place_scales(online_trajectory *self, const real *place,
+static MAYBE_UNUSED void online_trajectory_write_place_scales(online_trajectory *self, const real *place,
         real place_m, real heading_rad, real *restrict deviation)
 {
     for (int i = 0; i < online_trajectory_latent_dim(self); ++i) {

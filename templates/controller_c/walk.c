@@ -23,7 +23,7 @@
 #define WALK_WINDOW 64
 
 /* Moves all samples by one to the front. */
-static inline MAYBE_UNUSED void walk_walker_shift(walk_walker *self)
+static MAYBE_UNUSED void walk_walker_shift(walk_walker *self)
 {
     for (int sample = 0; sample < WALK_WINDOW - 1; ++sample) {
         self->time_s[sample] = self->time_s[sample + 1];
@@ -43,13 +43,13 @@ static inline MAYBE_UNUSED void walk_walker_shift(walk_walker *self)
 }
 
 /* The smaller of two numbers; the second if the first is not one. */
-static inline MAYBE_UNUSED real walk_smaller(real value, real other)
+static MAYBE_UNUSED real walk_smaller(real value, real other)
 {
     return value < other ? value : other;
 }
 
 /* Velocity, amplitude and share of the stride of one more sample. A velocity changes at most by its range in range_s. */
-static inline MAYBE_UNUSED void walk_walker_pace(walk_walker *restrict self, const walk_gait *gait, double range_s)
+static MAYBE_UNUSED void walk_walker_pace(walk_walker *restrict self, const walk_gait *gait, double range_s)
 {
     const real part = (real)(WALK_SPACING_S / range_s);
     bool is_slow = true;
@@ -80,7 +80,7 @@ static inline MAYBE_UNUSED void walk_walker_pace(walk_walker *restrict self, con
 }
 
 /* The path's next place, by the velocity along the heading in the middle of the step. */
-static inline MAYBE_UNUSED void walk_walker_move_along(walk_walker *self)
+static MAYBE_UNUSED void walk_walker_move_along(walk_walker *self)
 {
     const real step = (real)WALK_SPACING_S;
     const int at = 6 * (WALK_WINDOW - 1);
@@ -97,7 +97,7 @@ static inline MAYBE_UNUSED void walk_walker_move_along(walk_walker *self)
 }
 
 /* A number of a node at the velocity of the last sample. */
-static inline MAYBE_UNUSED real walk_walker_at_node(walk_walker *self, const real *nodes, int node, int i)
+static MAYBE_UNUSED real walk_walker_at_node(walk_walker *self, const real *nodes, int node, int i)
 {
     real value = nodes[WALK_NODE * node + i];
     for (int k = 0; k < 3; ++k) {
@@ -108,8 +108,8 @@ static inline MAYBE_UNUSED real walk_walker_at_node(walk_walker *self, const rea
 
 /* One more sample at the end, in place of the first. Its torques are in torque; Walker::keep_input takes the input
  * that they make. */
-static inline MAYBE_UNUSED void walk_walker_advance(walk_walker *restrict self, const walk_gait *gait,
-        const real *nodes, double range_s)
+static MAYBE_UNUSED void walk_walker_advance(walk_walker *restrict self, const walk_gait *gait, const real *nodes,
+        double range_s)
 {
     walk_walker_shift(self);
     walk_walker_pace(self, gait, range_s);
@@ -146,7 +146,7 @@ static inline MAYBE_UNUSED void walk_walker_advance(walk_walker *restrict self, 
 }
 
 /* Stands where the path begins: the walk starts at time 0, the samples before it are those of the stand. */
-static inline MAYBE_UNUSED void walk_walker_clear(walk_walker *restrict self, const walk_gait *gait)
+static MAYBE_UNUSED void walk_walker_clear(walk_walker *restrict self, const walk_gait *gait)
 {
     for (int i = 0; i < 3; ++i) {
         self->asked[i] = 0;
@@ -172,8 +172,7 @@ static inline MAYBE_UNUSED void walk_walker_clear(walk_walker *restrict self, co
 }
 
 /* Takes a command, kept within what can be commanded. */
-static inline MAYBE_UNUSED void walk_walker_command(walk_walker *restrict self, const walk_gait *gait,
-        const real *velocity)
+static MAYBE_UNUSED void walk_walker_command(walk_walker *restrict self, const walk_gait *gait, const real *velocity)
 {
     self->stops = false;
     for (int i = 0; i < 3; ++i) {
@@ -183,8 +182,7 @@ static inline MAYBE_UNUSED void walk_walker_command(walk_walker *restrict self, 
 }
 
 /* Takes the generalised input (18) of the last sample's stride. */
-static inline MAYBE_UNUSED void walk_walker_keep_input(walk_walker *restrict self, const walk_gait *gait,
-        const real *u)
+static MAYBE_UNUSED void walk_walker_keep_input(walk_walker *restrict self, const walk_gait *gait, const real *u)
 {
     for (int i = 0; i < 18; ++i) {
         const real stand = gait->stand[18 + i];
@@ -193,14 +191,14 @@ static inline MAYBE_UNUSED void walk_walker_keep_input(walk_walker *restrict sel
 }
 
 /* Whether the samples end before a horizon of a time does. Not so for times beyond them: a clock that leaps ends the walk. */
-static inline MAYBE_UNUSED bool walk_walker_lacks(walk_walker *self, double time_s, double horizon_s)
+static MAYBE_UNUSED bool walk_walker_lacks(walk_walker *self, double time_s, double horizon_s)
 {
     const double last_s = self->time_s[WALK_WINDOW - 1];
     return time_s <= last_s && last_s < time_s + (horizon_s + WALK_AHEAD_S);
 }
 
 /* Moves a state and its velocity from where the walk began to the axes of the path at a time. */
-static inline MAYBE_UNUSED void walk_walker_move_to_path(walk_walker *self, double time_s, real *restrict x,
+static MAYBE_UNUSED void walk_walker_move_to_path(walk_walker *self, double time_s, real *restrict x,
         real *restrict dx)
 {
     const double passed = (time_s - self->time_s[0]) / WALK_SPACING_S;
@@ -233,14 +231,14 @@ static inline MAYBE_UNUSED void walk_walker_move_to_path(walk_walker *self, doub
 }
 
 /* Whether a walk stands at a time: it was to stop, or has no sample any more. */
-static inline MAYBE_UNUSED bool walk_walker_rests(walk_walker *self, double time_s)
+static MAYBE_UNUSED bool walk_walker_rests(walk_walker *self, double time_s)
 {
     const bool stands = self->stops && self->amplitude <= 0 && time_s >= self->rest_s;
     return stands || time_s > self->time_s[WALK_WINDOW - 1];
 }
 
 /* At once the training's mean gait. */
-static inline MAYBE_UNUSED void walk_walker_set_to_mean(walk_walker *restrict self, const walk_gait *gait)
+static MAYBE_UNUSED void walk_walker_set_to_mean(walk_walker *restrict self, const walk_gait *gait)
 {
     for (int i = 0; i < 3; ++i) {
         self->asked[i] = gait->mean[i];
@@ -250,7 +248,7 @@ static inline MAYBE_UNUSED void walk_walker_set_to_mean(walk_walker *restrict se
 }
 
 /* Slows down, then stands. */
-static inline MAYBE_UNUSED void walk_walker_stop(walk_walker *self)
+static MAYBE_UNUSED void walk_walker_stop(walk_walker *self)
 {
     self->stops = true;
     for (int i = 0; i < 3; ++i) {

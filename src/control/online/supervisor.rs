@@ -444,14 +444,12 @@ impl Supervisor {
         walks_on: &[bool],
     ) -> bool {
         let mut is_opposed = true;
-        let mut on: usize = 0;
+        let mut changes = false;
         for foot in 0..4 {
             is_opposed = is_opposed && is_down[foot] != walks_on[foot];
-            if walks_on[foot] {
-                on += 1;
-            }
+            changes = changes || walks_on[foot] != walks_on[0];
         }
-        is_opposed = is_opposed && on > 0 && on < 4;
+        is_opposed = is_opposed && changes;
         if is_opposed && !self.is_opposed {
             self.opposed_s = time_s;
         }

@@ -164,7 +164,7 @@ impl<'a> Writer<'a> {
         let signature = format!("{c_name}({})", declared.join(", "));
         let signature = output.declare(&signature, &|of| self.spelling(of));
         let attribute = self.items.unit.attribute;
-        (here.lines).add(&format!("static inline {attribute}{signature}"));
+        (here.lines).add(&format!("static {attribute}{signature}"));
         here.lines.open("{");
         self.block(&mut here, body, true)?;
         here.lines.close("}");

@@ -199,6 +199,7 @@ pub fn controller(root: &Path) -> Result<[(&'static str, String); 6], Fault> {
         users: &users,
         header: &["Stage"],
         elsewhere: &[("is_linked", "LINKED")],
+        attribute: "inline ",
         ..Unit::default()
     };
     let online = Unit {
