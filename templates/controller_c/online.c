@@ -1348,6 +1348,7 @@ static MAYBE_UNUSED void online_routine_enter(online_routine *restrict self, onl
 {
     self->mode = mode;
     self->is_asked = false;
+    self->asks_walk = false;
     self->since_s = time_s;
     self->is_still = false;
     for (int i = 0; i < 12; ++i) {

@@ -103,8 +103,9 @@ typedef enum { ONLINE_DAMP, ONLINE_STAND_UP, ONLINE_READY, ONLINE_JUMP, ONLINE_L
 /* Mode of the state machine, memory of its transitions, and frame of the reference. */
 typedef struct {
     online_mode mode;
-    /* Whether a jump was requested. */
+    /* Whether a jump was requested, or a walk. */
     bool is_asked;
+    bool asks_walk;
     /* When the mode began, s, and the joints then, rad. */
     double since_s;
     real from[12];

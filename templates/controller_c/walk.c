@@ -85,15 +85,18 @@ static MAYBE_UNUSED void walk_walker_move_along(walk_walker *self)
     const real step = (real)WALK_SPACING_S;
     const int at = 6 * (WALK_WINDOW - 1);
     const int before = at - 6;
-    const real middle = self->path[before + 2] + (real)0.5 * step * self->now[2];
+    const real turn = step * self->now[2];
+    const real middle = (real)self->path[before + 2] + (real)0.5 * turn;
     const real along = step * self->now[0];
     const real across = step * self->now[1];
-    self->path[at] = self->path[before] + (COS(middle) * along - SIN(middle) * across);
-    self->path[at + 1] = self->path[before + 1] + (SIN(middle) * along + COS(middle) * across);
-    self->path[at + 2] = self->path[before + 2] + step * self->now[2];
-    self->path[at + 3] = self->path[before + 3] + along;
-    self->path[at + 4] = self->path[before + 4] + across;
-    self->path[at + 5] = self->now[2];
+    const real x = COS(middle) * along - SIN(middle) * across;
+    const real y = SIN(middle) * along + COS(middle) * across;
+    self->path[at] = self->path[before] + (double)x;
+    self->path[at + 1] = self->path[before + 1] + (double)y;
+    self->path[at + 2] = self->path[before + 2] + (double)turn;
+    self->path[at + 3] = self->path[before + 3] + (double)along;
+    self->path[at + 4] = self->path[before + 4] + (double)across;
+    self->path[at + 5] = (double)self->now[2];
 }
 
 /* A number of a node at the velocity of the last sample. */
@@ -130,7 +133,7 @@ static MAYBE_UNUSED void walk_walker_advance(walk_walker *restrict self, const w
         self->x[at] = gait->stand[i] + self->amplitude * (row[i] - gait->stand[i]);
     }
     for (int i = 0; i < 2; ++i) {
-        self->x[18 * last + 12 + i] += self->path[6 * last + 3 + i];
+        self->x[18 * last + 12 + i] += (real)self->path[6 * last + 3 + i];
     }
     const real step = (real)WALK_SPACING_S;
     for (int i = 18 * last; i < 18 * (last + 1); ++i) {
@@ -153,7 +156,9 @@ static MAYBE_UNUSED void walk_walker_clear(walk_walker *restrict self, const wal
         self->now[i] = 0;
     }
     self->stops = false;
+    self->in_place = 0;
     self->amplitude = 0;
+    self->rest_s = 0.0;
     self->share = 0;
     for (int sample = 0; sample < WALK_WINDOW; ++sample) {
         self->time_s[sample] = ((double)sample - (double)(WALK_WINDOW - WALK_AHEAD)) * WALK_SPACING_S;
@@ -166,7 +171,7 @@ static MAYBE_UNUSED void walk_walker_clear(walk_walker *restrict self, const wal
             self->feet[4 * sample + foot] = true;
         }
         for (int i = 0; i < 6; ++i) {
-            self->path[6 * sample + i] = 0;
+            self->path[6 * sample + i] = 0.0;
         }
     }
 }
@@ -190,7 +195,7 @@ static MAYBE_UNUSED void walk_walker_keep_input(walk_walker *restrict self, cons
     }
 }
 
-/* Whether the samples end before a horizon of a time does. Not so for times beyond them: a clock that leaps ends the walk. */
+/* Whether the samples end before a horizon of a time does. Not so for times beyond them: the clock has leapt. */
 static MAYBE_UNUSED bool walk_walker_lacks(walk_walker *self, double time_s, double horizon_s)
 {
     const double last_s = self->time_s[WALK_WINDOW - 1];
@@ -212,8 +217,8 @@ static MAYBE_UNUSED void walk_walker_move_to_path(walk_walker *self, double time
     }
     real at[6] = {0};
     for (int i = 0; i < 6; ++i) {
-        const real from = self->path[6 * sample + i];
-        at[i] = from + share * (self->path[6 * (sample + 1) + i] - from);
+        const double from = self->path[6 * sample + i];
+        at[i] = (real)(from + (double)share * (self->path[6 * (sample + 1) + i] - from));
     }
     const real cosine = COS(at[2]);
     const real sine = SIN(at[2]);
@@ -230,7 +235,7 @@ static MAYBE_UNUSED void walk_walker_move_to_path(walk_walker *self, double time
     dx[17] -= at[5];
 }
 
-/* Whether a walk stands at a time: it was to stop, or has no sample any more. */
+/* Whether a walk stands at a time: it was to stop, or has no sample any more, where no supervisor saw the clock leap. */
 static MAYBE_UNUSED bool walk_walker_rests(walk_walker *self, double time_s)
 {
     const bool stands = self->stops && self->amplitude <= 0 && time_s >= self->rest_s;

@@ -23,7 +23,7 @@ typedef struct {
     real u[18 * WALK_WINDOW];
     bool feet[4 * WALK_WINDOW];
     /* Of each sample the path's place (2) and heading where the walk began, its length along and across (2), its turning. */
-    real path[6 * WALK_WINDOW];
+    double path[6 * WALK_WINDOW];
 } walk_walker;
 
 /* The gait of a walk in SI units; velocities are along the heading, to the left, and of yaw. */

@@ -2,7 +2,7 @@
  * bit or up to a tolerance.
  * usage: machine FILE [TOLERANCE]; prints steps and differing ones. Native byte order: int64 samples; double time_s[samples], x[18 samples],
  * dx[18 samples], u[18 samples]; uint8 feet[4 samples]; then for each step int64 request (0 none, 1 stand, 2 jump, 3 damp, 4
- * reset, 5 prepare, 6 a new machine, 7 strides as its trajectory, 8 stop, 9 and more walk), its answer; double time_s, x[18], dx[18]; int64 feet, a bit each;
+ * reset, 5 prepare, 6 a new machine, 7 strides as its trajectory, 8 stop, 9 to 12 walk, 13 the strides again), its answer; double time_s, x[18], dx[18]; int64 feet, a bit each;
  * double torque[12], joint_position[12], joint_velocity[12], stiffness, damping, u_lat[D]; int64 status, mode. */
 #include HEADER
 
@@ -38,6 +38,8 @@ static int request_of(FN(_machine) *machine, int64_t request, double time_s, con
         FN(_machine_prepare)(machine, time_s);
         return 0;
 #ifdef WALKS
+    case 13:
+        return FN(_machine_set_walk)(machine) == 0;
     case 8:
         return FN(_machine_stop)(machine);
     case 9:

@@ -39,6 +39,7 @@ enum Request {
     Turn = 10,
     Beyond = 11,
     Undefined = 12,
+    SetAgain = 13,
 }
 
 /// A robot whose joints go where they are sent and whose body moves as commanded, somewhere in the world.
@@ -147,6 +148,10 @@ impl Robot {
                 false
             }
             Request::Stop => machine.stop(),
+            Request::SetAgain => {
+                let strides = walk_strides(&shipped("go1-trot-d6")).expect("strides");
+                machine.set_walk(strides).is_ok()
+            }
             _ => walk(machine),
         };
         let measurement = Measurement {
@@ -300,6 +305,53 @@ fn commands_are_kept_within_what_the_strides_reach_and_change_slowly() {
     robot.until(Mode::Ready);
 }
 
+/// Requests before the next measurement, and references that replace the strides.
+#[test]
+fn requests_begin_only_what_was_asked_for() {
+    let mut robot = Robot::ready();
+    assert!(robot.machine.walk(VELOCITIES[0]));
+    assert!(robot.machine.stop(), "it has not begun");
+    robot.step(Request::None);
+    assert_eq!(robot.machine.mode(), Mode::Ready);
+    assert!(robot.machine.walk(VELOCITIES[0]));
+    assert!(!robot.machine.jump());
+    robot.step(Request::None);
+    assert_eq!(robot.machine.mode(), Mode::Ready, "the last request counts");
+    assert!(robot.machine.walk(VELOCITIES[0]));
+    assert!(!robot.machine.stand(f64::NAN, &robot.x));
+    robot.step(Request::None);
+    robot.pass(1.0, VELOCITIES[0]);
+    let off = robot.command.joint_position_rad[1] - robot.gait.stand[1];
+    assert!(off.abs() > 1e-3, "the command was lost");
+
+    let still = |robot: &mut Robot| {
+        let (x, time_s) = ([robot.x; 3].concat(), [0.0, 0.1, 0.2]);
+        let samples = romc::mpc::ReferenceSamples {
+            time_s: &time_s,
+            x: &x,
+            dx: &[0.0; 54],
+            u: None,
+            feet: &[[true; 4]; 3],
+        };
+        let controller = robot.machine.controller_mut();
+        controller.set_reference(samples).expect("sound");
+    };
+    still(&mut robot);
+    for _ in 0..30 {
+        robot.step(Request::None);
+    }
+    assert_eq!(
+        robot.machine.mode(),
+        Mode::Damp,
+        "another reference ends the walk"
+    );
+    let mut robot = Robot::ready();
+    assert!(robot.machine.walk(VELOCITIES[0]));
+    still(&mut robot);
+    robot.step(Request::None);
+    assert_eq!(robot.machine.mode(), Mode::Ready, "nobody asked for a jump");
+}
+
 #[test]
 fn walk_in_c_repeats_the_library() {
     let mut robot = Robot::ready();
@@ -308,6 +360,7 @@ fn walk_in_c_repeats_the_library() {
     robot.step(Request::Turn);
     robot.pass(2.0, VELOCITIES[1]);
     robot.step(Request::Undefined);
+    assert!(!robot.step(Request::SetAgain), "while it walks");
     for step in 0..500 {
         robot.step_with(Request::None, |x| {
             x[14] += 0.01 * (step as f64 * 0.1).sin();
@@ -318,6 +371,7 @@ fn walk_in_c_repeats_the_library() {
     robot.pass(0.4, [0.0; 3]);
     robot.until(Mode::Recover);
     robot.until(Mode::Ready);
+    assert!(robot.step(Request::SetAgain));
     robot.step(Request::Beyond);
     robot.pass(1.0, [0.2, 0.0, 0.2]);
     robot.step_with(Request::None, |x| x[15] = 3.0);

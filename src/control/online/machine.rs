@@ -62,13 +62,6 @@ impl Machine {
     /// modes, after a fault and without a reference.
     pub fn stand(&mut self, time_s: f64, x: &[f64]) -> bool {
         let has_fault = self.controller.supervisor.fault != Fault::None;
-        let is_walk = self.follows_walk() && matches!(self.routine.mode, Mode::Damp | Mode::Ready);
-        if let (true, Some(walk)) = (is_walk, &mut self.walk) {
-            walk.stand(&mut self.controller);
-        }
-        let Some(start) = self.start() else {
-            return false;
-        };
         let (mode, from) = match (self.routine.mode, x.first_chunk::<JOINT_DIM>()) {
             (Mode::Damp, Some(joints)) if !has_fault => (Mode::StandUp, *joints),
             (Mode::Ready, _) => (Mode::Recover, self.routine.stand),
@@ -77,6 +70,13 @@ impl Machine {
         if !(time_s.is_finite() && from.iter().all(|joint| joint.is_finite())) {
             return false;
         }
+        let is_walk = self.follows_walk();
+        if let (true, Some(walk)) = (is_walk, &mut self.walk) {
+            walk.stand(&mut self.controller);
+        }
+        let Some(start) = self.start() else {
+            return false;
+        };
         self.routine.stand.copy_from_slice(&start[..JOINT_DIM]);
         self.routine.enter(mode, time_s, &from);
         self.controller.forget();
@@ -93,15 +93,25 @@ impl Machine {
             _ => mode == Mode::Damp && is_sound,
         };
         let is_jump = !self.follows_walk();
+        self.routine.asks_walk = false;
         self.routine.is_asked = is_jump && self.start().is_some_and(may_start);
         self.routine.is_asked
     }
 
-    /// Takes the strides of a model as its reference, not while it jumps or walks. The controller needs settings for walks.
+    /// Takes the strides of a model as its reference. The controller needs settings for walks.
     ///
     /// # Errors
-    /// Those of the strides as a reference, a horizon that is too long for a walk, feet that select no phase.
+    /// Those of the strides as a reference, a horizon that is too long for a walk, feet that select no phase, a robot that jumps
+    /// or walks.
     pub fn set_walk(&mut self, strides: Strides) -> Result<(), ControlError> {
+        if let Mode::Jump | Mode::Land | Mode::Walk = self.routine.mode {
+            return Err(ControlError::Setting {
+                name: "mode",
+                found: f64::from(self.routine.mode as u8),
+                expected: "one in which the robot stands or is damped",
+            });
+        }
+        self.routine.is_asked = false;
         self.walk = Some(Walk::new(strides, &mut self.controller)?);
         Ok(())
     }
@@ -124,6 +134,7 @@ impl Machine {
             _ => return false,
         }
         if self.routine.is_asked {
+            self.routine.asks_walk = true;
             walk.stand(&mut self.controller);
         }
         walk.walker.command(&walk.strides.gait, &velocity);
@@ -131,8 +142,12 @@ impl Machine {
     }
 
     /// Slows down, stands, and moves the joints back to the stand: [`Mode::Recover`], then [`Mode::Ready`]. False in other
-    /// modes than [`Mode::Walk`].
+    /// modes than [`Mode::Walk`]; a walk that was requested and has not begun is not begun.
     pub fn stop(&mut self) -> bool {
+        if self.routine.is_asked && self.routine.asks_walk {
+            self.routine.is_asked = false;
+            return true;
+        }
         match &mut self.walk {
             Some(walk) if self.routine.mode == Mode::Walk => {
                 walk.walker.stop();
@@ -168,6 +183,12 @@ impl Machine {
     pub fn step_into(&mut self, measurement: Measurement<'_>, command: &mut Command) {
         let is_whole = measurement.x.len() == STATE_DIM && measurement.dx.len() == STATE_DIM;
         let Measurement { time_s, x, dx, .. } = measurement;
+        // The reference may have been replaced since the request.
+        let asks_this = self.routine.asks_walk == self.follows_walk();
+        self.routine.is_asked = self.routine.is_asked && asks_this;
+        if self.routine.mode == Mode::Walk && !self.follows_walk() {
+            self.damp();
+        }
         let starts = self.routine.is_asked && is_whole;
         if starts && self.controller.memory.accepts(time_s, x, dx) {
             let start = self.start().expect("a request was accepted");

@@ -63,4 +63,4 @@ pub use settings::{
 pub use supervisor::Bounds;
 pub use trajectory::NO_PHASE;
 pub use walk::Strides;
-pub use walker::Gait;
+pub use walker::{Gait, WINDOW as WALK_WINDOW};

@@ -59,8 +59,9 @@ impl Default for Timing {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Routine {
     pub mode: Mode,
-    /// Whether a jump was requested.
+    /// Whether a jump was requested, or a walk.
     pub is_asked: bool,
+    pub asks_walk: bool,
     /// When the mode began, s, and the joints then, rad.
     since_s: f64,
     from: [Real; 12],
@@ -86,6 +87,7 @@ impl Routine {
     pub(super) fn enter(&mut self, mode: Mode, time_s: f64, joints: &[Real]) {
         self.mode = mode;
         self.is_asked = false;
+        self.asks_walk = false;
         self.since_s = time_s;
         self.is_still = false;
         for i in 0..12 {

@@ -57,7 +57,8 @@ impl Walk {
         };
         walk.walker.clear(&walk.strides.gait);
         walk.walker.set_to_mean(&walk.strides.gait);
-        for _ in 0..WINDOW {
+        // The first ones come from the stand.
+        for _ in 0..2 * WINDOW {
             walk.advance(controller, 1.0);
         }
         let feet: Vec<ContactFlags> = (0..WINDOW).map(|i| walk.feet(i)).collect();

@@ -6,7 +6,7 @@
 use super::dense::{Real, smaller};
 
 /// Samples that a walk holds at a time.
-pub(super) const WINDOW: usize = 64;
+pub const WINDOW: usize = 64;
 /// Time between samples, s.
 pub(super) const SPACING_S: f64 = 0.01;
 /// Samples that stay when their time is over: a measurement may be late.
@@ -61,7 +61,7 @@ pub(super) struct Walker {
     pub u: [Real; 18 * WINDOW],
     pub feet: [bool; 4 * WINDOW],
     /// Of each sample the path's place (2) and heading where the walk began, its length along and across (2), its turning.
-    path: [Real; 6 * WINDOW],
+    path: [f64; 6 * WINDOW],
 }
 
 impl Walker {
@@ -92,7 +92,9 @@ impl Walker {
             self.now[i] = 0.0;
         }
         self.stops = false;
+        self.in_place = 0.0;
         self.amplitude = 0.0;
+        self.rest_s = 0.0;
         self.share = 0.0;
         for sample in 0..WINDOW {
             self.time_s[sample] = (sample as f64 - (WINDOW - AHEAD) as f64) * SPACING_S;
@@ -140,13 +142,13 @@ impl Walker {
         self.amplitude = 1.0;
     }
 
-    /// Whether the samples end before a horizon of a time does. Not so for times beyond them: a clock that leaps ends the walk.
+    /// Whether the samples end before a horizon of a time does. Not so for times beyond them: the clock has leapt.
     pub(super) fn lacks(&self, time_s: f64, horizon_s: f64) -> bool {
         let last_s = self.time_s[WINDOW - 1];
         time_s <= last_s && last_s < time_s + (horizon_s + AHEAD_S)
     }
 
-    /// Whether a walk stands at a time: it was to stop, or has no sample any more.
+    /// Whether a walk stands at a time: it was to stop, or has no sample any more, where no supervisor saw the clock leap.
     pub(super) fn rests(&self, time_s: f64) -> bool {
         let stands = self.stops && self.amplitude <= 0.0 && time_s >= self.rest_s;
         stands || time_s > self.time_s[WINDOW - 1]
@@ -216,15 +218,18 @@ impl Walker {
         let step = SPACING_S as Real;
         let at = 6 * (WINDOW - 1);
         let before = at - 6;
-        let middle = self.path[before + 2] + 0.5 * step * self.now[2];
+        let turn = step * self.now[2];
+        let middle = (self.path[before + 2] as Real) + 0.5 * turn;
         let along = step * self.now[0];
         let across = step * self.now[1];
-        self.path[at] = self.path[before] + (middle.cos() * along - middle.sin() * across);
-        self.path[at + 1] = self.path[before + 1] + (middle.sin() * along + middle.cos() * across);
-        self.path[at + 2] = self.path[before + 2] + step * self.now[2];
-        self.path[at + 3] = self.path[before + 3] + along;
-        self.path[at + 4] = self.path[before + 4] + across;
-        self.path[at + 5] = self.now[2];
+        let x = middle.cos() * along - middle.sin() * across;
+        let y = middle.sin() * along + middle.cos() * across;
+        self.path[at] = self.path[before] + (x as f64);
+        self.path[at + 1] = self.path[before + 1] + (y as f64);
+        self.path[at + 2] = self.path[before + 2] + (turn as f64);
+        self.path[at + 3] = self.path[before + 3] + (along as f64);
+        self.path[at + 4] = self.path[before + 4] + (across as f64);
+        self.path[at + 5] = self.now[2] as f64;
     }
 
     /// A number of a node at the velocity of the last sample.
@@ -258,7 +263,7 @@ impl Walker {
             self.x[at] = gait.stand[i] + self.amplitude * (row[i] - gait.stand[i]);
         }
         for i in 0..2 {
-            self.x[18 * last + 12 + i] += self.path[6 * last + 3 + i];
+            self.x[18 * last + 12 + i] += self.path[6 * last + 3 + i] as Real;
         }
         let step = SPACING_S as Real;
         for i in 18 * last..18 * (last + 1) {
@@ -299,7 +304,7 @@ impl Walker {
         let mut at: [Real; 6] = [0.0; 6];
         for i in 0..6 {
             let from = self.path[6 * sample + i];
-            at[i] = from + share * (self.path[6 * (sample + 1) + i] - from);
+            at[i] = (from + (share as f64) * (self.path[6 * (sample + 1) + i] - from)) as Real;
         }
         let cosine = at[2].cos();
         let sine = at[2].sin();

@@ -3,7 +3,7 @@
 use super::preprocess::moving_average;
 use super::*;
 
-const WALK_WINDOW_S: f64 = 0.01; // the same in walks
+const WALK_WINDOW_S: f64 = 0.0095; // in walks: 5 samples of 2 ms, where 10 ms would be between 5 and 7
 const ACCELERATION_WINDOW_S: f64 = 0.02; // joint accelerations are averaged over it before motor inertia counts
 
 pub(crate) type Rows = DMatrix<f64>; // quantities by row, one column a sample
@@ -64,7 +64,7 @@ pub struct Segment {
     pub feet: Vec<ContactFlags>,
     /// `[F_lin; F_ang]`, 6 x n (N, N m), when the file carries it.
     pub body_wrench: Option<DMatrix<f64>>,
-    /// Whether it is part of a walk, whose feet stand for a tenth of a second each.
+    /// Whether it is part of a walk, whose feet stand for a tenth to a quarter of a second each.
     pub is_walk: bool,
 }
 
@@ -209,7 +209,7 @@ impl Segment {
     }
 
     /// Accelerations, 18 x n: [`Self::ddx`] averaged over 20 ms within stretches of equal contact (a foot down, or none),
-    /// so that noise and the spikes of landings do not become torques; of a walk over 10 ms within stretches of the same feet:
+    /// so that noise and the spikes of landings do not become torques; of a walk over 10 ms, 5 samples at 500 Hz, within stretches of the same feet:
     /// the spike of a touchdown belongs to the stance that it begins.
     fn smoothed_accelerations(&self) -> DMatrix<f64> {
         let (window_s, stretches) = match self.is_walk {

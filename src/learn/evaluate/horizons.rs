@@ -46,24 +46,30 @@ impl<'a> Horizon {
         let names = names.chain(has_strides.then_some(MEAN_STRIDE));
         let sums = CoordinateSums::new(model)?;
         let predictors: Vec<_> = names.map(|name| (name, sums.clone())).collect();
-        let motion = |segment: Cow<'a, Segment>, latent: Cow<'a, LatentSegment>| {
-            let pendulum = stride_s
-                .map(|_| Pendulum::of(model, &segment))
-                .transpose()?;
-            Ok(Motion {
-                rigid_body: (baselines.rigid_body.as_ref())
-                    .map(|body| body.accelerations(&segment))
-                    .transpose()?,
-                pendulum,
-                stride: stride_s.and_then(|stride_s| MeanStride::of(model, &segment, stride_s)),
-                segment,
-                latent,
-            })
-        };
-        let runs = assessment
-            .runs
-            .iter()
-            .map(|run| motion(Cow::Borrowed(&*run.segment), Cow::Borrowed(&run.latent)));
+        let motion =
+            |segment: Cow<'a, Segment>, latent: Cow<'a, LatentSegment>, recorded: &Segment| {
+                // Of a piece without three touchdowns the stride of all motions.
+                let own_s = crate::recording::stride_s(std::iter::once(recorded)).or(stride_s);
+                let pendulum = stride_s
+                    .map(|_| Pendulum::of(model, &segment))
+                    .transpose()?;
+                Ok(Motion {
+                    rigid_body: (baselines.rigid_body.as_ref())
+                        .map(|body| body.accelerations(&segment))
+                        .transpose()?,
+                    pendulum,
+                    stride: own_s.and_then(|stride_s| MeanStride::of(model, &segment, stride_s)),
+                    segment,
+                    latent,
+                })
+            };
+        let runs = assessment.runs.iter().map(|run| {
+            motion(
+                Cow::Borrowed(&*run.segment),
+                Cow::Borrowed(&run.latent),
+                &run.segment,
+            )
+        });
         let runs: Vec<Motion<'_>> = runs.collect::<Result<_>>()?;
         let mut horizons = Vec::new();
         let restarts = RESTARTS_S.map(|time_s| (format!("{time_s} s"), Restart::Every(time_s)));
@@ -85,7 +91,7 @@ impl<'a> Horizon {
                     }
                     let own = segment.slice(window).in_its_heading();
                     let latent = LatentSegment::encode(model, &own)?;
-                    long.push(motion(Cow::Owned(own), Cow::Owned(latent))?);
+                    long.push(motion(Cow::Owned(own), Cow::Owned(latent), segment)?);
                 }
             }
             horizons.push((name, Restart::Every(f64::INFINITY), Some(long)));

@@ -75,7 +75,7 @@ pub fn walk_strides(model: &ReducedModel) -> Result<Strides, MpcError> {
             *mean += number / count as f64;
         }
     }
-    let reach = std::array::from_fn(|i| prior.gait[i].reach());
+    let reach = std::array::from_fn(|i| prior.reach(i));
     let gait = Gait {
         count,
         frequency_hz,

@@ -61,7 +61,7 @@ pub struct MappedWalk {
 pub fn walk_reach(model: &ReducedModel) -> Result<WalkMap> {
     let (prior, limits) = (model.stride_prior()?, model.robot()?.torque_limit_nm());
     let [speeds_m_s, yaw_rates_rad_s] = [(0, SPEEDS), (2, YAW_RATES)].map(|(axis, count)| {
-        let [least, most] = prior.gait[axis].reach();
+        let [least, most] = prior.reach(axis);
         let share = |k: usize| k as f64 / (count - 1) as f64;
         (0..count)
             .map(|k| least + share(k) * (most - least))
@@ -185,8 +185,10 @@ fn smoothed_differences(time_s: &[f64], values: &DMatrix<f64>) -> DMatrix<f64> {
 
 fn verdict(prior: &StridePrior, gait: &[f64; GAIT_DIM]) -> Verdict {
     let (mut beyond, mut far) = (Vec::new(), Vec::new());
-    for ((range, value), (name, unit)) in prior.gait.iter().zip(gait).zip(NAMES) {
-        let [least, most] = range.reach();
+    for (number, ((range, value), (name, unit))) in
+        prior.gait.iter().zip(gait).zip(NAMES).enumerate()
+    {
+        let [least, most] = prior.reach(number);
         let text = format!(
             "{name} {value} {unit}, recorded from {:.2} to {:.2}",
             range.least, range.most

@@ -21,8 +21,6 @@ pub struct GoalRange {
     pub most: f64,
 }
 
-/// How far beyond the recorded range a walk is planned, as a share of that range.
-const BEYOND: f64 = 0.15;
 /// Numbers that differ less say nothing of how motions depend on them, SI units.
 const LEAST_STD_M: f64 = 1e-3;
 
@@ -51,12 +49,6 @@ impl GoalRange {
 
     pub fn normalised(&self, value: f64) -> f64 {
         (value - self.mean) / self.std
-    }
-
-    /// Least and most that walks are planned for: 15 % of the range beyond it.
-    pub fn reach(&self) -> [f64; 2] {
-        let margin = BEYOND * (self.most - self.least);
-        [self.least - margin, self.most + margin]
     }
 }
 

@@ -11,6 +11,8 @@ const GAIT_FEATURES: usize = 1 + GAIT_DIM;
 /// Numbers at a node: the state, the input, and for each foot how often it is down.
 pub const STRIDE_WIDTH: usize = 2 * STATE_DIM + FOOT_DIM;
 const MOST_NODES: usize = 200;
+/// How far beyond the recorded range a walk is planned, as a share of that range.
+const BEYOND: f64 = 0.15;
 
 /// `strides` of a model file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,6 +26,19 @@ pub struct StridePrior {
 }
 
 impl StridePrior {
+    /// Least and most that a number of a gait is planned for: 15 % of the recorded range beyond it. Velocities to the left and of
+    /// yaw are used with both signs, and reach as far to the right.
+    pub fn reach(&self, number: usize) -> [f64; 2] {
+        let GoalRange { least, most, .. } = self.gait[number];
+        let margin = BEYOND * (most - least);
+        let [least, most] = [least - margin, most + margin];
+        let both = most.min(-least).max(0.0);
+        match number {
+            1 | 2 => [-both, both],
+            _ => [least, most],
+        }
+    }
+
     /// Both halves of a stride, `2 (n - 1) x 40`, joined where they meet: the second is the mirror image of the gait turning
     /// the other way.
     pub fn stride(&self, robot: &Robot, gait: &[f64; GAIT_DIM]) -> DMatrix<f64> {
