@@ -17,27 +17,22 @@ import c_controller
 import walk_loop
 from followers import Commanded
 from parallel import results_of
-from perturbations import NOMINAL, Motors, Perturbation, perturbed_simulation
+from perturbations import NOMINAL, Motors, perturbed_simulation
 from robot_model import Floor, RobotModel
 from simulation import CONTROL_STEP_S, Push, write_state
+from walk_plans import RANGES, miss, velocity_of
 
 EXAMPLE = """example:
   cargo build --release
   MUJOCO_GL=egl python walk_commands.py --seed 1
 draws 6 sequences of 6 commands (0.2 to 0.9 m/s, up to 0.5 rad/s) and drives each with and without
 perturbations."""
-RANGES = {"speed": (0.2, 0.9), "yaw rate": (-0.5, 0.5)}
 STRIDE_S = 0.36
 CROUCH, CROUCH_M = np.array([0.0, 0.9, -1.8] * 4), 0.28
 LATEST_S = 5.0  # to stand up, and to stand again
 MOST_TILT_RAD = 0.35
-PERTURBATIONS = (
-    NOMINAL,
-    Perturbation("payload +2 kg", "+2 kg", payload_kg=2.0),
-    Perturbation("torque x0.9", "tau 0.9", torque_factor=0.9),
-    Perturbation("push 40 N", "push"),
-    Perturbation("friction 0.4", "mu 0.4", friction=0.4),
-)
+# The robot starts from the floor: no start beside a recording.
+PERTURBATIONS = tuple(one for one in walk_loop.PERTURBATIONS if one.start_offset_rad == 0.0)
 FOLLOWERS = {"MPC": False, "no dynamics": True}
 # Least share of the runs of the MPC without a fall, and most median error in the last stride of a command.
 LEAST_SHARE, MOST_ERROR = 1.0, 0.15
@@ -59,9 +54,7 @@ class Run:
 
     def errors(self):
         """Error of each command, as a share of it (of 0.2 where it is less)."""
-        for commanded, reached in zip(self.commanded, self.reached, strict=True):
-            pairs = zip(commanded, reached, strict=True)
-            yield max(abs(got - asked) / max(abs(asked), 0.2) for asked, got in pairs)
+        return map(miss, self.commanded, self.reached)
 
 
 class Operator(Commanded):
@@ -171,11 +164,7 @@ def reached_at(log, operator, number):
     rows = (log.time_s >= end_s - STRIDE_S) & (log.time_s <= end_s)
     if rows.sum() < 2:
         return 0.0, 0.0
-    yaw = np.unwrap(log.x[rows, 17])
-    steps = np.diff(log.x[rows, 12:14], axis=0)
-    along = (steps * np.stack([np.cos(yaw[:-1]), np.sin(yaw[:-1])], axis=1)).sum()
-    passed_s = (rows.sum() - 1) * CONTROL_STEP_S
-    return float(along / passed_s), float((yaw[-1] - yaw[0]) / passed_s)
+    return velocity_of(log.x[rows])
 
 
 def table(runs):
@@ -195,7 +184,7 @@ def table(runs):
 
 
 def write_film(path, crates, commands, hold_s):
-    """The robot from a stand to a stand, followed by a camera, with its command and what it reaches."""
+    """Moving picture of a run: a camera that moves with the robot, the command and the velocity."""
     log, operator, _ = driven("MPC", crates, NOMINAL, commands, hold_s)
     robot = RobotModel("go1")
     data, camera = mujoco.MjData(robot.mj), mujoco.MjvCamera()
@@ -231,15 +220,12 @@ def draw_floor(scene, place):
 
 
 def caption(log, operator, row):
-    """What is asked for and what the robot does, over the stride before a row."""
+    """The command at a row, and the mean velocity of the robot over the stride before it."""
     time_s = log.time_s[row]
     passed_s = time_s - operator.start_s
     number = int(passed_s // operator.hold_s)
     before = max(row - round(STRIDE_S / CONTROL_STEP_S), 0)
-    yaw = log.x[row, 17]
-    way = (log.x[row, 12:14] - log.x[before, 12:14]) / max((row - before) * CONTROL_STEP_S, 1e-9)
-    speed = way @ np.array([np.cos(yaw), np.sin(yaw)])
-    rate = (yaw - log.x[before, 17]) / max((row - before) * CONTROL_STEP_S, 1e-9)
+    speed, rate = velocity_of(log.x[before : row + 1]) if row > before else (0.0, 0.0)
     if passed_s < 0.0:
         asked = "stand up"
     elif number >= len(operator.commands):

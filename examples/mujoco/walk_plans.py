@@ -40,8 +40,22 @@ class Reached:
 
     def misses(self):
         """Largest error of speed and yaw rate, as a share of the command (of 0.2 where it is less)."""
-        pairs = zip(self.commanded, self.reached, strict=True)
-        return max(abs(got - asked) / max(abs(asked), 0.2) for asked, got in pairs)
+        return miss(self.commanded, self.reached)
+
+
+def miss(commanded, reached):
+    """Largest error of speed and yaw rate, as a share of the command (of 0.2 where it is less)."""
+    pairs = zip(commanded, reached, strict=True)
+    return max(abs(got - asked) / max(abs(asked), 0.2) for asked, got in pairs)
+
+
+def velocity_of(x):
+    """Mean speed along the heading (m/s) and yaw rate (rad/s) over states (rows, 18), one each control step."""
+    yaw = np.unwrap(x[:, 17])
+    steps = np.diff(x[:, 12:14], axis=0)
+    along = (steps * np.stack([np.cos(yaw[:-1]), np.sin(yaw[:-1])], axis=1)).sum()
+    passed_s = (len(yaw) - 1) * walk_loop.CONTROL_STEP_S
+    return float(along / passed_s), float((yaw[-1] - yaw[0]) / passed_s)
 
 
 def main():
@@ -94,12 +108,7 @@ def run(task):
     """One run; returns its speed and yaw rate and whether it fell."""
     follower, controllers, command, plan = task
     log, outcome = driven(follower, controllers, plan)
-    half = len(log.x) // 2
-    yaw = np.unwrap(log.x[half:, 17])
-    steps = np.diff(log.x[half:, 12:14], axis=0)
-    along = (steps * np.stack([np.cos(yaw[:-1]), np.sin(yaw[:-1])], axis=1)).sum()
-    passed_s = (len(yaw) - 1) * walk_loop.CONTROL_STEP_S
-    reached = (float(along / passed_s), float((yaw[-1] - yaw[0]) / passed_s))
+    reached = velocity_of(log.x[len(log.x) // 2 :])
     return Reached(follower, command, reached, outcome.fell)
 
 

@@ -162,26 +162,10 @@ impl Robot {
             self.jump_s = Some(self.time_s);
             self.place = [self.x[12], self.x[13], self.x[17]];
         }
-        self.keep(request, answer, time_s, &x);
+        let mode = self.machine.mode();
+        let asked = [request as i64, i64::from(answer)];
+        push_step(&mut self.bytes, asked, measurement, &self.command, mode);
         answer
-    }
-
-    fn keep(&mut self, request: Request, answer: bool, time_s: f64, x: &[f64]) {
-        let (bytes, command) = (&mut self.bytes, &self.command);
-        push_counts(bytes, &[request as i64, i64::from(answer)]);
-        push(bytes, &[time_s]);
-        push(bytes, x);
-        push(bytes, &self.dx);
-        let down = (0..4).map(|foot| i64::from(self.feet[foot]) << foot).sum();
-        push_counts(bytes, &[down]);
-        push(bytes, &command.torque_nm);
-        push(bytes, &command.joint_position_rad);
-        push(bytes, &command.joint_velocity_rad_s);
-        let drives = command.drives;
-        push(bytes, &[drives.stiffness_nm_rad, drives.damping_nm_s_rad]);
-        push(bytes, &command.u_lat);
-        let codes = [i64::from(command.status.code()), self.machine.mode() as i64];
-        push_counts(bytes, &codes);
     }
 
     fn still(&mut self, request: Request) -> bool {
@@ -204,6 +188,29 @@ impl Robot {
         }
         panic!("{:?}, not {mode:?}", self.machine.mode());
     }
+}
+
+/// A step as `machine.c` reads it: the request with its answer, the measurement, the command and the mode after it.
+pub fn push_step(
+    bytes: &mut Vec<u8>,
+    asked: [i64; 2],
+    measurement: Measurement<'_>,
+    command: &Command,
+    mode: Mode,
+) {
+    push_counts(bytes, &asked);
+    push(bytes, &[measurement.time_s]);
+    push(bytes, measurement.x);
+    push(bytes, measurement.dx);
+    let down = |foot: usize| i64::from(measurement.feet[foot]) << foot;
+    push_counts(bytes, &[(0..4).map(down).sum()]);
+    push(bytes, &command.torque_nm);
+    push(bytes, &command.joint_position_rad);
+    push(bytes, &command.joint_velocity_rad_s);
+    let drives = command.drives;
+    push(bytes, &[drives.stiffness_nm_rad, drives.damping_nm_s_rad]);
+    push(bytes, &command.u_lat);
+    push_counts(bytes, &[i64::from(command.status.code()), mode as i64]);
 }
 
 #[test]

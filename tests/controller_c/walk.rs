@@ -1,5 +1,5 @@
-//! A walk by commands under the state machine: a robot that stands up, walks where it is told, turns, stops and stands, in
-//! Rust, and the same up to rounding in C.
+//! The state machine in a walk: stand up, start, change the velocity, turn, stop, stand, in Rust; and the commands of the C
+//! beside them, up to rounding.
 
 use std::f64::consts::PI;
 use std::fs;
@@ -12,8 +12,9 @@ use romc::mpc::{
 use romc::robot::Leg;
 
 use crate::emitted::Emitted;
+use crate::machine::push_step;
 use crate::programs::{root, shipped, succeed};
-use crate::{push, push_counts};
+use crate::push_counts;
 
 const STEP_S: f64 = 0.002;
 /// Those of `machine.c`: forwards and to the left, m/s, and yaw, rad/s.
@@ -164,25 +165,9 @@ impl Robot {
         if machine.mode() == Mode::Walk && mode != Mode::Walk {
             self.now = [0.0; 3];
         }
-        let (bytes, command) = (&mut self.bytes, &self.command);
-        push_counts(bytes, &[request as i64, i64::from(answer)]);
-        push(bytes, &[self.time_s]);
-        push(bytes, &x);
-        push(bytes, &self.dx);
-        push_counts(
-            bytes,
-            &[(0..4).map(|foot| i64::from(feet[foot]) << foot).sum()],
-        );
-        push(bytes, &command.torque_nm);
-        push(bytes, &command.joint_position_rad);
-        push(bytes, &command.joint_velocity_rad_s);
-        let drives = command.drives;
-        push(bytes, &[drives.stiffness_nm_rad, drives.damping_nm_s_rad]);
-        push(bytes, &command.u_lat);
-        push_counts(
-            bytes,
-            &[i64::from(command.status.code()), machine.mode() as i64],
-        );
+        let asked = [request as i64, i64::from(answer)];
+        let mode = machine.mode();
+        push_step(&mut self.bytes, asked, measurement, &self.command, mode);
         answer
     }
 

@@ -221,8 +221,7 @@ impl Numbers {
             ("least", self.vector(leg.least)),
             ("volume", self.one(leg.volume)),
         ];
-        let fields = fields.map(|(name, value)| format!(".{name} = {value}"));
-        format!("{{{}}}", fields.join(",\n     "))
+        structure(&fields)
     }
 
     fn gait(self, gait: &Gait) -> String {
@@ -234,8 +233,7 @@ impl Numbers {
             ("mean", self.vector(gait.mean)),
             ("stand", self.vector(gait.stand)),
         ];
-        let fields = fields.map(|(name, value)| format!(".{name} = {value}"));
-        format!("{{{}}}", fields.join(",\n     "))
+        structure(&fields)
     }
 
     fn limits(self, rows: &[Row]) -> String {
@@ -258,6 +256,13 @@ impl Numbers {
     ) -> String {
         nested(rows.into_iter().map(|row| self.vector(row)))
     }
+}
+
+/// An initialiser with named fields.
+fn structure(fields: &[(&str, String)]) -> String {
+    let named = |(name, value): &(&str, String)| format!(".{name} = {value}");
+    let fields: Vec<String> = fields.iter().map(named).collect();
+    format!("{{{}}}", fields.join(",\n     "))
 }
 
 /// An initialiser of initialisers, one per line.
@@ -302,7 +307,7 @@ fn is_value(word: &str) -> bool {
     word.starts_with("ONLINE_") && (separated(",") || separated(" }"))
 }
 
-/// A stage of the horizon's solver, the controller's own state and that of a walk, for the header of a controller.
+/// Types for the header of a controller: a stage of the horizon's solver, the state of the controller, the state of a walk.
 pub(super) fn stage(name: &str, upper: &str, real: &str, walks: bool) -> String {
     let rename = |word: &str| match word {
         "real" => Some(real.to_owned()),
