@@ -95,7 +95,10 @@ use crate::train::{
     assess, sha256,
 };
 use crate::typeset::words::counted;
-use crate::typeset::{Cell, NumberStyle, PrintOptions, Rounding, SymbolTable, Table, significant};
+use crate::typeset::{
+    COLUMNS, Cell, NumberStyle, PrintOptions, Rounding, SymbolTable, Table, model_text,
+    significant, wrapped,
+};
 use crate::{Error, artifact};
 
 type Result<T, E = Error> = std::result::Result<T, E>;

@@ -315,9 +315,21 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
     text.chars().map(shown).collect()
 }
 
+/// Each item after the same words, on lines that fit a terminal.
 pub(super) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
-    let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
+    let lines = items
+        .into_iter()
+        .map(|item| fitted(&format!("{words}{item}")));
     lines.collect()
+}
+
+/// Text on lines that fit a terminal; those after the first are indented by two characters more than that.
+pub(super) fn fitted(text: &str) -> String {
+    let bare = text.trim_start_matches([' ', '\n']);
+    let (start, indent) = (&text[..text.len() - bare.len()], text.len() - bare.len());
+    let lines = wrapped(bare, COLUMNS - 2 - indent);
+    let joint = format!("\n{}", " ".repeat(start.matches(' ').count() + 2));
+    format!("{start}{}\n", lines.join(&joint))
 }
 
 pub(super) fn shown(path: &Option<PathBuf>) -> Option<String> {

@@ -106,12 +106,9 @@ impl Outcome {
         Ok(())
     }
 
-    /// How coefficients are printed unless digits are given: in full if simplification has already chosen their digits.
-    pub(super) fn rounding(&self) -> Rounding {
-        match self.certificate.n_changes() {
-            0 => Rounding::default(),
-            _ => Rounding::Exact,
-        }
+    /// Coefficients in full where simplification has already chosen their digits.
+    pub(super) fn rounding(&self) -> Option<Rounding> {
+        (self.certificate.n_changes() > 0).then_some(Rounding::Exact)
     }
 
     /// Adds the certificate, and a comment to files that can hold one; `equations` are those of the model as printed.

@@ -147,12 +147,10 @@ fn command_line(
 fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetrics>) -> Answer {
     let (report, latent_dim) = (&trained.report, trained.model.latent_dim());
     let output = arguments.output.display().to_string();
-    let words = trained.model.latent_words().into_iter().zip(1..);
-    let words = words.map(|(words, number)| format!("  z{number}  {words}\n"));
     let text = format!(
-        "{output}: {latent_dim} latent coordinates from {} recordings\n{}\n{}{}",
-        arguments.recordings.len(),
-        words.collect::<String>(),
+        "{output}: {latent_dim} latent coordinates from {}\n\n{}\n{}{}",
+        counted(arguments.recordings.len(), "recording"),
+        model_text(&trained.model),
         metrics_table(report, tested),
         seed_table(report)
     );

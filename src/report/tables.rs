@@ -2,6 +2,8 @@
 
 use super::introduction::headline;
 use super::*;
+use crate::evaluate::PhaseInvariance;
+
 use crate::plan;
 
 pub(crate) type NamedRun = (PathBuf, Run);
@@ -187,24 +189,43 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
         .table()
 }
 
+const ROUNDED: f64 = 1e-9; // below, a difference is the rounding of zero
+
+/// Gravity, mass and symmetries of the equations, which nothing gave them.
 pub(crate) fn invariance_table(invariance: &Invariance) -> Table {
-    let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-    let words = format!(
-        "What the model says of physics that is known: gravity in flight {} m/s^2, mass {} kg, rotation {} rad/s^2 per N m; decoded joints \
-         move by up to {} rad for a body 1 m further on; by phase, change of the body's acceleration per metre of \
-         shift along x and y, and difference between mirror images",
-        shown(invariance.gravity_m_s2),
-        shown(invariance.mass_kg),
-        shown(invariance.rotation_rad_s2_per_nm),
-        significant(invariance.joint_shift_rad_m)
-    );
-    Table::of(&invariance.phases)
-        .column("phase", "", |phase| &phase.phase)
-        .column("shift in x", "1/s^2", |phase| phase.shift_x)
-        .column("shift in y", "1/s^2", |phase| phase.shift_y)
-        .column("mirror", "m/s^2", |phase| phase.mirror_asymmetry)
+    let phases = invariance.phases.iter();
+    let worst = |of: fn(&PhaseInvariance) -> f64| {
+        let worst = phases.clone().map(of).fold(0.0, f64::max);
+        Some(if worst < ROUNDED { 0.0 } else { worst })
+    };
+    let rotation = invariance.rotation_rad_s2_per_nm;
+    let joints = Some(invariance.joint_shift_rad_m);
+    let rows = [
+        ("gravity in flight", "m/s^2", invariance.gravity_m_s2),
+        ("mass", "kg", invariance.mass_kg),
+        ("pitch acceleration per moment", "rad/s^2 per N m", rotation),
+        ("joints moved by a body 1 m further on", "rad", joints),
+        (
+            "acceleration changed by a shift in x",
+            "1/s^2",
+            worst(|phase| phase.shift_x),
+        ),
+        (
+            "acceleration changed by a shift in y",
+            "1/s^2",
+            worst(|phase| phase.shift_y),
+        ),
+        (
+            "difference between mirror images",
+            "m/s^2",
+            worst(|phase| phase.mirror_asymmetry),
+        ),
+    ];
+    Table::of(rows)
+        .column("known physics", "", |row| format!("{}, {}", row.0, row.1))
+        .column("value", "", |row| row.2.map(significant))
         .table()
-        .captioned(words)
+        .captioned("Known physics that the equations reproduce")
 }
 
 type Driven<'a> = (

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::limits::table::{DIGITS, MARGIN, SIGNIFICANT, WIDTH};
-use crate::typeset::Form;
+use crate::typeset::{Form, Rounding};
 
 #[derive(Debug, Args)]
 #[command(
@@ -46,6 +46,14 @@ pub enum UnitsChoice {
 }
 
 impl UnitsChoice {
+    /// Rounding of printed coefficients where neither digits nor significant digits are chosen.
+    pub fn usual_rounding(self) -> Rounding {
+        match self {
+            Self::Si | Self::Scaled => Rounding::default(),
+            Self::Physical => Rounding::PHYSICAL,
+        }
+    }
+
     /// Units at the interface of functions.
     pub fn of_interface(self) -> Units {
         match self {

@@ -28,7 +28,7 @@ pub(crate) use coordinates::is_plausible;
 pub use coordinates::{
     ByContact, Comparison, CoordinateSums, Fit, FitSums, LAMBDA, PointwiseSums, combined_loss,
 };
-pub use invariance::Invariance;
+pub use invariance::{Invariance, PhaseInvariance};
 pub use prediction::{LinearisedPhase, PredictionError, eigenvalues};
 pub(crate) use prediction::{linearise_phases, state_matrix};
 pub use round_trip::RoundTrip;
