@@ -201,7 +201,9 @@ fn leg_table(legs: &LegMoments) -> String {
         ("second, calf", "kg m^2", legs.calf_kg_m2),
     ];
     let table = Table::of(rows)
-        .column("moment of a leg's links", "", |row| format!("{}, {}", row.0, row.1))
+        .column("moment of a leg's links", "", |row| {
+            format!("{}, {}", row.0, row.1)
+        })
         .column("value", "", |row| row.2)
         .table();
     format!("\nweight and inertia of legs on the ground are subtracted\n\n{table}")

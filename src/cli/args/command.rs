@@ -68,6 +68,9 @@ pub(crate) struct DemoArguments {
     /// Folder for the files of the demo
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out_dir: PathBuf,
+    /// Also print every metric of every jump
+    #[arg(long)]
+    pub verbose: bool,
     /// Write into a folder that holds files romc did not make
     #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
     pub force: Overwrite,

@@ -270,6 +270,8 @@ fn escaped(cell: &str) -> String {
 
 /// Longest line on a terminal, in characters.
 pub const COLUMNS: usize = 100;
+/// Widths to which titles are wrapped, one after the other, until a table fits.
+const TITLE_WIDTHS: [usize; 4] = [20, 14, 10, 7];
 
 impl fmt::Display for Table {
     /// Columns aligned under their titles: the first to the left, the rest to the right. Where a line would be too
@@ -281,21 +283,29 @@ impl fmt::Display for Table {
             let cells = rows.iter().filter_map(|row| row.get(column));
             cells.map(|cell| length(cell)).max().unwrap_or(0)
         };
-        let whole: usize = (header.iter().enumerate())
-            .map(|(column, title)| 2 + length(title).max(of_cells(column)))
-            .sum();
-        let titles: Vec<Vec<String>> = (header.iter().enumerate())
-            .map(|(column, title)| match whole <= COLUMNS {
-                true => vec![title.clone()],
-                false => wrapped(title, of_cells(column)),
-            })
-            .collect();
-        let widths: Vec<usize> = (titles.iter().enumerate())
-            .map(|(column, lines)| {
+        let titles_of = |width: usize| -> Vec<Vec<String>> {
+            let titles = header.iter().enumerate();
+            titles
+                .map(|(column, title)| wrapped(title, width.max(of_cells(column))))
+                .collect()
+        };
+        let widths_of = |titles: &[Vec<String>]| -> Vec<usize> {
+            let widths = titles.iter().enumerate().map(|(column, lines)| {
                 let title = lines.iter().map(|line| length(line)).max();
                 title.unwrap_or(0).max(of_cells(column))
-            })
-            .collect();
+            });
+            widths.collect()
+        };
+        let fits =
+            |widths: &[usize]| widths.iter().map(|width| 2 + width).sum::<usize>() <= COLUMNS;
+        let mut titles = titles_of(usize::MAX);
+        for width in TITLE_WIDTHS {
+            if fits(&widths_of(&titles)) {
+                break;
+            }
+            titles = titles_of(width);
+        }
+        let widths = widths_of(&titles);
         let blocks = blocks(&widths);
         for (place, block) in blocks.iter().enumerate() {
             if place > 0 {
