@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
             tables[0],
             tables[1]
         );
-        text += &verdict_lines(&verdict);
+        text += &lines("", verdict_lines(&verdict).lines());
     } else {
         let [fit, failed] = [&verdict.fit_for, &verdict.failed].map(|uses| uses.join(", "));
         text += &lines(
@@ -218,10 +218,19 @@ fn controllers(model: &ReducedModel, jumps: &[Recording], runs: &[NamedRun]) -> 
 /// The files by use, and where to go on.
 fn made_text(model: &ReducedModel, self_test: &str) -> String {
     let name = model.identifier();
-    format!(
-        "  {name}.h, {name}.c, {name}/   C99 (self-test {self_test}) and a Rust crate\n  \
-         {name}.tex, commands.csv       equations for a paper; torques of every step\n"
-    )
+    let files = [
+        (
+            format!("{name}.h, {name}.c, {name}/"),
+            format!("C99 (self-test {self_test}) and a Rust crate"),
+        ),
+        (
+            format!("{name}.tex, commands.csv"),
+            "equations for a paper; torques of every step".to_owned(),
+        ),
+    ];
+    files
+        .map(|(files, words)| format!("  {files:<29} {words}\n"))
+        .concat()
 }
 
 /// Compiles the emitted C with the machine's compiler and runs its self-test: what became of it, or why it failed.

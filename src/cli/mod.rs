@@ -44,6 +44,7 @@ use std::process::{self, ExitCode};
 
 use args::{PhaseSet, ReadingArguments, TrainArguments, TrainSettings, Widths, *};
 use clap::Parser;
+use console::style;
 use nalgebra::{DMatrix, DVector};
 use prepared_recordings::RecordedSets;
 use serde_json::{Map, Value, json};
@@ -151,12 +152,13 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Answer { text, json, code }) => {
             let text = match arguments.json {
                 true => format!("{}\n", printable_json(&json.to_string())),
-                false => printable(&text).into_owned(),
+                false => coloured(&printable(&text)),
             };
             if print(&text) { code } else { FAILED }
         }
         Err(error) => {
-            eprintln!("error: {}", printable(&error.to_string()));
+            let head = style("error:").for_stderr().red().bold();
+            eprintln!("{head} {}", printable(&error.to_string()));
             let first = std::error::Error::source(&error);
             for cause in std::iter::successors(first, |cause| cause.source()) {
                 eprintln!("  because: {}", printable(&cause.to_string()));
@@ -203,6 +205,27 @@ fn execute(arguments: &Arguments) -> Result<Answer> {
     let entries = std::mem::replace(&mut answer.json, json!({ "command": name }));
     extend(&mut answer.json, entries);
     Ok(answer)
+}
+
+/// The same text with the first words of failures, verdicts and notes in colour, where stdout is a terminal.
+fn coloured(text: &str) -> String {
+    if !console::colors_enabled() {
+        return text.to_owned();
+    }
+    let heads = [
+        ("FAILED", style("FAILED").red().bold()),
+        ("verdict:", style("verdict:").bold()),
+        ("warning:", style("warning:").yellow().bold()),
+        ("note:", style("note:").cyan()),
+    ];
+    let line = |line: &str| {
+        let head = heads.iter().find(|(head, _)| line.starts_with(head));
+        match head {
+            Some((head, styled)) => format!("{styled}{}", &line[head.len()..]),
+            None => line.to_owned(),
+        }
+    };
+    text.split_inclusive('\n').map(line).collect()
 }
 
 /// Prints to stdout, and says whether that worked; a reader that has gone away (`| head`) is no failure.

@@ -57,7 +57,7 @@ impl JudgedRuns {
         let (runs, failed) = (&self.runs, &self.failed);
         let mut text = format!("{}\n{}\n", control_table(runs), run_table(runs));
         text += &lines("FAILED along ", failures(runs).iter().chain(failed));
-        text += &verdict_lines(&self.verdict);
+        text += &lines("", verdict_lines(&self.verdict).lines());
         text + &lines("note: ", &self.remarks)
     }
 

@@ -26,7 +26,7 @@ fn of_log(arguments: &ReportArguments, path: &Path) -> Result<Answer> {
     let figures = log_figures(&log, &facts);
     let page = log_page(path, &facts, &figures)?;
     let (shown, bytes) = (output.display().to_string(), page.len());
-    let mut text = format!("{}\n{}", facts.headline, lines("", &facts.sentences));
+    let mut text = lines("", [&facts.headline]) + &lines("", &facts.sentences);
     text += &format!("{shown}: {} kB, {} figures\n", bytes / 1000, figures.len());
     let json = json!({ "log": path.display().to_string(), "output": shown, "bytes": bytes });
     let mut answer = Answer::new(text, json);

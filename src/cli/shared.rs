@@ -253,7 +253,7 @@ pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Record
 }
 
 pub(super) fn note(text: &str) {
-    eprintln!("note: {}", printable(text));
+    eprintln!("{} {}", style("note:").for_stderr().cyan(), printable(text));
 }
 
 pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {

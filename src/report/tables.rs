@@ -29,7 +29,8 @@ fn coordinates(assessment: &Assessment<'_>) -> Table {
 }
 
 pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
-    let every = format!("restarted every {} s", assessment.restart_every_s);
+    let every = format!("error over {} s", assessment.restart_every_s);
+    let every_r2 = format!("R^2 over {} s", assessment.restart_every_s);
     let mut table = coordinates(assessment);
     let first = assessment.runs.first();
     let modelled = first.and_then(|run| modelled(model, run).ok());
@@ -38,8 +39,8 @@ pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>
         _ => r2(*fit),
     };
     for (title, coefficient, sums) in [
-        ("full rms", "full R^2", &assessment.full),
-        (&every, "restarted R^2", &assessment.restarted),
+        ("error, whole motion", "R^2, whole motion", &assessment.full),
+        (&every, &every_r2, &assessment.restarted),
     ] {
         let fits = sums.fits();
         table.column(title, "", fits.iter().copied().map(rms));
@@ -73,18 +74,31 @@ pub(crate) fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
 }
 
 pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
-    let every = format!("restarted every {} s", assessment.restart_every_s);
+    let every = format!("{} s", assessment.restart_every_s);
     let rows = ["body.x", "body.z"].map(|name| ["whole motion", &every].map(|kind| (name, kind)));
     let rows = rows.concat().into_iter();
     let rows = rows.map(|(name, kind)| format!("{name}, {kind}"));
     let mut table = Table::default();
-    table.column("rms error", "m", rows);
+    table.column("root mean square error", "m", rows);
     let sums = [&assessment.full, &assessment.restarted];
     let mut column = |name: &str, [full, restarted]: [[Option<f64>; 2]; 2]| {
         let cells = [full[0], restarted[0], full[1], restarted[1]];
         table.column(name, "", cells);
     };
     column("model", sums.map(|sums| body_rms(assessment, sums)));
+    let constant = [
+        ("constant velocity", &assessment.constant_velocity),
+        (
+            "constant latent velocity",
+            &assessment.constant_latent_velocity,
+        ),
+    ];
+    for (name, [full, restarted]) in constant {
+        column(
+            name,
+            [full, restarted].map(|sums| body_rms(assessment, sums)),
+        );
+    }
     for baseline in &assessment.baselines {
         let sums = [&baseline.full, &baseline.restarted];
         column(baseline.name, sums.map(template_rms));
@@ -243,12 +257,14 @@ pub(crate) fn control_table(runs: &[NamedRun]) -> Table {
     Table::of(rows)
         .column("recording", "", |(path, _)| file_name(path))
         .column("controller", "", |(_, row)| row.0)
-        .column("x one stage ahead", "mm", stage(|e| 1e3 * e.body_x_m))
-        .column("z one stage ahead", "mm", stage(|e| 1e3 * e.body_z_m))
-        .column("joints one stage ahead", "rad", stage(|e| e.joints_rad))
-        .column("own input: torque R^2 contact", "", |row| row.1.2.contact)
-        .column("torque R^2 flight", "", |(_, row)| row.2.flight)
-        .column("off after a push", "mm", |(_, row)| row.3.map(|m| 1e3 * m))
+        .column("x, one step ahead", "mm", stage(|e| 1e3 * e.body_x_m))
+        .column("z, one step ahead", "mm", stage(|e| 1e3 * e.body_z_m))
+        .column("joints, one step ahead", "rad", stage(|e| e.joints_rad))
+        .column("torque R^2, contact", "", |row| row.1.2.contact)
+        .column("torque R^2, flight", "", |(_, row)| row.2.flight)
+        .column("error after a push", "mm", |(_, row)| {
+            row.3.map(|m| 1e3 * m)
+        })
         .table()
 }
 
@@ -266,7 +282,7 @@ fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
         ("model", own, metrics.torque_r2, metrics.recovery_rms_m),
         ("no dynamics", blinds, blind.torque_r2, blind.recovery_rms_m),
         ("constant velocity", constant, none, None),
-        ("feedback off", None, none, off),
+        ("no feedback", None, none, off),
         ("replay", None, none, replay),
     ]
 }
@@ -344,8 +360,9 @@ pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
         .column("lift R^2 flight", "", |(_, run)| run.lift_r2.flight)
         .column("limit violations", "", |(_, run)| run.limit_violations)
         .column("friction violations", "", |row| row.1.friction_violations)
-        .column("step, median", "us", |(_, run)| whole(run.step_us.p50))
-        .column("step, p99", "us", |(_, run)| whole(run.step_us.p99))
+        .column("step, median, p99", "us", |(_, run)| {
+            [run.step_us.p50, run.step_us.p99].map(whole).join(", ")
+        })
         .table()
 }
 

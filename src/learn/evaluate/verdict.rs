@@ -18,7 +18,7 @@ const TORQUES: &str = "torques";
 const CONTROL: &str = "control";
 pub const TORQUES_IN_CONTACT: &str = "R^2 of torques in contact";
 pub const AFTER_A_PUSH: &str = "deviation after a push";
-const ONE_STAGE: &str = "error one stage ahead as a share of the baseline's";
+const ONE_STAGE: &str = "error one step ahead, share of the baseline's";
 const CONSTANT_VELOCITY: &str = "constant velocity";
 const CONSTANT_LATENT_VELOCITY: &str = "constant latent velocity";
 const NO_DYNAMICS: &str = "no dynamics";
@@ -98,7 +98,7 @@ impl VerdictRow {
         }
     }
 
-    /// `deviation after a push 12.3 mm, at most 11.9 mm (feedback off: 12.1 mm)`.
+    /// `deviation after a push 12.3 mm, at most 11.9 mm (no feedback: 12.1 mm)`.
     pub fn words(&self) -> String {
         let shown = |value: f64| match self.unit {
             "m" => format!("{:.1} mm", 1e3 * value),
@@ -304,7 +304,7 @@ fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
     let push = VerdictRow::new(
         (CONTROL, AFTER_A_PUSH, "m"),
         metrics.recovery_rms_m.filter(|_| off.is_some()),
-        ("feedback off", off),
+        ("no feedback", off),
         (Bound::AtMost, NO_BETTER * off.unwrap_or(0.0)),
     );
     let unplanned = VerdictRow::new(
