@@ -7,8 +7,8 @@
     .ci/numbers.py list
 
 docs/numbers/commands.toml has an entry per NAME: `command` (run by bash in the root of the repository), `inputs` (files and
-patterns whose digests are stored with the output), and `files` for pictures that the command makes, or `kept` with the
-reason why the output is not made anew here. docs/numbers/NAME.txt is the stored output. A page refers to it by a line
+patterns whose digests are stored with the output), `files` for pictures that the command makes, `kept` with the reason why
+the output is not made anew here, and `known` for constants that a table shows next to the output. docs/numbers/NAME.txt is the stored output. A page refers to it by a line
 `<!-- numbers: NAME -->`: every number of the table or block below must be in the output, as printed or after a change of
 unit by a power of ten, rounded.
 """
@@ -102,9 +102,9 @@ def numbers(text):
         yield found.group(0), float(found.group(0))
 
 
-def missing(block, output):
+def missing(block, output, constants):
     """Numbers of a page's block that no number of the output rounds to."""
-    known = [value for _, value in numbers(output)]
+    known = [value for _, value in numbers(output)] + constants
     absent = []
     for shown, value in numbers(block):
         if value == int(value) and abs(value) <= MOST_UNCHECKED:
@@ -136,7 +136,7 @@ def check():
         if name not in all_entries:
             faults.append(f"{page}:{line}: `{name}` is not in docs/numbers/commands.toml")
         elif stored:
-            absent = missing(block, stored[2])
+            absent = missing(block, stored[2], all_entries[name].get("known", []))
             if absent:
                 faults.append(f"{page}:{line}: not in docs/numbers/{name}.txt: {', '.join(absent)}")
     pictures = {path for entry in all_entries.values() for path in entry.get("files", [])}

@@ -50,7 +50,9 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
         .column("kn", "", |(.., [value, error])| pair(value.kn, error.kn))
         .table();
     let moments: [(&str, &str, fn(&LegMoments) -> f64); 5] = [
-        ("first moment, sideways from the hip", "kg m", |l| l.side_kg_m),
+        ("first moment, sideways from the hip", "kg m", |l| {
+            l.side_kg_m
+        }),
         ("first moment of the thigh", "kg m", |l| l.thigh_kg_m),
         ("first moment of the calf", "kg m", |l| l.calf_kg_m),
         ("second moment of the thigh", "kg m^2", |l| l.thigh_kg_m2),

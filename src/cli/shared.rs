@@ -323,12 +323,17 @@ pub(super) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>)
     lines.collect()
 }
 
-/// Text on lines that fit a terminal; those after the first are indented by two characters more than that.
+/// Text on lines that fit a terminal; those after the first are indented by two characters more. Text that has lines
+/// already, such as a table, stays as it is.
 pub(super) fn fitted(text: &str) -> String {
     let bare = text.trim_start_matches([' ', '\n']);
-    let (start, indent) = (&text[..text.len() - bare.len()], text.len() - bare.len());
+    if bare.contains('\n') {
+        return format!("{text}\n");
+    }
+    let start = &text[..text.len() - bare.len()];
+    let indent = start.matches(' ').count();
     let lines = wrapped(bare, COLUMNS - 2 - indent);
-    let joint = format!("\n{}", " ".repeat(start.matches(' ').count() + 2));
+    let joint = format!("\n{}", " ".repeat(indent + 2));
     format!("{start}{}\n", lines.join(&joint))
 }
 
