@@ -33,7 +33,7 @@ twine check --strict "$out"/romc-*
 for wheel in "$out"/romc-*linux*.whl; do
   [ -f "$wheel" ] || continue
   auditwheel show "$wheel" | tee "$work/audit"
-  # The quoted tag is the oldest that the symbols of the wheel allow. romc supports glibc 2.28 and newer.
+  # The quoted tag is the oldest that the symbols of the wheel allow; it may be manylinux_2_28 at most.
   minor=$(sed -n 's/.*"manylinux_2_\([0-9]*\)_.*".*/\1/p' "$work/audit" | head -n 1)
   [ "${minor:-99}" -le 28 ] || { echo "$wheel: needs a newer glibc than 2.28" >&2; exit 1; }
 done
