@@ -1,4 +1,4 @@
-//! The equations of a model, and what is printed of them: programs, code and text.
+//! The equations of a model, and their output as programs, code and text.
 //!
 //! [`equations`] are the accelerations over the expressions of `romc-cas`, [`lower`] makes an [`ir::Program`] of them;
 //! [`typeset`] and [`codegen`] print both. `romc` re-exports every module; depend on that.
