@@ -18,7 +18,7 @@
 //! # Ok::<(), romc::check::CheckError>(())
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
+#![allow(missing_docs, reason = "names are self-explanatory where there is no comment")]
 
 mod compare;
 mod point;

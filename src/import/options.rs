@@ -1,5 +1,5 @@
 //! Options of an import: everything that tensors do not carry.
-#![allow(missing_docs, reason = "the names say it")]
+#![allow(missing_docs, reason = "the names are self-explanatory")]
 
 use clap::ValueEnum;
 

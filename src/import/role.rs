@@ -1,5 +1,5 @@
 //! Parts of a model that a tensor can be.
-#![allow(missing_docs, reason = "the names say it")]
+#![allow(missing_docs, reason = "the names are self-explanatory")]
 
 use super::*;
 

@@ -1,5 +1,5 @@
 //! From a foreign file to a checked model, with the record of all decisions.
-#![allow(missing_docs, reason = "the names say it")]
+#![allow(missing_docs, reason = "the names are self-explanatory")]
 
 use std::fs::File;
 
