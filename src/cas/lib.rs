@@ -31,7 +31,10 @@
 //! assert_eq!(pool.evaluate(slope, &|_| 0.0), -0.91);
 //! # Ok::<(), romc::symbolic::ParseError>(())
 //! ```
-#![allow(missing_docs, reason = "names are self-explanatory where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 mod build;
 mod canonical;

@@ -18,7 +18,10 @@
 //! # Ok::<(), romc::check::CheckError>(())
 //! ```
 
-#![allow(missing_docs, reason = "names are self-explanatory where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 mod compare;
 mod point;

@@ -2,7 +2,10 @@
 //!
 //! [`equations`] are the accelerations over the expressions of `romc-cas`, [`lower`] makes an [`ir::Program`] of them;
 //! [`typeset`] and [`codegen`] print both. `romc` re-exports every module; depend on that.
-#![allow(missing_docs, reason = "names are self-explanatory where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 use romc_cas as symbolic;
 use romc_model::{files, model};

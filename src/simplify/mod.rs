@@ -3,7 +3,10 @@
 //! simpler model with a [`Certificate`]. It lists every change with the interval of its error over the whole box, and
 //! with its error at the recorded samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then
 //! `equation.rs` (the changes made to one equation) and `ranges.rs` (the intervals).
-#![allow(missing_docs, reason = "names are self-explanatory where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 mod certificate;
 #[cfg(test)]
