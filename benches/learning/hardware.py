@@ -134,7 +134,7 @@ def errors(bench, model, rows, recording, restart_s):
 
 
 def reconstruction(model, trajectories):
-    """What decoder and encoder make of the recorded states, without any dynamics."""
+    """Reconstruction of the recorded states by encoder and decoder, without any dynamics."""
     file = json.loads(pathlib.Path(model).read_text())
     z = [trajectories[f"z_{k + 1}"] for k in range(file["latent_dim"])]
     found = {}

@@ -2,7 +2,7 @@
 
     cargo build --release && python3 benches/learning/tables.py
 
-Every row is a training on the jumps of `examples/recordings/go1` and what `romc simulate` says of the model along
+Every row is a training on the jumps of `examples/recordings/go1` and the results of `romc simulate` with the model along
 its test jumps and along `go1-other`. About two minutes on two cores; needs Python alone.
 """
 

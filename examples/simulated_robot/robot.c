@@ -88,7 +88,7 @@ static int load(robot *r, const char *path)
     return 0;
 }
 
-/* What the robot's sensors and its estimator give: state, velocity, feet on the ground. */
+/* Measurements of the robot's sensors and its estimator: state, velocity, feet on the ground. */
 static void measure(const robot *r, double x[18], double dx[18], uint8_t feet[4])
 {
     const mjData *d = r->data;

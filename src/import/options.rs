@@ -1,5 +1,5 @@
 //! Options of an import: everything that tensors do not carry.
-#![allow(missing_docs, reason = "the names say it")]
+#![allow(missing_docs, reason = "the names are self-explanatory")]
 
 use clap::ValueEnum;
 
@@ -38,7 +38,7 @@ impl Format {
                 }
                 _ => {
                     "a file that ends in .safetensors, .npz, .txt (equations), .tex or .md (LaTeX), \
-                     or --format to say what it is"
+                     or --format with its format"
                 }
             };
             ImportError::at(&path.display().to_string(), Place::Whole, found, expected)

@@ -117,7 +117,7 @@ pub fn along_recording(
     })
 }
 
-/// The torques that the lift makes of exactly projected recorded inputs, at every sample: what the lift alone loses.
+/// Lifted torques of exactly projected recorded inputs, at every sample: the error of the lift alone.
 fn lift_comparison(
     controller: &mut Controller,
     recording: &Recording,

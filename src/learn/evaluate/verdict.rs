@@ -1,4 +1,4 @@
-//! What a model is fit for: rows that compare a figure with a baseline and a threshold, for a use each.
+//! The uses for which a model is fit: each row compares a metric with a baseline and a threshold.
 
 use super::*;
 
@@ -117,8 +117,8 @@ impl VerdictRow {
     }
 }
 
-/// Uses are `0.1 s` (predictions between restarts, by their time), `whole motion`, of walks `a stride` instead, `torques` (those that the controller
-/// finds itself) and `control`; one that is not measured is in neither list.
+/// Uses are `0.1 s` (predictions between restarts, by their time), `whole motion` (for walks `a stride`), `torques`
+/// (computed by the controller without recorded inputs) and `control`. A use that is not measured is in neither list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Verdict {
     pub fit_for: Vec<String>,
@@ -219,7 +219,7 @@ fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> 
         let body = ["body.x", "body.z"].map(|name| row(name, &[name], "m", &limit));
         rows.extend(body.into_iter().flatten());
         if of != short {
-            continue; // open loop, the least difference at take-off decides where pitch and legs end
+            continue; // in open loop, small differences at take-off determine where pitch and legs end
         }
         let in_plane = |name: &&str| name.ends_with(".hy") || name.ends_with(".kn");
         let names = Robot::state_names();
@@ -264,7 +264,7 @@ fn worst_of(control: &[&ControlMetrics]) -> Vec<VerdictRow> {
     worst
 }
 
-/// What passes of the control while predictions fail is not due to the dynamics: it counts as not measured.
+/// If predictions fail, a passed test of the control is not due to the dynamics: it counts as not measured.
 fn without_predictions(rows: &mut [VerdictRow], fails_soon: bool) {
     let mut one_stage = rows.iter().filter(|row| row.name == ONE_STAGE);
     if fails_soon || one_stage.any(VerdictRow::is_failed) {

@@ -19,7 +19,7 @@ pub(super) fn closed_form(
         return Err(TrainError::Option {
             option: "encoder-layers or decoder-layers",
             found: format!("{:?} and {:?}", maps.encoder_layers, maps.decoder_layers),
-            expected: "none with the closed form, which learns linear maps; take `--method joint`",
+            expected: "none with the closed form, which learns linear maps; use `--method joint`",
         });
     }
     let task = Task::new(recordings, robot, options)?;

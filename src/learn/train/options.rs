@@ -1,4 +1,4 @@
-//! What to train and how.
+//! Options of a training.
 
 use clap::ValueEnum;
 
@@ -22,7 +22,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// Learns a model, deterministically. A cancelled training ends with the seeds begun by then.
+    /// Learns a model, deterministically. A cancelled training ends with the seeds that have begun.
     ///
     /// # Errors
     /// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
@@ -96,8 +96,8 @@ pub enum Transfer {
 pub struct EncoderOptions {
     /// Weight of the lift loss, the input energy that the latent input cannot carry, against the reconstruction error.
     pub lift_weight: f64,
-    /// Weight of the three body positions in the reconstruction error, of all body coordinates where `body` has lateral ones;
-    /// the others have 1.
+    /// Weight of the three body positions in the reconstruction error, or of all body coordinates if `body` has lateral
+    /// ones; the others have 1.
     pub body_weight: f64,
     /// Coordinates with a smaller standard deviation (rad or m) are masked unless they are actuated.
     pub least_std: f64,
@@ -149,7 +149,7 @@ pub struct RegressionOptions {
     /// Parts of the recipe for named coordinates that are left out.
     pub leave_out: Vec<RecipePart>,
     pub body_equations: BodyEquations,
-    /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
+    /// Of all candidates within this share of the best validation score, the one with the fewest terms is chosen.
     pub slack: f64,
     /// Steps by which rollouts of the training jumps refine the coefficients chosen; 0 leaves the regression's.
     pub refinements: usize,
@@ -217,8 +217,8 @@ impl TrainOptions {
         InputRule::new(robot, self.actuators.clone(), self.wrench_frame)
     }
 
-    /// The settings of the paper: motors' torques, forces in the body's axes, one scale, no mask, no lift loss, Xi from
-    /// ones, the published library and transfer steps, accelerations as recorded.
+    /// The settings of the paper: motors' torques, forces in the body's axes, one scale, no mask, no lift loss,
+    /// accelerations as recorded. Also Xi from ones, the published library and transfer steps.
     pub fn paper(name: impl Into<String>, latent_dim: usize) -> Self {
         let mut options = Self::new(name, latent_dim);
         options.library = Some(LibraryChoice::Standard(StandardLibrary::default()));
@@ -235,7 +235,7 @@ impl TrainOptions {
         options
     }
 
-    /// What the encoder's rows are made of: networks have no rows to hold, so theirs are free.
+    /// The coordinates of the encoder's rows: networks have no fixed rows, so theirs are free.
     pub fn coordinates(&self) -> Coordinates {
         match self.joint.maps.is_linear() {
             true => self.encoder.coordinates,

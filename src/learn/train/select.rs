@@ -1,4 +1,4 @@
-//! Choosing Xi: many candidates, judged by what their rollouts predict on jumps that were not fitted.
+//! Selection of Xi: many candidates, judged by their rollouts on jumps that were not fitted.
 
 use std::collections::BTreeSet;
 
@@ -44,9 +44,9 @@ pub struct Choice {
     pub active: usize,
 }
 
-/// Of all combinations of windows, ridges and prunings within the slack of the best by `judge`, the sparsest: Xi of
-/// every phase, how it was fitted, and the number of candidates. Once there is a best, errors are relative to its own.
-/// If cancelled, the search ends as soon as a candidate is stable.
+/// The sparsest of all combinations of windows, ridges and prunings within the slack of the best by `judge`. Returns Xi
+/// of every phase, how it was fitted, and the number of candidates. Once there is a best, errors are relative to its
+/// own. If cancelled, the search ends as soon as a candidate is stable.
 pub(super) fn select(
     set: EncodedSet<'_>,
     (knowledge, mirror): (&[Knowledge], &Mirror),
@@ -190,8 +190,8 @@ impl Trial<'_> {
 type Regressions = [(usize, Vec<Regression>)]; // of every phase, for each of the windows
 
 impl Refiner<'_> {
-    /// All combinations; where there are terms to choose that are not affine also those without them, and the best of these
-    /// grown by such terms: rollouts of full libraries diverge more often than not.
+    /// All combinations. If there are nonlinear terms to choose, also those without them, and the best of these grown
+    /// by such terms, because rollouts of full libraries often diverge.
     fn try_all<'r>(
         &self,
         regressions: &'r Regressions,

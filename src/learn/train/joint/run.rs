@@ -133,7 +133,7 @@ impl Trainer<'_> {
         };
         let all: Vec<&Batch> = self.batches.iter().collect();
         let of_phase = |phase: usize| all.iter().copied().filter(move |b| b.phase == phase);
-        // The published first step sees contact only. A network says nothing about states that it was not trained on.
+        // The published first step uses contact only. A network is undefined at states on which it was not trained.
         let first = match self.is_linear() || published {
             true => of_phase(0).collect(),
             false => all.clone(),
@@ -254,7 +254,7 @@ impl Trainer<'_> {
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())
-                .expect("takes the robot's states");
+                .expect("accepts the robot's states");
             sum + &jacobian * jacobian.transpose()
         }) / x.ncols().max(1) as f64;
         // A basis without full rank is left as it is; the regression then reports that no model is stable.
