@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
 /// One of romc's commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Run all steps on the shipped model and recordings: equations, code, rollouts, controller
+    /// Run all steps on the shipped model and recordings
     Demo(DemoArguments),
     /// Describe recordings and models, and list implausible samples
     Inspect(InspectArguments),
@@ -49,7 +49,7 @@ pub(crate) enum Command {
     Import(ImportArguments),
     /// Show a robot, or convert a URDF file to a robot file
     Robot(RobotArguments),
-    /// Prove that two models, equation files or papers in LaTeX are equal, or show a difference
+    /// Prove that two models, equation files or papers are equal, or show a difference
     Check(CheckArguments),
     /// Compile a model to equations, code (C, Rust, Python, MATLAB) or a controller
     Compile(CompileArguments),

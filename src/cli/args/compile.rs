@@ -21,7 +21,7 @@ pub(crate) struct CompileArguments {
     #[arg(value_delimiter = ',', default_value = "latex,c,rust")]
     pub emit: Vec<Target>,
     /// Recording or plan that the examples of generated controllers follow, made with the model's robot. For PLAN.csv the
-    /// settings in PLAN.settings.toml become defaults of the controller [default: none; a motion of a Go1]
+    /// settings in PLAN.settings.toml become defaults of the controller [default: a shipped jump of a Go1]
     #[arg(long, help_heading = TARGETS, value_name = "PLAN.csv")]
     pub plan: Option<PathBuf>,
     #[command(flatten)]
@@ -105,8 +105,8 @@ pub(crate) struct EquationArguments {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = SIMPLIFICATION)]
 pub(crate) struct SimplifyArguments {
-    /// Largest error of any ddz in the domain after dropping and rounding terms: 1% of its root mean square over the
-    /// recordings, or 0.05 in scaled units per s^2 [default: 0]
+    /// Largest error of any ddz in the domain after dropping and rounding terms. 1% is a share of its root mean square over
+    /// the recordings, 0.05 is in scaled units per s^2 [default: 0]
     #[arg(long, value_name = "ERROR", requires = "domain")]
     #[arg(allow_negative_numbers = true)]
     pub tolerance: Option<Tolerance>,

@@ -9,8 +9,8 @@ use crate::limits::table::{HORIZON, RESTART_EVERY, STEP, TORQUE_RATE};
     after_help = "Phases of LaTeX are found by a comment `% Phase NAME` or a label that ends in the name, those of \
                   Markdown by a heading. Otherwise their order counts. Decimals of LaTeX and Markdown are regarded as \
                   rounded in their last digit.\n\n\
-                  A domain is a TOML file with a table per phase and a range per variable in scaled units, such as \
-                  `[contact]` and `z1 = [-0.2, 0.4]`. Without a domain, points are drawn from ranges of several sizes \
+                  A domain is a TOML file with a table per phase, such as `[contact]`. It has a range per variable in \
+                  scaled units, such as `z1 = [-0.2, 0.4]`. Without a domain, points are drawn from ranges of several sizes \
                   around zero, the smallest -0.03 to 0.03 and the largest -100 to 100.\n\n\
                   Exit code 0: proven equal; 1: different, or not decided; 2: a file could not be read.\n\n\
                   Examples:\n  \

@@ -32,11 +32,13 @@ const SHORT: &str =
     "This is a selection: `romc import --help` lists all options and the names of tensors.\n\n";
 
 const TENSORS: &str = "\
-Tensors are found by the names of the parts: encoder.weight, encoder.bias, decoder.weight, decoder.bias, xi.PHASE (or \
-sindy_coefficients.PHASE), mask.PHASE (or coefficient_mask.PHASE), input_mean.PHASE, input_covariance.PHASE, \
-scaling.state, scaling.input, mean.state, std.state, std.input. Names of modules may come first (net.encoder.0.weight, \
-encoder/dense_1/kernel). Dots, slashes and underscores separate words (xi_contact). --map names the others. Input \
-statistics are those of u in SI units, 18 numbers and 18 x 18.
+Tensors are found by the names of the parts:
+  encoder.weight, encoder.bias, decoder.weight, decoder.bias,
+  xi.PHASE (or sindy_coefficients.PHASE), mask.PHASE (or coefficient_mask.PHASE),
+  input_mean.PHASE, input_covariance.PHASE (of u in SI units, 18 numbers and 18 x 18),
+  scaling.state, scaling.input, mean.state, std.state, std.input.
+Names of modules may come first (net.encoder.0.weight, encoder/dense_1/kernel). Dots, slashes and underscores \
+separate words (xi_contact). --map names the others.
 
 The command prints the part and layout of each tensor, unused tensors, and the terms of the rows of Xi.
 
@@ -72,8 +74,8 @@ pub(crate) struct ImportArguments {
     #[arg(long, help_heading = FILE, value_name = "VARIABLE=NAME")]
     pub symbols: Vec<String>,
 
-    /// Candidate terms in the order of the rows of Xi: `degree=N[,trigonometric][,inputs]`, a file with one term per line,
-    /// or the terms themselves as in "1; z1; sin(z1); u1" [required for tensors]
+    /// Candidate terms in the order of the rows of Xi. They are `degree=N[,trigonometric][,inputs]`, a file with one term
+    /// per line, or a list such as "1; z1; sin(z1); u1" [required for tensors]
     #[arg(long, help_heading = EQUATIONS, value_name = "LIBRARY", value_parser = library_argument)]
     pub library: Option<LibraryArgument>,
     /// Order of the terms of degree=N,...: 1, z, dz, products, sines and cosines as below, inputs [default: decided by
@@ -105,13 +107,13 @@ pub(crate) struct ImportArguments {
     #[arg(long, help_heading = ROBOT, value_name = "FACTOR", value_delimiter = ',')]
     #[arg(value_parser = real(&INPUT_SCALING), hide_short_help = true)]
     pub input_scaling: Vec<f64>,
-    /// Axes of force and moment in the inputs of the training: body as in the paper, world, or ground (world for feet that
-    /// push and never pull) [default: body]
+    /// Axes of force and moment in the inputs of the training: body as in the paper, world, or ground. `ground` is `world`
+    /// for feet that push and never pull [default: body]
     #[arg(long, help_heading = ROBOT, value_name = "FRAME", requires = "robot")]
     #[arg(value_parser = wrench_frame, hide_short_help = true)]
     pub wrench_frame: Option<WrenchFrame>,
-    /// Friction and rotor inertia of the joints that the training subtracted from the torques: a file with a table
-    /// `actuators`, such as one of `romc identify` [default: none]
+    /// Joint friction and rotor inertia that the training subtracted from the torques. A file with a table `actuators`,
+    /// such as one of `romc identify` [default: none]
     #[arg(long, help_heading = ROBOT, value_name = "FILE.toml", requires = "robot")]
     pub actuators: Option<PathBuf>,
     /// Sampling period of the training recordings in s, stored in the model [default: none]

@@ -172,8 +172,9 @@ pub(crate) struct TrainSettings {
     /// Number of latent coordinates d [required, or in --config]
     #[arg(long, help_heading = MODEL, value_name = "D", value_parser = count(&table::LATENT_DIM))]
     #[arg(required_unless_present_any = ["config", "from"])]
+    #[arg(display_order = 0)]
     pub latent_dim: Option<usize>,
-    /// Method [default: closed-form; joint with --paper or its options]
+    /// Method [default: closed-form; joint with --paper or an option under Joint method]
     #[arg(long, help_heading = METHOD, value_enum)]
     pub method: Option<Method>,
     /// Robot of the recordings: go1, go2, a1, or a .toml or .urdf file [default: go1; with --from that of the model]
@@ -268,10 +269,12 @@ pub(crate) struct TrainSettings {
     pub wrench_frame: Option<WrenchFrame>,
     /// Phases by the name of a motion [default: jump]
     #[arg(long, help_heading = MODEL, value_name = "MOTION", value_enum)]
+    #[arg(display_order = 2)]
     pub phases: Option<PhaseSet>,
     /// Phases one by one: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001. Can be repeated; the
     /// first match counts [default: those of --phases]
     #[arg(long, help_heading = MODEL, value_name = "NAME=FEET", conflicts_with = "phases")]
+    #[arg(display_order = 3)]
     pub phase: Option<Vec<PhasePattern>>,
     /// Leave out implausible samples, which `romc inspect` lists
     #[arg(long, help_heading = RECORDINGS)]
@@ -301,6 +304,7 @@ pub(crate) struct TrainSettings {
     pub mask_input_share: Option<Finite>,
     /// Rows of a linear encoder [default: named; free with --paper or hidden layers]
     #[arg(long, help_heading = MODEL, value_name = "KIND", value_enum)]
+    #[arg(display_order = 1)]
     pub coordinates: Option<Coordinates>,
     /// Body coordinates with a latent coordinate of their own, a list with x and z, or all [default: x,z; x,z,pitch from d
     /// = 5; all with --phases trot or crawl from d = 6]

@@ -126,9 +126,9 @@ pub enum MirrorImages {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyEquations {
-    /// Equations of each phase; free fall in flight
+    /// Own equations in each phase; free fall in flight
     PerPhase,
-    /// The same on the ground; free fall in flight
+    /// The same in all phases on the ground; free fall in flight
     AllPhases,
 }
 
