@@ -4,6 +4,8 @@
 mod bounds;
 #[path = "cli/failed_runs.rs"]
 mod failed_runs;
+#[path = "cli/helps.rs"]
+mod helps;
 #[path = "cli/outputs.rs"]
 mod outputs;
 mod outside;

@@ -31,11 +31,10 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     let mut files = deploy::emit(&Equations::of(&model), &targets, &options)?;
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
-    progress.set_message("running the controller");
+    progress.finish_and_clear();
     let control = mpc::run_with_both_lifts(&model, &jumps)?;
     let commands = mpc::command_table(&model, &control[0]).csv();
     files.push(EmittedFile::new("commands.csv", commands));
-    progress.set_message("drawing the report");
     let digests = JUMPS.map(|(name, bytes)| (PathBuf::from(name), sha256(bytes)));
     let verdict = verdict(&model, &evaluation, &mpc::judged(&control[0]));
     let content = Content {
@@ -52,7 +51,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
     let made = inputs.write_folder(folder, &files, arguments.force)?;
-    progress.set_message("checking the C code");
+    let progress = spinner("checking the C code");
     let self_test = self_test(&model, folder);
     progress.finish_and_clear();
 

@@ -43,7 +43,6 @@ use std::path::{Path, PathBuf};
 use std::process::{self, ExitCode};
 
 use args::{PhaseSet, ReadingArguments, TrainArguments, TrainSettings, Widths, *};
-use clap::Parser;
 use console::style;
 use nalgebra::{DMatrix, DVector};
 use prepared_recordings::RecordedSets;
@@ -135,7 +134,7 @@ pub fn run() -> ExitCode {
 
 /// The same with the arguments of another program, the first of them its name; returns the exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let arguments = match Arguments::try_parse_from(arguments) {
+    let arguments = match Arguments::read(arguments) {
         Ok(arguments) => arguments,
         Err(refusal) => {
             // Help and the version are refusals of clap that go to stdout; a reader that has gone away is no failure.

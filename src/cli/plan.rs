@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
         return Ok(answer);
     }
     if arguments.reach {
-        let bar = progress_bar("planning a grid of goals");
+        let bar = progress_bar("planning a grid of goals", 0);
         let progress = |done, total| show_progress(&bar, done, total);
         let reach = plan::reach(&model, &settings, progress)?;
         bar.finish_and_clear();

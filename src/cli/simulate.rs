@@ -17,8 +17,9 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer> {
         true => Horizon::all(&model, &assessment)?,
         false => Vec::new(),
     };
-    progress.set_message("judging");
-    let (verdict, unmeasured) = verdict_by_default(&model, &recordings, &assessment);
+    begin_part(&progress, "running the controller", Some(recordings.len()));
+    let judged = |done, total| show_progress(&progress, done, total);
+    let (verdict, unmeasured) = verdict_by_default(&model, &recordings, &assessment, judged);
     progress.finish_and_clear();
     let unmeasured =
         unmeasured.map(|reason| format!("torques and control are not judged: {reason}"));

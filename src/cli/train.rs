@@ -34,8 +34,12 @@ pub(super) fn run(arguments: &TrainArguments) -> Result<Answer> {
 
     let bar = spinner("training");
     let mut listener = |progress: Progress| match progress {
-        Progress::Stage { name, .. } => bar.set_message(name),
-        Progress::Done { text, .. } => bar.set_message(text),
+        Progress::Stage { name, steps } => begin_part(&bar, name, steps),
+        Progress::Done { text } => {
+            bar.set_message(text);
+            bar.inc(1);
+        }
+        Progress::Step => bar.inc(1),
     };
     let mut monitor = Monitor::new(&mut listener, stop_on_interrupt());
     let mut trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;

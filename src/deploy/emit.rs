@@ -26,7 +26,7 @@ pub enum Target {
     Matlab,
     /// The controller as a crate with a C interface
     Controller,
-    /// The controller in C99 alone: one source file next to the model's
+    /// The controller in C99, one file next to the model's
     ControllerC,
 }
 

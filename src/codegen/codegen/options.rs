@@ -83,10 +83,10 @@ fn beyond_single(program: &Program) -> Option<f64> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum SineCosine {
     // Within about one unit of the last place, without branches, so that loops over it vectorise.
-    /// A function inside the file that compilers vectorise, the same bits everywhere.
+    /// A function in the file; equal bits on every platform
     #[default]
     Inline,
-    /// The platform's mathematics library.
+    /// The mathematics library of the platform
     Library,
 }
 

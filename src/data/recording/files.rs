@@ -158,7 +158,7 @@ pub enum ImplausibleSamples {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Accelerations {
-    /// The recording's own columns, differences where it has none.
+    /// Columns of the recording, or differences if it has none
     #[default]
     Recorded,
     /// Differences of the recorded velocities.

@@ -11,9 +11,9 @@ use crate::mpc::problem::to_upright;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum ReferenceInput {
-    /// The recorded torques and forces, projected into the latent space.
+    /// Projection of the recorded torques and forces
     Recorded,
-    /// None: the controller finds the input itself.
+    /// No input; the controller computes its own
     None,
 }
 

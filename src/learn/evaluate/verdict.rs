@@ -164,14 +164,19 @@ pub fn verdict(
 }
 
 /// The verdict with a controller of [`usual_settings`], and why this one was not measured, if so.
+/// `progress(done, total)` is called after each recording.
 pub fn verdict_by_default(
     model: &ReducedModel,
     recordings: &[Recording],
     assessment: &Assessment<'_>,
+    mut progress: impl FnMut(usize, usize),
 ) -> (Verdict, Option<EvaluateError>) {
     let settings = usual_settings(model, recordings);
-    let measured = recordings.iter();
-    let measured = measured.map(|recording| control_metrics(model, recording, settings));
+    let measured = recordings.iter().zip(1..).map(|(recording, done)| {
+        let metrics = control_metrics(model, recording, settings);
+        progress(done, recordings.len());
+        metrics
+    });
     match measured.collect::<Result<Vec<_>, _>>() {
         Ok(control) => {
             let control: Vec<&ControlMetrics> = control.iter().collect();

@@ -179,21 +179,25 @@ fn with_floor(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
 pub const LIFTS: [(&str, &str, Lift); 2] = [
     (
         "transpose",
-        "`u = W_e^T u_lat`, the paper's",
+        "`u = W_e^T u_lat`, as in the paper",
         Lift::Transpose,
     ),
     (
         "consistent",
-        "Torques whose own ground reaction forces reproduce the latent input",
+        "Torques with ground forces that reproduce the latent input",
         Lift::Consistent,
     ),
 ];
 
 pub const SOLVERS: [(&str, &str, Solver); 2] = [
-    ("clarabel", "General interior point", Solver::Clarabel),
+    (
+        "clarabel",
+        "General interior-point solver",
+        Solver::Clarabel,
+    ),
     (
         "riccati",
-        "Gains prepared ahead where no limit is active, else an interior point stage by stage",
+        "Structured solver with gains prepared in advance",
         Solver::Riccati,
     ),
 ];

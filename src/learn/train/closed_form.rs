@@ -35,7 +35,7 @@ pub(super) fn closed_form(
 
 fn fit(task: &Task<'_>, seed: u64, monitor: &mut Monitor<'_>) -> Outcome {
     let options = task.options;
-    monitor.stage("searching the latent space");
+    monitor.stage("searching the latent space", None);
     let (frame, d) = (&task.frame, options.latent_dim);
     let basis = find_subspace(&task.moments, frame, d, &options.encoder, seed);
     let encoder = task.encoder_over(&basis)?.into();

@@ -15,9 +15,9 @@ use crate::robot::{Actuators, JOINT_NAMES};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Encoder, decoder and coefficients each from a least-squares problem; seconds.
+    /// Least-squares problems, one after the other; seconds
     ClosedForm,
-    /// Encoder, decoder and coefficients together by Adam, as published; minutes.
+    /// All parts together by Adam, as in the paper; minutes
     Joint,
 }
 
@@ -117,29 +117,27 @@ pub struct EncoderOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum MirrorImages {
-    /// Every training recording once more, legs exchanged, abductions, y, roll and yaw negated
+    /// Each recording again with left and right exchanged
     Added,
-    /// The recordings alone
+    /// No mirror images
     None,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyEquations {
-    /// Those of each phase by itself; in flight free fall
+    /// Own equations in each phase; free fall in flight
     PerPhase,
-    /// One for all phases with feet on the ground, of forces, moments and constants; in flight free fall
+    /// The same in all phases on the ground; free fall in flight
     AllPhases,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
-    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right. From
-    /// five coordinates on also the rotation about the centre of mass, from seven on foot positions relative to it. The
-    /// dynamics obey known physics.
+    /// Centre of mass, joints and pitch; from d = 5 rotation, from d = 7 foot positions. The dynamics obey known physics
     Named,
-    /// Any rows over all coordinates that move or are actuated.
+    /// Any rows over coordinates that move or are actuated
     Free,
 }
 

@@ -104,7 +104,7 @@ impl Refiner<'_> {
         let Some(weights) = self.weights(&start.xi).filter(|_| !free.indices.is_empty()) else {
             return start;
         };
-        monitor.stage("refining coefficients by rollouts");
+        monitor.stage("refining coefficients by rollouts", steps);
         self.descend(start, &free, weights, steps, monitor)
     }
 
@@ -271,7 +271,7 @@ impl Refiner<'_> {
             return refined;
         };
         let mut thinned = refined;
-        monitor.stage("dropping terms that rollouts do not miss");
+        monitor.stage("dropping terms that rollouts do not miss", None);
         while !monitor.cancelled() {
             let free = FreeCoefficients::of(&thinned.xi, self.knowledge);
             let model = self.model(&thinned.xi, &free, weights);

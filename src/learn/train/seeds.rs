@@ -23,7 +23,7 @@ impl Seeds {
         match outcome.and_then(with_finite_coefficients) {
             Ok(finished) => self.finished.push(finished),
             Err(error) if is_of_one_seed(&error) => {
-                monitor.stage("leaving out a seed without a model");
+                monitor.stage("leaving out a seed without a model", None);
                 monitor.done(format!("seed {seed}: {error}"));
                 self.failure.get_or_insert(error);
             }

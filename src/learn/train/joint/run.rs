@@ -90,7 +90,16 @@ impl Trainer<'_> {
     fn run_seeds(&self, monitor: &mut Monitor<'_>) -> Vec<Run> {
         let options = &self.task.options.joint;
         let (seeds, cancel) = (self.task.options.seeds(), monitor.cancel);
-        monitor.stage("training encoder, decoder and dynamics");
+        let steps = if self.is_published() {
+            2 + self.task.training.phases.patterns.len()
+        } else {
+            1
+        };
+        let epochs = steps * (options.schedule.epochs + options.schedule.refinement);
+        monitor.stage(
+            "training encoder, decoder and dynamics",
+            seeds.len() * epochs,
+        );
         let mut runs = Vec::new();
         for group in seeds.chunks(options.threads.max(1)) {
             if monitor.cancelled() {
@@ -104,7 +113,10 @@ impl Trainer<'_> {
                 });
                 let workers: Vec<_> = started.collect();
                 drop(sender);
-                receiver.iter().for_each(|text| monitor.done(text));
+                receiver.iter().for_each(|text| match text {
+                    Some(text) => monitor.done(text),
+                    None => monitor.step(),
+                });
                 for worker in workers {
                     runs.push(worker.join().expect("a seed does not panic"));
                 }
@@ -113,7 +125,7 @@ impl Trainer<'_> {
         runs
     }
 
-    fn run_seed(&self, seed: u64, cancel: &AtomicBool, news: &Sender<String>) -> Run {
+    fn run_seed(&self, seed: u64, cancel: &AtomicBool, news: &Sender<Option<String>>) -> Run {
         let options = &self.task.options.joint;
         let (schedule, published) = (&options.schedule, self.is_published());
         let weights = LossWeights {
@@ -124,11 +136,11 @@ impl Trainer<'_> {
         let mut loss = self.loss(weights, &parameters);
         let mut listener = |epoch: usize, losses: &Losses, active: usize| {
             // Nobody listens any more if the training is being dropped; that ends soon by itself.
-            let _ = news.send(format!(
+            let _ = news.send(Some(format!(
                 "seed {seed} epoch {epoch}: loss {:.3e}, decoder {:.3e}, {active} terms",
                 losses.total(&weights),
                 losses.decoder
-            ));
+            )));
             !cancel.load(Ordering::Relaxed)
         };
         let all: Vec<&Batch> = self.batches.iter().collect();
@@ -146,7 +158,10 @@ impl Trainer<'_> {
         };
         let losses = step(&mut parameters, Moved::All, &first, &mut listener);
         if published {
-            let mut quiet = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
+            let mut quiet = |_: usize, _: &Losses, _: usize| {
+                let _ = news.send(None);
+                !cancel.load(Ordering::Relaxed)
+            };
             step(&mut parameters, Moved::Decoder, &all, &mut quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
