@@ -254,7 +254,7 @@ pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Record
 }
 
 pub(super) fn note(text: &str) {
-    eprintln!("{} {}", style("note:").for_stderr().cyan(), printable(text));
+    eprintln!("{} {}", console::style("note:").for_stderr().cyan(), printable(text));
 }
 
 pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
