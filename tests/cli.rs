@@ -21,6 +21,7 @@ fn romc(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_romc"))
         .args(arguments)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env_remove("COLUMNS") // helps are wrapped at it
         .output()
         .expect("the binary runs")
 }

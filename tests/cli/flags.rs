@@ -94,7 +94,7 @@ const IDLE: [(&str, &str); 34] = [
 ];
 
 /// The same flags where they do something.
-const USED: [&str; 11] = [
+const USED: [&str; 12] = [
     "compile m.json --out-dir o --emit c --precision f32 --units scaled --sincos library",
     "compile m.json --out-dir o --emit latex --digits 3 --rename z1=x --form align --siunitx",
     "compile m.json --out-dir o --emit c --digits 3 --domain r.csv --clock recorded",
@@ -104,6 +104,7 @@ const USED: [&str; 11] = [
     "check a.json b.tex --exact --symbols z1=x",
     "mpc m.json r.csv --torque-rate 100",
     "plan m.json --distance 0.3 --apex 0.1 --output p.csv --start r.csv --clock recorded",
+    "plan m.json --distance 0.3 --apex 0.1 --figures f",
     "import n.npz --output m.json --robot go1 --order body,fl,fr,rl,rr --inputs-from r.csv --clock recorded",
     "robot r.urdf --feet a,b,c,d",
 ];

@@ -9,6 +9,7 @@ const STUDY: &str = "Study";
 const PARTS: &str = "Parts";
 
 #[derive(Debug, Args)]
+#[command(mut_arg("clock", |clock| clock.help(clock_help("repaired; recorded with --paper"))))]
 #[command(
     override_usage = "romc study [OPTIONS] <RECORDING>...\n       romc study [OPTIONS] --merge <DIR>...",
     after_help = "The example trains 45 models and takes about a minute on two cores. The same command continues a \
@@ -39,7 +40,7 @@ pub(crate) struct StudyArguments {
     #[arg(long, help_heading = STUDY, value_name = "N", default_value_t = 5)]
     #[arg(value_parser = count(&table::SEEDS))]
     pub seeds: usize,
-    /// Method of learning [default: closed-form; joint with --paper]
+    /// Method of learning [default: closed-form; joint with --paper or a setting of it]
     #[arg(long, help_heading = STUDY, value_enum)]
     pub method: Option<Method>,
     /// Train as in the paper, by the joint method
