@@ -1,6 +1,6 @@
-/* A Go1 in MuJoCo that stands up, jumps and stands again, by the state machine of a generated controller: measurements go in,
- * torques come out, 500 times a second. Prints a line for each mode and four times a second; with a path as argument
- * writes the log there. usage: robot [LOG.csv] */
+/* A Go1 in MuJoCo that stands up, jumps and stands again, by the state machine of a generated controller: measurements
+ * go in, torques come out, 500 times a second. Prints a line for each mode and four times a second; with a path as
+ * argument writes the log there. usage: robot [LOG.csv] */
 #include CONTROLLER_HEADER
 #include JUMP_HEADER
 #include LOG_HEADER

@@ -1,7 +1,8 @@
 //! One stage of the optimal control problem, in deviations from the reference divided by their scale.
 //!
 //! ```text
-//! x̂⁺ = A x̂ + B v + c,   G v <= g,   E p̂⁺ − t <= e,   t >= 0,   L v − L⁻ v⁻ <= l + o⁻ − o,   k − K v ∈ second-order cones
+//! x̂⁺ = A x̂ + B v + c,   G v <= g,   E p̂⁺ − t <= e,   t >= 0,   L v − L⁻ v⁻ <= l + o⁻ − o,
+//! k − K v ∈ second-order cones
 //! ```
 //!
 //! `p̂⁺` are the positions among the states `x̂⁺`, `L⁻ v⁻` and `o⁻` belong to the stage before. Both solvers use stages

@@ -271,7 +271,7 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>> {
         let place = Place::Character(at.row as usize, at.col as usize);
         RobotFileError::text(file, place, error.to_string())
     })?;
-    let mut unread_to = 0; // meshes and extensions of simulators may have signs of xacro in parts that romc does not read
+    let mut unread_to = 0; // parts that romc does not read, such as meshes, may have signs of xacro
     for node in document.descendants().filter(Node::is_element) {
         let name = node.tag_name();
         if UNREAD.contains(&name.name()) {

@@ -17,7 +17,7 @@ const LEAST_MOTION_M: f64 = 3e-3; // least movement of feet on stiff legs that s
 const BLOCK_S: f64 = 0.08; // length of the times over which forces and changes of velocity are summed, s
 const OTHER_SIGNS: f64 = 0.5; // share of the unexplained by which other signs have to be better than one sign for all
 const UNCARRIED: f64 = 0.8; // share of weight and change of velocity that torques may leave unexplained
-const HIP_SHARE: f64 = 0.3; // slope of the hips' torques over those that hold the feet on their side, from which their sign is decided
+const HIP_SHARE: f64 = 0.3; // slope of the hips' torques over those that hold the feet on their side
 const FITS_M: f64 = 0.05; // largest movement of feet on the ground in a reading that fits, m
 
 pub(super) type NamedUnit = (&'static str, f64);
