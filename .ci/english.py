@@ -141,8 +141,8 @@ def helps(romc):
                 short = re.match(r"\s*(-\S.*?|[<\[].*?)  +(\S.*)", line)
                 text += ["", short.group(2) if short and not is_example else ""]
             else:
-                text.append(re.sub(r"\[(default|possible values|aliases?|env): [^\]]*\]", "", bare))
-        yield command, "\n".join(text)
+                text.append(bare)
+        yield command, re.sub(r"\[(default|possible values|aliases?|env)[ :][^\]]*\]", "", "\n".join(text))
 
 
 def main():

@@ -1,4 +1,4 @@
-"""Trains with and without each default and prints the tables of docs/learning.md.
+"""Trains with and without each default and prints the tables of docs/evaluation/training-choices.md.
 
     cargo build --release && python3 benches/learning/tables.py
 

@@ -1,4 +1,4 @@
-"""Trains models of the whole body, each without a part of the recipe, and prints the table of docs/learning.md.
+"""Trains models of the whole body, each without a part of the recipe, and prints the table of docs/evaluation/training-choices.md.
 
     cargo build --release && python3 benches/learning/whole_body.py
 

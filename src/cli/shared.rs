@@ -225,7 +225,7 @@ pub(super) fn motions(recordings: &[Recording]) -> impl Iterator<Item = &Segment
 
 pub(super) const CUT: &str = "predictions are of pieces, each in the axes of its heading";
 pub(super) const UNROLLED: &str =
-    "a controller follows them only in the axes of their path, see docs/walking.md";
+    "a controller follows them only in the axes of their path, see docs/explanation/walking.md";
 
 pub(super) fn read_recordings(
     paths: &[PathBuf],

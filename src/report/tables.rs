@@ -439,7 +439,7 @@ fn rollouts_json(model: &ReducedModel, of: &Assessment<'_>, sums: &CoordinateSum
     })
 }
 
-/// A plan under the names of `docs/planning.md`.
+/// A plan under the names of `docs/reference/plan-settings.md`.
 pub fn plan_json(planned: &Plan) -> Value {
     let durations = (planned.parts.iter()).map(|part| (part.name.clone(), json!(part.duration_s)));
     json!({

@@ -126,7 +126,7 @@
 #define ONLINE_WHOLE_STAGE 0.75
 
 /* Bounds of measurements, and the damping that follows a violation; infinite bounds and counts of zero disable a
- * check. docs/control.md, "The supervisor", defines the quantity that each bound limits. */
+ * check. docs/explanation/supervisor.md, "The supervisor", defines the quantity that each bound limits. */
 typedef struct {
     real tilt_rad;
     real joint_margin_rad;

@@ -33,7 +33,7 @@ pub(crate) struct PlanArguments {
     /// Start from the first sample of this recording [default: the mean start of the training jumps]
     #[arg(long, help_heading = JUMP, value_name = "RECORDING")]
     pub start: Option<PathBuf>,
-    /// TOML file with weights and bounds of the plan; docs/planning.md lists names and defaults [default: none]
+    /// TOML file with weights and bounds of the plan; docs/reference/plan-settings.md lists names and defaults [default: none]
     #[arg(long, help_heading = JUMP, value_name = "FILE.toml")]
     pub settings: Option<PathBuf>,
     /// Speed of a walk, in m/s, for a model trained on walks [required for a walk]

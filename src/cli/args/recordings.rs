@@ -36,7 +36,7 @@ impl ReadingArguments {
 /// The one description of `--columns` and `--clock`, and examples.
 const OF_INSPECT: &str = "\
 Columns: a map of columns describes the log of another program. It is a TOML file with the name, unit and sign of each \
-column. `romc inspect --guess LOG` writes a first map, and docs/logs.md describes its keys. Without a map, romc reads \
+column. `romc inspect --guess LOG` writes a first map, and docs/reference/column-maps.md describes its keys. Without a map, romc reads \
 CSV files with its own column names, and MCAP files with named joints.
 
 Clocks: the times of a log often disagree with the recorded motion. `--clock repaired` rebuilds times that are wrong by \

@@ -33,7 +33,7 @@ pub(crate) struct StudyArguments {
     #[command(flatten)]
     pub reading: ReadingArguments,
     /// Latent dimensions: `4`, `1..18` (both ends included) or `2,4,6`. The default recipe has models up to 9
-    #[arg(long, help_heading = STUDY, value_name = "DIMS", default_value = "1..18")]
+    #[arg(long, help_heading = STUDY, value_name = "DIMS", default_value = "1..9")]
     #[arg(value_parser = dimensions)]
     pub latent_dims: Dimensions,
     /// Number of seeds per dimension

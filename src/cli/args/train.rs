@@ -317,7 +317,7 @@ pub(crate) struct TrainSettings {
     /// Mirror images of the training recordings [default: added with y, roll or yaw in --body; otherwise none]
     #[arg(long, help_heading = METHOD, value_name = "IMAGES", value_enum, hide_short_help = true)]
     pub mirror_images: Option<MirrorImages>,
-    /// Parts of the recipe for named coordinates to leave out; docs/learning.md states the effect of each [default: none]
+    /// Parts of the recipe for named coordinates to leave out; docs/evaluation/training-choices.md states the effect of each [default: none]
     #[arg(long, help_heading = METHOD, value_enum, value_name = "PART", value_delimiter = ',')]
     #[arg(hide_short_help = true)]
     pub leave_out: Option<Vec<RecipePart>>,

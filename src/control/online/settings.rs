@@ -361,7 +361,7 @@ settings! {
         input_weight: f64 = 10.0 => input_weight: Real, Accepts::Positive,
             "weight of deviations from the reference's input";
         /// (`w_v`). In closed loop small weights let a jump that is under-powered, by a payload or weak motors, end
-        /// short; see `docs/control.md`.
+        /// short; see `docs/reference/controller-settings.md`.
         velocity_weight: f64 = 0.1 => velocity_weight: Real, Accepts::Positive,
             "weight of velocities against positions";
         terminal_weight: f64 = 1.0 => terminal_weight: Real, Accepts::Positive,
@@ -410,7 +410,7 @@ settings! {
         after_end: AfterEnd = AfterEnd::Hold => after_end: i32, Accepts::Whole(0, 2, "0 (hold), 1 (damp) or 2 (stop)"),
             "after the reference: UPPER_HOLD (default), _DAMP or _STOP", in_c "after the reference: UPPER_HOLD, _DAMP or _STOP";
         /// Chosen so that no valid recording, plan or simulated jump of the repository comes near; see
-        /// `docs/control.md`.
+        /// `docs/reference/controller-settings.md`.
         bounds: Bounds = Bounds::USUAL =>
             tilt_rad: Real, Accepts::Bound, "most angle between the verticals of body and reference, rad"
             | joint_margin_rad: Real, Accepts::Bound, "how far joints may be outside their limits, rad"

@@ -36,7 +36,7 @@ const FALL_SHARE: Real = 0.5;
 const REFERENCE_MOVES: Real = 0.01;
 
 /// Bounds of measurements, and the damping that follows a violation; infinite bounds and counts of zero disable a
-/// check. `docs/control.md`, "The supervisor", defines the quantity that each bound limits.
+/// check. `docs/explanation/supervisor.md`, "The supervisor", defines the quantity that each bound limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs, reason = "the table of settings describes them")]
 pub struct Bounds {
@@ -70,7 +70,7 @@ impl Bounds {
         poor_steps: 0,
         ..Self::USUAL
     };
-    /// No valid recording, plan or simulated jump of the repository comes near these bounds; see `docs/control.md`.
+    /// No valid recording, plan or simulated jump of the repository comes near these bounds; see `docs/explanation/supervisor.md`.
     pub(super) const USUAL: Self = Self {
         tilt_rad: 0.5,
         joint_margin_rad: 0.1,

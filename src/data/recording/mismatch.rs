@@ -1,7 +1,7 @@
 //! Mismatches: contradictions between whole recordings and this robot. A recording of possible samples can still be of
 //! another robot, in other units, or have legs, signs or columns exchanged. The robot's geometry reveals it: a foot on
 //! the ground stays in place, the feet carry the weight, a body in flight falls. Metrics over a whole recording are
-//! compared with the bounds of `docs/recordings.md`.
+//! compared with the bounds of `docs/reference/recordings.md`.
 
 mod feet;
 mod stance;

@@ -1,7 +1,7 @@
 //! Figures of a model's quality.
 //!
 //! In: rollouts and recordings. Out: fits (root mean square in SI units, coefficient of determination), template models
-//! under the same inputs, stability, the losses of the lift and a [`Verdict`]. `docs/mathematics.md` defines each
+//! under the same inputs, stability, the losses of the lift and a [`Verdict`]. `docs/reference/metrics.md` defines each
 //! figure once. Start with `assessment`, then [`coordinates`](Fit).
 
 mod along_recording;

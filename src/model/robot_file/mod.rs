@@ -3,7 +3,7 @@
 //! In: a name, or the path or text of a file. Out: a checked [`Robot`] with its legs in romc's order, or an error with
 //! file, place, the text found and the text expected. Legs are matched by the positions of their first joints, joints
 //! by their order from the trunk. Read `identity.rs` first, the grammar, which also checks plausibility. `legs.rs`
-//! makes a robot of it, `urdf` finds the legs of a tree. `docs/robots.md` describes the file.
+//! makes a robot of it, `urdf` finds the legs of a tree. `docs/reference/robots.md` describes the file.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};

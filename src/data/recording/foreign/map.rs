@@ -1,4 +1,4 @@
-//! The map of a log: the columns of each quantity with unit, sign and order; a TOML file, described by `docs/logs.md`.
+//! The map of a log: the columns of each quantity with unit, sign and order; a TOML file, described by `docs/reference/column-maps.md`.
 //!
 //! ```toml
 //! [time]
