@@ -142,7 +142,7 @@ def helps(romc):
                 text += ["", short.group(2) if short and not is_example else ""]
             else:
                 text.append(bare)
-        yield command, re.sub(r"\[(default|possible values|aliases?|env)[ :][^\]]*\]", "", "\n".join(text))
+        yield command, re.sub(r"\[(default|possible\s+values|aliases?|env):[^\]]*\]", "", "\n".join(text))
 
 
 def main():
