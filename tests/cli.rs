@@ -1346,7 +1346,7 @@ fn compile_within_zero_tolerance_emits_the_same_bytes() {
     assert!(certificate.contains("- changes: 0\n"), "{certificate}");
     // default printing rounds, and the certificate bounds what that costs
     assert!(
-        certificate.contains("## What printing adds"),
+        certificate.contains("## Error due to rounded printing"),
         "{certificate}"
     );
 }
@@ -1539,7 +1539,7 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
         (&["--margin", "-1", "--domain", ranges], "from 0 to 100"),
         (
             &["--margin", "0.5", "--domain", ranges],
-            "taken as they are",
+            "used unchanged",
         ),
         (
             &["--tolerance", "1%", "--domain", ranges],
