@@ -1547,10 +1547,7 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
         (&["--tolerance", "-0.1", "--domain", ranges], "found `-0.1`"),
         (&["--tolerance", "nan", "--domain", ranges], "found `nan`"),
         (&["--margin", "-1", "--domain", ranges], "from 0 to 100"),
-        (
-            &["--margin", "0.5", "--domain", ranges],
-            "used unchanged",
-        ),
+        (&["--margin", "0.5", "--domain", ranges], "used unchanged"),
         (
             &["--tolerance", "1%", "--domain", ranges],
             "scaled units per s^2",

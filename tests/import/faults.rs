@@ -298,7 +298,8 @@ fn import_of_layers_that_are_no_chain_or_of_one_layer_is_refused() {
     let elu = |options: &mut ImportOptions| options.activation = Some(Activation::Elu);
     let text = message(broken, elu);
     assert!(
-        text.contains("each with the outputs of the previous one as inputs") && text.contains("(2 x 3)"),
+        text.contains("each with the outputs of the previous one as inputs")
+            && text.contains("(2 x 3)"),
         "{text}"
     );
     let text = message(|_| {}, elu);
