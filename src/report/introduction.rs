@@ -150,13 +150,13 @@ fn errors(assessment: &Assessment<'_>) -> String {
     let words = |sums: &CoordinateSums| match (sums.diverged, body_rms(assessment, sums)) {
         (0, [Some(x), Some(z)]) => {
             let [x, z] = [x, z].map(|rms| with_unit(rms, "m"));
-            format!("has a root mean square error of {x} in body.x and {z} in body.z")
+            format!("the root mean square error is {x} in body.x and {z} in body.z")
         }
-        (0, _) => "does not contain the body's position".to_owned(),
-        (diverged, _) => format!(
-            "diverges in {diverged} of {}",
-            counted(sums.windows, "rollout")
-        ),
+        (0, _) => "the prediction does not contain the body's position".to_owned(),
+        (diverged, _) => {
+            let rollouts = counted(sums.windows, "rollout");
+            format!("the prediction diverges in {diverged} of {rollouts}")
+        }
     };
     let (over, long) = match &assessment.over_stride {
         Some([own, ..]) => ("a stride", own),
@@ -164,8 +164,8 @@ fn errors(assessment: &Assessment<'_>) -> String {
     };
     let every = assessment.restart_every_s;
     format!(
-        "Driven by the recorded torques and contacts, the prediction over {over} {}. Restarted every {every} s from the \
-         recorded state, it {}.",
+        "Predictions use the recorded torques and contacts. Over {over} {}. Restarted every {every} s from the recorded \
+         state, {}.",
         words(long),
         words(&assessment.restarted)
     )
