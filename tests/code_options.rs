@@ -495,7 +495,7 @@ fn constants_of_single_precision_are_computed_in_double() {
         let refused = in_c(coefficient, term, Precision::Single).expect_err("too large");
         let said = refused.to_string();
         assert!(
-            said.contains("single precision") && said.contains("--precision f64"),
+            said.contains("single-precision") && said.contains("--precision f64"),
             "{said}"
         );
     }

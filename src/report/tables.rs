@@ -318,7 +318,6 @@ pub(super) fn file_name(path: &Path) -> String {
 
 pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
     let rows = runs.iter().map(|(path, run)| (path, &run.summary));
-    let whole = |us: f64| format!("{us:.0}");
     Table::of(rows)
         .column("recording", "", |(path, _)| file_name(path))
         .column("steps", "", |(_, run)| run.steps)
@@ -330,7 +329,8 @@ pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
         .column("limit violations", "", |(_, run)| run.limit_violations)
         .column("friction violations", "", |row| row.1.friction_violations)
         .column("step, median, p99", "us", |(_, run)| {
-            [run.step_us.p50, run.step_us.p99].map(whole).join(", ")
+            // Of one width, so that the layout does not depend on the machine.
+            format!("{:6.0}, {:7.0}", run.step_us.p50, run.step_us.p99)
         })
         .table()
 }

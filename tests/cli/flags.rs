@@ -135,7 +135,7 @@ fn a_flag_without_effect_is_refused_by_name_and_one_with_effect_is_not() {
 
 /// Flags that always have an effect, or that clap itself or their command refuses where they have none.
 const ELSEWHERE: &str = "json help version force output out-dir \
-    compile: emit as-learned tolerance domain margin save-model plan \
+    demo: verbose compile: emit as-learned tolerance domain margin save-model plan \
     inspect: guess robot: name check: domain convert: inputs-of clock columns identify: robot clock columns \
     simulate: restart-every verbose clock columns mpc: horizon step lift reference-input solver figures clock columns \
     plan: distance apex start figures reach settings speed \

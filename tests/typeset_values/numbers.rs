@@ -99,6 +99,40 @@ fn rounded_up_is_never_below_and_at_most_a_unit_of_the_last_digit_above() {
 }
 
 #[test]
+fn numbers_of_a_column_have_the_same_decimals_unless_their_sizes_are_too_different() {
+    let shown = |values: &[f64]| {
+        let mut table = Table::default();
+        table.column("row", "", (0..values.len()).map(|row| row.to_string()));
+        table.column("value", "", values.to_vec());
+        let text = table.to_string();
+        let rows = text.lines().skip(2);
+        let values = rows.map(|row| row.split_whitespace().nth(1).expect("a value").to_owned());
+        values.collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(shown(&[0.01289, 8.127e-4]), "0.01289 0.00081");
+    assert_eq!(shown(&[9.194, 13.53, 0.0]), "9.2 13.5 0");
+    assert_eq!(shown(&[1.2345e9, 0.5]), "1.234e9 0.5000");
+    assert_eq!(shown(&[f64::INFINITY, 1.0]), "diverged 1.00");
+}
+
+#[test]
+fn a_table_that_is_too_wide_wraps_its_titles_and_then_continues_below() {
+    let mut table = Table::default();
+    table.column("recording", "", ["test_01"]);
+    for index in 1..=12 {
+        let title = format!("error of the coordinate {index:02} over the whole motion");
+        table.column(&title, "m", [0.5]);
+    }
+    let text = table.to_string();
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 100),
+        "{text}"
+    );
+    assert_eq!(text.matches("test_01").count(), 2, "{text}");
+    assert_eq!(text.matches("0.500").count(), 12, "{text}");
+}
+
+#[test]
 fn every_rendering_has_the_same_cells() {
     let items = [("body.x", Some(0.5)), ("a|<b>, c", None)];
     let mut table = Table::of(items)
@@ -108,11 +142,11 @@ fn every_rendering_has_the_same_cells() {
     table.column("count", "", [3, 12]);
     assert_eq!(
         table.to_string(),
-        "  coordinate  rms, m  count\n  ----------  ------  -----\n  body.x      0.5000      3\n  a|<b>, c         -     12\n"
+        "  coordinate  rms, m  count\n  ----------  ------  -----\n  body.x       0.500      3\n  a|<b>, c         -     12\n"
     );
     assert_eq!(
         table.markdown(),
-        "| coordinate | rms, m | count |\n|---|---|---|\n| body.x | 0.5000 | 3 |\n| a\\|\\<b>, c | - | 12 |\n"
+        "| coordinate | rms, m | count |\n|---|---|---|\n| body.x | 0.500 | 3 |\n| a\\|\\<b>, c | - | 12 |\n"
     );
     assert_eq!(
         table.csv(),
