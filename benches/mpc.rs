@@ -1,17 +1,18 @@
-//! The controller's real-time iteration against the solver as it comes, on the same problems.
+//! The controller's real-time iteration compared with the solver's default settings, on the same problems.
 //!
 //! ```text
 //! cargo bench --bench mpc                      the table
-//! cargo bench --bench mpc -- --steps 100000    growth of memory over so many steps instead
+//! cargo bench --bench mpc -- --steps 100000    growth of memory over this many steps instead
 //! cargo bench --bench mpc -- --dump FILE       the problems as JSON lines, for other solvers
-//! cargo bench --bench mpc -- --dump FILE --along   the same of measured states as they were recorded
+//! cargo bench --bench mpc -- --dump FILE --along   the same with the recorded states as measurements
 //! ```
 //!
-//! Drives the shipped model along the recorded jumps from measurements that are off the reference,
+//! Drives the shipped model along the recorded jumps from measurements away from the reference,
 //! so that limits become active; with `--along` the measurements are the recorded ones. Each problem
-//! of the table is solved by the controller (linearisation, solve and lift together) and, at once, by
-//! clarabel with its default settings, set up anew; each that is written out comes with the time of the
-//! controller with the structured solver. Times are those of this thread's CPU clock where the system has one.
+//! of the table is solved by the controller (linearisation, solve and lift together). Immediately
+//! afterwards clarabel solves it with its default settings, set up again. Each problem that is written
+//! out comes with the time of the controller with the structured solver. Times are those of this thread's
+//! CPU clock where the system has one.
 
 use std::io::Write;
 use std::path::Path;
@@ -49,7 +50,7 @@ fn main() {
         })
         .collect();
     if let Some(steps) = value_of("--steps") {
-        let steps = steps.parse().expect("--steps takes a number");
+        let steps = steps.parse().expect("--steps needs a number");
         watch_memory(&model, &segments[0], steps);
     } else if let Some(path) = value_of("--dump") {
         let push = match arguments.iter().any(|argument| argument == "--along") {
@@ -86,10 +87,11 @@ fn controller(
 }
 
 fn conic(controller: &Controller) -> &QpSolver {
-    controller.solver().expect("clarabel is what solves")
+    controller.solver().expect("clarabel is the solver")
 }
 
-/// The recorded state, pushed forwards, down and into a pitch that change slowly, by `size` times as much as in the table.
+/// The recorded state with slowly changing displacements forwards, down and in pitch, `size` times as large as in the
+/// table.
 fn pushed(segment: &Segment, sample: usize, size: f64) -> ([f64; 18], [f64; 18]) {
     let mut x: [f64; 18] = std::array::from_fn(|i| segment.x[(i, sample)]);
     let mut dx: [f64; 18] = std::array::from_fn(|i| segment.dx[(i, sample)]);

@@ -4,8 +4,8 @@
 //! cargo bench --bench plan [-- --model FILE.json --goals 100 --seed 1]
 //! ```
 //!
-//! Two goals in three are inside the range of the training jumps, the range of the others is 35 % longer and 40 % higher. Times
-//! are wall times of the whole plan with the model already read.
+//! Two goals in three are inside the range of the training jumps, the range of the others is 35 % longer and 40 %
+//! higher. Times are wall times of the whole plan with the model already read.
 
 use std::path::Path;
 

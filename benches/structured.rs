@@ -1,4 +1,4 @@
-//! The structured solver on problems from a file, against clarabel at 1e-9.
+//! The structured solver on problems from a file, compared with clarabel at 1e-9.
 //!
 //! ```text
 //! cargo bench --bench structured -- FILE.bin... [--times FILE.txt]
@@ -10,11 +10,11 @@
 //! inputs (`d` each), factor on the last state's; then for each of `T` steps `x0 (2d)`, reference
 //! `((N+1) x 2d)`, `A (N x 2d x 2d)`, `B (N x 2d x d)`, `c (N x 2d)`, a guess of states and inputs
 //! (`(N+1) x 2d`, `N x d`), the solution's (the same) and its cost. `benches/mpc_solvers/stages.py`
-//! makes such files, and runs PIQP on them beside this program.
+//! makes such files, and runs PIQP on them next to this program.
 //!
-//! Rows that the others imply are left out first, by linear programs; each step starts from the last
-//! step's solution, and its time has all that depends on the step in it: writing, gains, solve. A loop is
-//! run [`REPEATS`] times; a step's time is its smallest, without what else the machine did meanwhile.
+//! Rows that the others imply are removed first, by linear programs. Each step starts from the last
+//! step's solution, and its time includes everything that depends on the step: writing, gains, solve. A
+//! loop is run [`REPEATS`] times; a step's time is the smallest, to exclude other load on the machine.
 
 use std::io::Write as _;
 
@@ -48,7 +48,7 @@ impl Reader {
     }
 }
 
-/// What all steps of a file share.
+/// Data common to all steps of a file.
 struct Loop<const NU: usize> {
     horizon: usize,
     input_rows: Vec<([f64; NU], f64)>,
@@ -329,7 +329,7 @@ fn write<const NX: usize, const NU: usize>(
     }
 }
 
-/// What the dynamics leave at the reference.
+/// Residual of the dynamics at the reference.
 fn defect<const NX: usize>(step: &Step, k: usize, i: usize) -> f64 {
     let row = &step.a[(k * NX + i) * NX..][..NX];
     let moved: f64 = (0..NX).map(|j| row[j] * step.reference[k * NX + j]).sum();

@@ -97,7 +97,7 @@ fn timed<T>(work: impl FnOnce() -> T) -> Duration {
     }
 }
 
-/// The time this thread has spent on a processor, where the system tells (Linux): the machine may
+/// The time this thread has spent on a processor, where the system provides it (Linux): the machine may
 /// be busy with other work.
 fn cpu_time() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;

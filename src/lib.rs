@@ -42,7 +42,7 @@
 //! ```
 //!
 //! `examples/train_model.rs` trains one, `examples/latent_mpc.rs` runs the controller. `ARCHITECTURE.md` has the rooms
-//! and who may import whom, `docs/mathematics.md` the equations.
+//! and who may import whom, `docs/explanation/model.md` the equations.
 
 #[cfg(test)]
 extern crate self as romc; // for test files that were written from outside

@@ -276,7 +276,7 @@ fn verdict_on(model: &ReducedModel, paths: &[&str]) -> Verdict {
     let read = |path: &&str| recording::read(&Path::new(ROOT).join(path)).expect("shipped");
     let recordings: Vec<_> = paths.iter().map(read).collect();
     let assessment = Assessment::over(model, &recordings, 0.1).expect("encodes");
-    let (verdict, unmeasured) = verdict_by_default(model, &recordings, &assessment);
+    let (verdict, unmeasured) = verdict_by_default(model, &recordings, &assessment, |_, _| {});
     assert!(unmeasured.is_none(), "{unmeasured:?}");
     verdict
 }

@@ -294,7 +294,10 @@ fn layers_that_are_wrong_are_refused_at_their_place() {
     let found = "unknown variant `selu`, expected one of `linear`, `elu`, `tanh`";
     assert!(message.contains(found), "{message}");
     let message = changed(&|v| v["encoder"]["weights"] = json!([[1.0]]));
-    assert!(message.contains("`layers` beside `weights`"), "{message}");
+    assert!(
+        message.contains("`layers` together with `weights`"),
+        "{message}"
+    );
     let message = changed(&|v| {
         array(v, "/decoder/layers/1/weights/3").pop();
     });

@@ -137,13 +137,14 @@ fn refinement_predicts_whole_jumps_better_and_terms_are_dropped_within_the_slack
             let messages = messages.borrow();
             let mut is_in = false;
             let each = messages.iter().filter_map(|message| match message {
-                Progress::Stage { name: own } => {
+                Progress::Stage { name: own, .. } => {
                     is_in = own.ends_with(name);
                     None
                 }
                 Progress::Done { text } => {
                     text.strip_prefix("score ")?.parse().ok().filter(|_| is_in)
                 }
+                Progress::Step => None,
             });
             each.collect()
         };

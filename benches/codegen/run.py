@@ -214,7 +214,7 @@ def report(results):
 
 
 def machine():
-    """What the figures were measured on."""
+    """The machine of the measurements."""
     processor = next(line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name"))
     versions = [call(command, stdout=subprocess.PIPE, text=True).stdout.splitlines()[0] for command in (["gcc", "--version"], ["rustc", "--version"])]
     packages = sorted({package for packages in REQUIREMENTS.values() for package in packages})

@@ -2,7 +2,7 @@
 """How time and memory of `romc compile` and `romc train` grow with the size of their input.
 
 Compiles dense cubic models of 2 to 16 latent coordinates to LaTeX, C and Rust, and trains in closed
-form on copies of the recorded jumps. Prints the tables of docs/benchmarks.md. Standard library of
+form on copies of the recorded jumps. Prints the tables of docs/evaluation/code-speed.md. Standard library of
 Python alone; Linux or macOS.
 """
 

@@ -1,4 +1,4 @@
-"""Trains models with equations of the body per phase and for all phases and prints the table of docs/learning.md.
+"""Trains models with equations of the body per phase and for all phases and prints the table of docs/evaluation/prediction.md.
 
     cargo build --release && python3 benches/learning/body_equations.py
 

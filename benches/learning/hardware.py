@@ -1,9 +1,9 @@
-"""Refines models on recordings of real robots and prints the tables of docs/hardware.md.
+"""Refines models on recordings of real robots and prints the tables of docs/evaluation/hardware.md.
 
     cargo build --release && python3 benches/learning/hardware.py FOLDER
 
 FOLDER holds `go1_hardware_jump.csv`, `go1_hardware_flights.csv.gz` and `a1/a1_01.csv.gz` to `a1_24.csv.gz`, which are not
-part of romc (docs/hardware.md names their sources). No model is judged on the recordings that refined it. Under a minute on two
+part of romc (docs/evaluation/hardware.md names their sources). No model is judged on the recordings that refined it. Under a minute on two
 cores; needs Python alone.
 """
 
@@ -121,10 +121,11 @@ def errors(bench, model, rows, recording, restart_s):
     for name in SHOWN:
         place, rate = (column(rows, of) for of in place_and_rate(name))
         of = {"model": [], "velocity": [], "rest": []}
-        of["decoded"] = [a - b for a, b in zip(decoded[name], place)]
+        recorded = predicted[name]  # in the axes of the prediction
+        of["decoded"] = [a - b for a, b in zip(decoded[name], recorded)]
         for start, end in windows(time_s, restart_s):
             for i in range(start, end):
-                of["model"].append(predicted[f"{name}_restarted"][i] - place[i])
+                of["model"].append(predicted[f"{name}_restarted"][i] - recorded[i])
                 of["velocity"].append(place[start] + rate[start] * (time_s[i] - time_s[start]) - place[i])
                 of["rest"].append(place[start] - place[i])
         mean = sum(place) / len(place)
@@ -134,7 +135,7 @@ def errors(bench, model, rows, recording, restart_s):
 
 
 def reconstruction(model, trajectories):
-    """What decoder and encoder make of the recorded states, without any dynamics."""
+    """Reconstruction of the recorded states by encoder and decoder, without any dynamics."""
     file = json.loads(pathlib.Path(model).read_text())
     z = [trajectories[f"z_{k + 1}"] for k in range(file["latent_dim"])]
     found = {}

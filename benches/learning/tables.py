@@ -1,8 +1,8 @@
-"""Trains with and without each default and prints the tables of docs/learning.md.
+"""Trains with and without each default and prints the tables of docs/evaluation/training-choices.md.
 
     cargo build --release && python3 benches/learning/tables.py
 
-Every row is a training on the jumps of `examples/recordings/go1` and what `romc simulate` says of the model along
+Every row is a training on the jumps of `examples/recordings/go1` and the results of `romc simulate` with the model along
 its test jumps and along `go1-other`. About two minutes on two cores; needs Python alone.
 """
 

@@ -1,4 +1,4 @@
-"""Trains models of the whole body, each without a part of the recipe, and prints the table of docs/learning.md.
+"""Trains models of the whole body, each without a part of the recipe, and prints the table of docs/evaluation/training-choices.md.
 
     cargo build --release && python3 benches/learning/whole_body.py
 
@@ -104,7 +104,7 @@ def chosen_romc(description):
 
 
 def without_legs(romc, path):
-    """Writes what `romc identify` finds in the training jumps without the moments of the legs."""
+    """Writes the result of `romc identify` on the training jumps without the moments of the legs."""
     run([romc, "identify", "--robot", "go1", *jumps("go1/train_*.csv.gz"), "--output", path])
     tables = path.read_text(encoding="utf-8").split("\n[")
     path.write_text("\n[".join(t for t in tables if not t.startswith("legs]")), encoding="utf-8")

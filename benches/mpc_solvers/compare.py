@@ -4,13 +4,14 @@
     python -m venv venv && venv/bin/pip install -r benches/mpc_solvers/requirements.txt
     venv/bin/python benches/mpc_solvers/compare.py problems.jsonl
 
-Each solver is set up once a jump (the rows that matter differ between jumps) and then only updated,
-as the controller does it; times are those of this thread's CPU clock for update and solve; each
-solver runs alone, and what it takes is in its own form before. Those in
-the last rows are of the controller with romc's structured solver, which the bench measured when it
-wrote the problems: a whole step, linearisation, gains and lift included, and the step alone after
-`Controller::prepare`, which linearises and makes the gains between two steps. `x whole` and `x prepared`
-say how many times as long a solver takes in the median.
+Each solver is set up once per jump (the rows that matter differ between jumps) and then only updated,
+as the controller does it. Times are those of this thread's CPU clock for update and solve. Each solver
+runs alone, and its input is converted to its own form before.
+
+The last rows are times of the controller with romc's structured solver, which the bench measured when it
+wrote the problems. They are a whole step, including linearisation, gains and lift, and the step alone
+after `Controller::prepare`, which linearises and computes the gains between two steps. `x whole` and
+`x prepared` are the ratios of a solver's median time to these.
 """
 
 import json
@@ -31,7 +32,7 @@ def matrix(stored):
 
 
 def rows_apart(problem):
-    """What PIQP takes: equalities and inequalities as matrices of their own."""
+    """The problem in the form of PIQP: equalities and inequalities as separate matrices."""
     n, b = problem["equalities"], problem["b"]
     rows = problem["A"].tocsr()
     lower = np.full(len(b) - n, -np.inf)

@@ -30,7 +30,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class Loop:
-    """What all steps of a file share."""
+    """Data common to all steps of a file."""
 
     def __init__(self, lift, decoder, weights):
         self.lift, self.decoder = lift, decoder

@@ -1,4 +1,4 @@
-"""What a jump was like, and whether it counts as one; from recorded columns alone."""
+"""Metrics of a jump, and whether it counts as one; from recorded columns alone."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ class Assessment:
         )
 
     def faults(self, min_flight_s):
-        """What keeps this from being a jump that ends standing upright; empty if nothing does."""
+        """Reasons why this is no jump that ends standing upright; empty if there are none."""
         faults = []
         if self.flight_s < min_flight_s:
             faults.append(f"flight lasts {self.flight_s:.3f} s, less than {min_flight_s} s")

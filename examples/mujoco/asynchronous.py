@@ -1,9 +1,9 @@
 """An asynchronous jump: the front feet leave first, the rear feet push on alone.
 
 While only the rear feet stand, two force components in the sagittal plane must
-serve three wishes: pitch and height get theirs, the forward force is what the
-balance of pitch leaves. So the robot pitches up over all feet first, and the
-rear push, directed ahead through the centre of mass, carries it forward.
+control three quantities. Pitch and height have priority; the forward force
+follows from the balance of pitch. The robot therefore pitches up over all feet
+first. The rear push, directed ahead through the centre of mass, carries it forward.
 """
 
 from dataclasses import dataclass

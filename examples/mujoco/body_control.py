@@ -27,7 +27,7 @@ class BodyControl:
         self.edges = np.array([[slope, 0, 1], [-slope, 0, 1], [0, slope, 1], [0, -slope, 1]]).T
 
     def update(self, x, dx):
-        """Takes the measured state; fills the properties below (world frame)."""
+        """Sets the measured state; fills the properties below (world frame)."""
         robot, data = self.robot, self.data
         write_state(robot, data, x, dx)
         mujoco.mj_fwdPosition(robot.mj, data)
@@ -58,8 +58,8 @@ class BodyControl:
     def foot_forces(self, wrench, stance, weights=WRENCH_WEIGHTS, effort=(1, 1, 1, 1)):
         """(4, 3) floor forces of the standing feet that give the wrench, inside the pyramids.
 
-        What cannot be met exactly is missed according to `weights`; feet of
-        greater `effort` are used less.
+        If the wrench cannot be produced exactly, the error is distributed according to
+        `weights`; feet of greater `effort` are used less.
         """
         legs = np.flatnonzero(stance)
         if len(legs) == 0:

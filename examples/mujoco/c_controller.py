@@ -31,7 +31,7 @@ def _fields(header, struct):
 
 
 def load(crate):
-    """What the crate's own Python module has: `Library().default_settings()` and `Controller(settings)`."""
+    """The interface of the crate's own Python module: `Library().default_settings()` and `Controller(settings)`."""
     facts = json.loads((crate / "binding.json").read_text())
     library = ctypes.CDLL(str(crate / "libcontroller.so"))
     prefix, number = facts["name"] + "_controller_", ctypes.c_double

@@ -25,7 +25,7 @@ EXAMPLE = """example:
   python check_recordings.py --reproduce  also records all sets again and compares bytes"""
 MAX_TOTAL_BYTES = 12_500_000
 DURATION_S = (0.8, 1.6)
-# Two sets of one robot; the README of the second says how they differ.
+# Two sets of one robot; the README of the second lists their differences.
 COMPARED = ("go1", "go1-other")
 REAR_LEAD_S = (0.15, 0.23)
 MIN_HEIGHT_M = 0.15
@@ -66,7 +66,7 @@ def main():
     size = sum(path.stat().st_size for path in arguments.recordings.rglob("*.csv.gz"))
     print(f"\nall recordings: {size / 1e6:.2f} MB")
     if size > MAX_TOTAL_BYTES:
-        faults.append(f"recordings take {size} bytes, more than {MAX_TOTAL_BYTES}")
+        faults.append(f"recordings have {size} bytes, more than {MAX_TOTAL_BYTES}")
     if arguments.reproduce:
         faults += compare_with_new(arguments.recordings)
 
@@ -121,7 +121,7 @@ def present_of(folder, recordings):
 
 
 def recording_faults(time_s, states, robot, jump_set):
-    """What is wrong with one recording."""
+    """Faults of one recording."""
     x, dx, ddx, torque, feet = states
     whole = assess(robot.name, time_s, x, dx, torque, feet)
     faults = format_faults(time_s, x, dx, ddx)

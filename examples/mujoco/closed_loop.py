@@ -35,7 +35,7 @@ EXAMPLE = """example:
   cargo build --release
   MUJOCO_GL=egl python closed_loop.py --out-dir ../../out/closed_loop
 drives the shipped model go1-d7 with its generated controller over the test jumps of the training's
-recorder and over those of another one; --models takes others, --recordings other folders, --folds 3
+recorder and over those of another one; --models selects others, --recordings other folders, --folds 3
 trains three models, each without another third of the training jumps, --seeds 3 with the joint
 method and seeds 1 to 3. Writes closed_loop.csv (one row per run), closed_loop.json, table.txt and
 a film strip for each jump of the first folder given, recorded above and driven below."""
@@ -79,7 +79,7 @@ class Controlled:
 
 @dataclass
 class Outcome:
-    """One run: what drove which jump under what, and how it ended."""
+    """One run: follower, jump, perturbation, and the result."""
 
     recordings: str
     model: str

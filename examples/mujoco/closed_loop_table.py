@@ -84,7 +84,7 @@ def table(report):
 def missed_aims(outcomes, folder, models):
     """Which of the aims that the documentation states the runs on a folder do not reach.
 
-    The baselines are compared with over all runs, whatever their folder: on single jumps all of them succeed.
+    The comparison with baselines uses all runs of all folders: on single jumps all baselines succeed.
     """
     own = [o for o in outcomes if o.recordings == folder]
     nominal = [o for o in own if o.perturbation == NOMINAL.name]

@@ -2,10 +2,10 @@
 
 The trunk follows a spline from standing through the bottom of a dip, where it is
 accelerating upwards already, to take-off. Every leg is a Cartesian spring and
-damper between the trunk and the place its foot stands on, and the wanted
-acceleration of the trunk is added as the least forces that give it. Nothing here
-knows friction, the centre of mass or the losses of the joints; nothing is shared
-with `jump_controller` but the measured state.
+damper between the trunk and the place its foot stands on. The least forces that
+produce the wanted acceleration of the trunk are added. Friction, the centre of
+mass and the losses of the joints are not modelled. Only the measured state is
+shared with `jump_controller`.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ REST_S = 0.10
 
 @dataclass(frozen=True)
 class CountermovementPlan:
-    """What one jump looks like: heights of the trunk in m, accelerations in m/s^2, rates in m/s.
+    """Parameters of one jump: heights of the trunk in m, accelerations in m/s^2, rates in m/s.
 
     `thrust_travel` is the way of the thrust along the floor over take-off speed times duration.
     Gains of a leg are in N/m and N s/m at the foot, those of flight in N m/rad and N m s/rad.

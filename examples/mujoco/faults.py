@@ -111,8 +111,8 @@ class Faulty(Commanded):
 
 
 def run(module, inputs, jump, fault, fault_s, rate_hz, walks):
-    """Name of the status, delay and contact of the trunk after the fault (s, or none), and what torques
-    are off the damping law (N m)."""
+    """Name of the status, delay and contact of the trunk after the fault (s, or none), and the largest
+    deviation of torques from the damping law (N m)."""
     chosen = module.Library().default_settings()
     if walks:
         chosen = with_settings(chosen, SETTINGS.items())

@@ -1,4 +1,4 @@
-"""Draws a recording as a strip of pictures, for a look at what the robot did."""
+"""Draws the motion of a recording as a strip of pictures."""
 
 import argparse
 import pathlib

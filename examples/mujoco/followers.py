@@ -1,6 +1,6 @@
-"""Controllers that follow a recorded jump: the latent MPC, and what it has to beat.
+"""Controllers that follow a recorded jump: the latent MPC, and its baselines.
 
-All of them end in joint torques at 500 Hz. `Follower` is what they share: a
+All of them end in joint torques at 500 Hz. `Follower` is their common base: a
 feed-forward torque that is held for 10 ms and a joint PD of low gain towards a
 posture. In flight the feed-forward torque is left out, the PD alone acts.
 """
@@ -83,7 +83,7 @@ class LatentMpc(Follower):
 
 
 class WithoutFeedback(LatentMpc):
-    """The same controller, told at every step that the robot is where the recording was."""
+    """The same controller without feedback: at every step it gets the recorded state as the measurement."""
 
     def __init__(self, controller, jump):
         super().__init__(controller)

@@ -110,7 +110,7 @@ class GaitController:
         return self.body.foot_forces(share * self._wrench(time_s), stance)
 
     def _swing(self, leg, late, progress):
-        """(3,) torques that take a foot along its cycloid, or down when it is late."""
+        """(3,) torques that move a foot along its cycloid, or down when it is late."""
         body, robot, plan = self.body, self.robot, self.plan
         if late:
             target = self._landing(leg, 0.0)

@@ -1,8 +1,8 @@
 """A jump: crouch, thrust, flight, landing; each a stage with its own reference.
 
 On the floor the centre of mass follows a reference (feed-forward acceleration
-and PD), in the air the joints follow one. `JumpPlan` says what to do,
-`JumpController.torque` does it from measurements alone.
+and PD), in the air the joints follow one. `JumpPlan` has the parameters,
+`JumpController.torque` computes torques from measurements alone.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ ALL_FEET = (True, True, True, True)
 
 @dataclass(frozen=True)
 class JumpPlan:
-    """What one jump looks like; heights are of the trunk (m)."""
+    """Parameters of one jump; heights are of the trunk (m)."""
 
     stand_height_m: float = 0.27
     crouch_height_m: float = 0.19

@@ -75,7 +75,7 @@ COUNTERMOVEMENT = {
 
 @dataclass(frozen=True)
 class FloorRange:
-    """(lowest, highest) of what a `Floor` is drawn from."""
+    """Ranges (lowest, highest) from which a `Floor` is drawn."""
 
     friction: tuple
     settling_s: tuple
@@ -87,8 +87,8 @@ class JumpSet:
 
     `base` is the plan that the draws complete; the velocities go into the field
     `velocity_field` of it. `to_touchdown` ends recordings before feet land. Every
-    `push_every`-th jump is pushed. `distance_m` and `flight_s` are what its
-    recordings have to keep.
+    `push_every`-th jump is pushed. `distance_m` and `flight_s` are ranges
+    that its recordings have to satisfy.
     """
 
     robot: str

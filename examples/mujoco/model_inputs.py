@@ -1,4 +1,4 @@
-"""Inputs of a jump by the rule of a model: what its controller takes as `u` of a reference.
+"""Inputs of a jump by the rule of a model: `u` of a reference for its controller.
 
 The model's own generated C is the rule: `NAME_generalised_input`, compiled with `cc` and called
 through ctypes. It subtracts friction from the motors' torques; the inertia of motors and legs is

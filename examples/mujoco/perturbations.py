@@ -1,4 +1,4 @@
-"""What can differ between the jump as recorded and the robot that is to repeat it."""
+"""Differences between the jump as recorded and the robot that has to repeat it."""
 
 import collections
 from dataclasses import dataclass, replace
@@ -63,7 +63,7 @@ START_SCATTER_RAD = 0.01
 def perturbed_simulation(name, perturbation, floor, x, dx, takeoff_s, draw=0):
     """A simulation of the named robot on a floor that starts from the state (x, dx), perturbed.
 
-    The draw numbers what is random: the offsets of the joints at the start and the sensors' noise;
+    The draw selects the random numbers: the offsets of the joints at the start and the sensors' noise;
     in all draws but the first also the heading of the push and a scatter of the start.
     """
     random = np.random.default_rng(draw)
@@ -107,7 +107,7 @@ def load_trunk(robot, payload_kg):
 
 
 class Motors:
-    """What becomes of a controller's torques on their way to the joints: clipped to the limits,
+    """Changes of a controller's torques on their way to the joints: clipped to the limits,
     late by whole control steps (the first command acts until the second arrives), too strong or
     too weak by a factor."""
 

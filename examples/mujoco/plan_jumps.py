@@ -1,4 +1,4 @@
-"""Plans jumps that nobody recorded and lets a simulated Go1 jump them, beside what needs no plan."""
+"""Plans new jumps, simulates them on a Go1, and compares them with methods without a plan."""
 
 import argparse
 import csv
@@ -37,7 +37,7 @@ EXAMPLE = """example:
   python plan_jumps.py --seed 1 --out-dir ../../out/plan_jumps
 draws 12 goals inside the range of the training jumps and 6 outside (up to 35 % further, 40 % higher
 than any of them) from the seed, plans each from the start of a test jump, and drives the simulated
-robot: the plan with the model's generated controller and with joint PD alone, and beside it replays,
+robot: the plan with the model's generated controller and with joint PD alone. Baselines are replays,
 blends and regressions of the training jumps. --ablations adds rows of plans by changed models.
 Writes plan_jumps.csv (one row per run), plan_jumps.json, table.txt, every plan and, with
 --strips (and MUJOCO_GL=egl where there is no display), film strips."""
@@ -73,7 +73,7 @@ ABLATIONS = (
 
 @dataclass
 class Outcome:
-    """One run: who jumped what under which conditions, and how it ended."""
+    """One run: method, goal, conditions, and the result."""
 
     method: str
     condition: str
@@ -235,7 +235,7 @@ def settings_of(answer):
 
 
 def reference_of(arguments, models, source, goal):
-    """The trajectory that a method follows, and what romc said of it."""
+    """The trajectory that a method follows, and the report of romc about it."""
     if source == "nearest":
         return recorded().nearest(goal), {}
     if source == "blend":
@@ -318,7 +318,7 @@ def made_controller(crate, settings):
 
 
 def ablated(arguments, name):
-    """A copy of the model file without one part of what planning rests on."""
+    """A copy of the model file without one part that planning uses."""
     model = json.loads(arguments.model.read_text(encoding="utf-8"))
     parts, d = model["prior"]["parts"], model["latent_dim"]
     random = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""Jumps made of recorded ones without a model: what a planned jump has to beat.
+"""Jumps made of recorded ones without a model: baselines of planned jumps.
 
 A recorded jump is cut at its landmarks (crouch, thrust, flight, landing) and sampled at equal
 shares of each part's duration, so that jumps of different timing can be averaged and regressed.
@@ -21,7 +21,7 @@ X, Z = 12, 14
 
 @dataclass(frozen=True)
 class Goal:
-    """What a jump is to reach: distance and rise of the trunk, m."""
+    """Goal of a jump: distance and rise of the trunk, m."""
 
     name: str
     distance_m: float
@@ -88,7 +88,7 @@ def as_jump(name, parts):
 
 
 class Recorded:
-    """The training jumps, and what can be made of them for a goal."""
+    """The training jumps, and trajectories made of them for a goal."""
 
     def __init__(self, jumps):
         self.jumps = jumps

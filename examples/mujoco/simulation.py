@@ -1,6 +1,6 @@
-"""Physics at 0.5 ms, control and logging at 2 ms, and what counts as a success.
+"""Physics at 0.5 ms, control and logging at 2 ms, and criteria of success.
 
-`Simulation` knows nothing about who computes the torques: a controller is any
+`Simulation` accepts any controller: an
 object with `torque(time_s, x, dx, feet) -> 12 torques (N m)`. State vectors are
 those of the recordings: 12 joints, trunk position, roll-pitch-yaw (R = Rz Ry Rx),
 and their rates (Euler-angle rates for the last three).
@@ -19,7 +19,7 @@ CONTACT_THRESHOLD_N = 1.0
 
 @dataclass
 class SensorNoise:
-    """Standard deviations of white noise on what is measured (0: none)."""
+    """Standard deviations of white noise on measurements (0: none)."""
 
     joint_rad: float = 0.0
     joint_rate: float = 0.0
@@ -155,8 +155,8 @@ class Simulation:
                 mujoco.mj_step(self.robot.mj, self.data)
             acting = self.data.actuator_force[self.robot.actuator_index]
             if not np.array_equal(acting, torque):
-                # What is logged as torque would not be what moved the robot.
-                raise ValueError(f"the motors give {acting} N m, not the {torque} that they are told")
+                # The logged torque would not be the one that moved the robot.
+                raise ValueError(f"the motors give {acting} N m, not the commanded {torque}")
         return log.arrays()
 
 

@@ -2,8 +2,8 @@
 
 Encoder, decoder, phases and input statistics stay. The one number g of a phase is the least-squares
 fit to training jumps, in the scaled units of the model file, so that a controller on the copy has
-the right scale and nothing else; how far its accelerations are off is its own. What a controller on
-the model itself does better is due to Xi.
+only the right scale. The error of its accelerations is its own. Any advantage of a controller on the
+model itself is due to Xi.
 """
 
 import json

@@ -1,6 +1,6 @@
 """Walks a simulated Go1 by commands of speed and yaw rate that change every two seconds, as from a joystick.
 
-The state machine in C stands up, walks by the strides of its model, takes the commands, stops and
+The state machine in C stands up, walks by the strides of its model, follows the commands, stops and
 stands. No trajectory is planned before.
 """
 
@@ -31,7 +31,7 @@ STRIDE_S = 0.36
 CROUCH, CROUCH_M = np.array([0.0, 0.9, -1.8] * 4), 0.28
 LATEST_S = 5.0  # to stand up, and to stand again
 MOST_TILT_RAD = 0.35
-# The robot starts from the floor: no start beside a recording.
+# The robot starts from the floor: there is no recording from which its start could differ.
 PERTURBATIONS = tuple(one for one in walk_loop.PERTURBATIONS if one.start_offset_rad == 0.0)
 FOLLOWERS = {"MPC": False, "no dynamics": True}
 # Least share of the runs of the MPC without a fall, and most median error in the last stride of a command.

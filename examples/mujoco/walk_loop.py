@@ -30,7 +30,7 @@ EXAMPLE = """example:
   cargo build --release
   MUJOCO_GL=egl python walk_loop.py --model ../../models/go1-trot-d6.json
 drives the controller along the three test trots and three of another controller."""
-# What the controller needs along a walk, see docs/walking.md.
+# Settings of the controller along a walk, see docs/explanation/walking.md.
 SETTINGS = {
     "lift": 1,
     "legs": 1,

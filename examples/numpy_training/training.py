@@ -1,7 +1,7 @@
 """The published training in plain NumPy: equations (9) to (20), Adam, the three transfer steps.
 
-Written to be compared with romc, so it takes the same batches, the same schedule and the same losses. Whatever a step
-does not move is computed once (latent states in step two, the library in step three), as anybody would do.
+Written to be compared with romc, so it uses the same batches, the same schedule and the same losses. Quantities that are
+constant in a step are computed once (latent states in step two, the library in step three).
 """
 
 import numpy as np

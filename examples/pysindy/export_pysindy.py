@@ -36,7 +36,7 @@ TOKEN = re.compile(
 
 
 class ExportError(ValueError):
-    """A model that romc has no form for; says what was found and what was expected."""
+    """A model that romc cannot represent; the message has the form found and the one expected."""
 
 
 def term_of(feature, variables):
@@ -120,7 +120,7 @@ def union(phases):
 def export(path, phases, encoder=None, decoder=None):
     """Writes models by phase; `encoder` and `decoder` are (weights, bias) with z = W x + b, if any.
 
-    Returns the command line that imports what was written.
+    Returns the command line that imports the files.
     """
     path = pathlib.Path(path)
     latent, terms, coefficients = union(phases)

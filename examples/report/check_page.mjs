@@ -1,5 +1,5 @@
 // Opens a report in headless Chromium at desktop and phone width, light and dark, and fails on
-// anything that a reader would trip over: an error, a request to elsewhere, a page wider than the
+// any fault that a reader would notice: an error, a request to elsewhere, a page wider than the
 // screen or higher than seven of them, too many sheets of paper, anything that axe-core finds, an
 // animation that does not play, a button that does not copy.
 //
@@ -11,7 +11,7 @@ import { resolve } from "node:path";
 import { writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
-// packages are those of the current folder, so that none need to be installed beside this file
+// packages are those of the current folder, so that none need to be installed in that of this file
 const require = createRequire(resolve("package.json"));
 const puppeteer = require("puppeteer-core");
 const axe = require.resolve("axe-core/axe.min.js");

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Makes the pictures of docs/pages.md, and checks printed pages of the shipped models in one and two columns and the
+# Makes the pictures of docs/gallery.md, and checks printed pages of the shipped models in one and two columns and the
 # report in Chromium. Run from the root of the repository; needs pdflatex, pdftoppm, chromium and npm, and target/release/romc.
 #
-#   examples/report/pictures.sh [FOLDER]      (docs/pictures unless given)
+#   examples/report/pictures.sh [FOLDER]      (default: docs/pictures)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 romc=$PWD/target/release/romc

@@ -1,4 +1,4 @@
-"""Takes simulated jumps of the robots in this folder through every command, from inspect to generated
+"""Runs every command on simulated jumps of the robots in this folder, from inspect to generated
 controllers that are built and run."""
 
 import argparse
@@ -12,7 +12,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 # Motors of ANYmal are weaker for its mass than those of a Go1.
 EFFORT = {"solo12.toml": 1.0, "anymal_c.toml": 0.65, "hare.urdf": 0.9}
 LATENT_DIM = 6
-# Torques in contact: of the latent maps alone, and of a controller that is not told the recorded inputs.
+# Torques in contact: of the latent maps alone, and of a controller without the recorded inputs.
 LEAST_LIFT_R2, LEAST_TORQUE_R2 = 0.85, 0.5
 # Torques of generated code against romc's, N m.
 TORQUE_NM = 1e-6
@@ -87,7 +87,7 @@ class Check:
 
     def following(self):
         rollouts = self.said("simulate", self.model, self.jumps[-1])["rollouts"]["restarted"]["coordinates"]
-        self.say("simulate", f"height off by {1e3 * rollouts['body.z']['rms']:.1f} mm after 0.1 s")
+        self.say("simulate", f"error of the height {1e3 * rollouts['body.z']['rms']:.1f} mm over 0.1 s")
         self.said("report", self.model, self.jumps[-1], "--output", self.folder / "report.html", "--force")
         [run] = self.said("mpc", self.model, self.jumps[-1], "--lift", "consistent")["runs"]
         told, lift = run["torque_r2"]["contact"], run["lift"]["torque_r2"]["contact"]
@@ -144,7 +144,7 @@ class Check:
 
 
 def compiled(folder, sources):
-    """Builds a C program in a folder, runs it, returns what it prints."""
+    """Builds a C program in a folder, runs it, returns its output."""
     program = folder / "program"
     output(["cc", "-O2", "-ffp-contract=off", "-Wall", "-Werror", "-o", program]
            + [folder / source for source in sources] + ["-lm"])  # fmt: skip

@@ -2,9 +2,8 @@
 
     python jumps.py solo12.toml --out-dir jumps/solo12 --romc ../../target/release/romc
 
-`romc robot FILE --json` says what the robot is; MuJoCo gets a model of it with the trunk's share of
-the mass in a box and the legs' in capsules, and jumps it with the controller of `../mujoco`. Heights
-and speeds are those of a Go1 scaled by the length of the legs.
+`romc robot FILE --json` describes the robot. MuJoCo gets a model of it with the trunk's share of the
+mass in a box and the legs' in capsules. The controller of `../mujoco` makes it jump. Heights and speeds are those of a Go1 scaled by the length of the legs.
 """
 
 import argparse
@@ -143,8 +142,8 @@ class DescribedRobot:
         return knee[0]
 
     def joints_for_foot(self, leg, foot):
-        """Joint angles that put the foot there, by Newton's method from the bent posture; what is
-        out of reach is pulled in."""
+        """Joint angles that put the foot there, by Newton's method from the bent posture; places
+        out of reach are moved into it."""
         foot = np.array(foot, float)
         straight = np.linalg.norm(foot - [0.0, self.hip_offset_m[leg], 0.0])
         reach = 0.95 * self.leg_m

@@ -1,13 +1,13 @@
-"""A plan beside what a robot did: learns the shorter jumps of a folder, plans a longer one.
+"""A plan compared with a recording: learns the shorter jumps of a folder, plans a longer one.
 
     python plan_beside_recording.py FOLDER --robot a1 --jump a1_07.csv.gz --shorter-than 0.4 \\
         --phases jump-rear
 
-FOLDER holds recordings that romc reads as they are; their clocks are mended first. The plan starts
-where the jump started and gets its distance and rise; nothing else of it. Prints root mean square
-differences of body path, joint angles and torques on the ground to the jump that was recorded, for
-the plan and for what needs none: the training jump nearest to the goal and the mean of all. Draws
-the three with the jump (`--figure`).
+FOLDER contains recordings that romc reads without a map; their clocks are repaired first. The plan gets
+only the start, the distance and the rise of the recorded jump. Prints root mean square differences of
+body path, joint angles and torques on the ground to the recorded jump. It does so for the plan and for
+two baselines: the training jump nearest to the goal and the mean of all. Draws the three with the jump
+(`--figure`).
 """
 
 import argparse
@@ -126,7 +126,7 @@ def differences(jump, other):
     ]
 
 
-# Hips hold the legs upright and say nothing of the jump.
+# Hips hold the legs upright and are not specific to the jump.
 THIGHS_AND_KNEES = [k for k, name in enumerate(NAMES) if not name.endswith("hx")]
 
 

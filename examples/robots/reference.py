@@ -1,7 +1,7 @@
 """Pinocchio's kinematics of the robots in this folder, for romc's tests to be compared with.
 
-    python reference.py --check     # what ../../tests/fixtures/robots/reference.json holds
-    python reference.py --write     # makes it
+    python reference.py --check     # checks ../../tests/fixtures/robots/reference.json
+    python reference.py --write     # writes it
 
 TOML files are built joint by joint in Pinocchio, URDF files are read by Pinocchio itself. Feet are
 in the body's frame; Jacobians are by the leg's three joints, in the body's axes. The body of a URDF
@@ -121,7 +121,7 @@ def main():
                 for key in ("angles", "foot", "jacobian"):
                     difference = np.abs(np.array(leg[key]) - np.array(kept[key])).max()
                     worst = max(worst, difference)
-        print(f"{name}: {POSTURES} postures, stored values off by at most {worst:.1e}")
+        print(f"{name}: {POSTURES} postures, largest error of stored values {worst:.1e}")
         if worst > 1e-12:
             raise SystemExit(f"{name}: the stored values are not Pinocchio's; --write them again")
 

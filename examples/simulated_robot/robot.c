@@ -1,6 +1,6 @@
-/* A Go1 in MuJoCo that stands up, jumps and stands again, by the state machine of a generated controller: measurements go in,
- * torques come out, 500 times a second. Prints a line for each mode and four times a second; with a path as argument
- * writes the log there. usage: robot [LOG.csv] */
+/* A Go1 in MuJoCo that stands up, jumps and stands again, by the state machine of a generated controller: measurements
+ * go in, torques come out, 500 times a second. Prints a line for each mode and four times a second; with a path as
+ * argument writes the log there. usage: robot [LOG.csv] */
 #include CONTROLLER_HEADER
 #include JUMP_HEADER
 #include LOG_HEADER
@@ -88,7 +88,7 @@ static int load(robot *r, const char *path)
     return 0;
 }
 
-/* What the robot's sensors and its estimator give: state, velocity, feet on the ground. */
+/* Measurements of the robot's sensors and its estimator: state, velocity, feet on the ground. */
 static void measure(const robot *r, double x[18], double dx[18], uint8_t feet[4])
 {
     const mjData *d = r->data;

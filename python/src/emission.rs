@@ -66,7 +66,7 @@ impl EmitArguments {
                 (Some(places), _) => Rounding::Decimals(places),
                 (None, Some(digits)) => Rounding::Significant(digits),
                 (None, None) if self.exact => Rounding::Exact,
-                (None, None) => Rounding::default(),
+                (None, None) => units.usual_rounding(),
             },
             width_em: width.transpose()?,
             symbols,

@@ -92,7 +92,7 @@ pub fn simulate<'py>(
     let recordings = gather(&recordings);
     let made = py.detach(|| -> Result<_, Error> {
         let assessment = Assessment::over(&model.data, &recordings, restart_every)?;
-        let (verdict, _) = verdict_by_default(&model.data, &recordings, &assessment);
+        let (verdict, _) = verdict_by_default(&model.data, &recordings, &assessment, |_, _| {});
         let metrics = json!({
             "metrics": assessment_json(&model.data, &assessment),
             "verdict": verdict,

@@ -257,7 +257,7 @@ impl ExprPool {
         }
     }
 
-    /// Adds the exponents of equal bases. What is no longer a power of its base (`sqrt(2)^2`) goes to `again`.
+    /// Adds the exponents of equal bases. A result that is no longer a power of its base (`sqrt(2)^2`) goes to `again`.
     fn collect_powers(
         &mut self,
         mut powers: Vec<(ExprId, Exponent)>,
@@ -319,7 +319,7 @@ impl ExprPool {
             ([], [only]) => return *only,
             ([only], []) => return self.constant(*only),
             ([Number::MINUS_ONE], [only]) => return self.scale(Number::MINUS_ONE, *only),
-            // By base alone: bases are distinct, and `x` keeps its place whatever its exponent.
+            // By base alone: bases are distinct, and `x` keeps its place for any exponent.
             _ => factors.sort_by(|a, b| {
                 let [a, b] = [a, b].map(|factor| self.base_and_exponent(*factor).0);
                 self.compare(a, b)
@@ -330,8 +330,9 @@ impl ExprPool {
     }
 }
 
-/// Folds numbers in an order that depends on their values alone: exact ones first, then floats from both ends, against
-/// the side the result so far is on, to avoid overflow. Numbers that overflow all the same stay separate.
+/// Folds numbers in an order that depends on their values alone. Exact numbers come first, then floats from both ends;
+/// each float is chosen against the side of the present result, to avoid overflow. Numbers that overflow nevertheless
+/// stay separate.
 fn fold(
     mut numbers: Vec<Number>,
     combine: impl Fn(Number, Number) -> Option<Number>,

@@ -1,10 +1,10 @@
-//! How long an expression is to a reader; a shared part counts as often as it is written.
+//! Length of an expression for a reader; a shared part counts as often as it is written.
 //!
 //! | counts | |
 //! |---|---|
 //! | 4 | a term that is added, with its sign; 2 inside the argument of a function |
 //! | 3 | the name of a function |
-//! | 3 | a function among the factors of another one's argument, beside its name |
+//! | 3 | a function among the factors of another one's argument, in addition to its name |
 //! | 2 | a pair of parentheses, a whole number before a term inside a sum |
 //! | 2 | a fraction below the bar of another |
 //! | 1 | a whole number before a term of an argument |
@@ -60,7 +60,7 @@ impl Costs {
 }
 
 impl ExprPool {
-    /// The length of a node without what its surroundings add to a sum.
+    /// The length of a node, without additions by the sum around it.
     fn length_of_node(&self, expr: ExprId, length_of: impl Fn(ExprId) -> u64) -> u64 {
         let factor = |operand: ExprId| self.as_factor(operand, length_of(operand));
         match self.node(expr) {
@@ -108,7 +108,7 @@ impl ExprPool {
         }
     }
 
-    /// What an operand of a product or power adds: sums stand in parentheses.
+    /// Length of an operand of a product or power: sums stand in parentheses.
     fn as_factor(&self, expr: ExprId, length: u64) -> u64 {
         match self.n_terms(expr) {
             1 => length,

@@ -1,6 +1,7 @@
-//! Whether what is read has a value: logarithms and roots of numbers below zero and quotients by zero have none.
-//! Canonical forms would forget them (`0*log(z)` is 0 wherever it has a value), so each is checked when it is read.
-//! `0^0` is 1, as in floating point; powers that are not integers have values for bases from zero on only.
+//! Whether an expression that is read has a value. Logarithms and roots of numbers below zero and quotients by zero
+//! have none. Canonical forms would lose these singularities (`0*log(z)` is 0 wherever it has a value), so each is
+//! checked when it is read. `0^0` is 1, as in floating point; powers with an exponent that is not an integer have
+//! values only for bases from zero on.
 
 use super::*;
 
@@ -12,7 +13,7 @@ const SMALL: f64 = 1e-6;
 pub struct Reading {
     /// The expression in canonical form.
     pub expr: ExprId,
-    /// What has a value exactly where the expression as written has one: NaN or infinite elsewhere.
+    /// Expressions with a value exactly where the expression as written has one, and NaN or infinite elsewhere.
     pub guards: Vec<ExprId>,
 }
 

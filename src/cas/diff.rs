@@ -16,7 +16,8 @@ impl ExprPool {
         self.derivatives[&(expr, symbol)]
     }
 
-    /// What to differentiate before and with `expr`, operands first; products without the number, for others to share.
+    /// Expressions to differentiate before and with `expr`, operands first; products without the number, so that others
+    /// can share them.
     fn to_differentiate(&self, expr: ExprId, symbol: SymbolId) -> Vec<ExprId> {
         let mut seen = IdSet::default();
         let mut stack = vec![expr];

@@ -1,4 +1,4 @@
-//! Identities of the factors of a product: a table of those of two factors, and what magnitudes and signs share.
+//! Identities of the factors of a product: a table for two factors, and common factors of magnitudes and signs.
 
 use super::*;
 
@@ -43,7 +43,7 @@ pub(super) struct Identity {
 type Power = (ExprId, i64);
 
 impl Identity {
-    /// What the variable is for a product of these factors, and how often the left side is part of it.
+    /// The value of the variable for a product of these factors, and how often the left side is part of it.
     fn find(
         &self,
         pool: &ExprPool,

@@ -1,6 +1,7 @@
-//! Series of expressions beside a point, where roots, magnitudes and signs may have kinks: with one variable at `p + t`
-//! or `p - t`, sums of terms `c t^r` for small positive `t`, with expressions at the point as coefficients and real
-//! exponents (Puiseux series). `sqrt(abs(x))*sin(x)` at 0 is `t^(3/2) - ...`; smooth expressions have Taylor series.
+//! Series of expressions next to a point, where roots, magnitudes and signs may have kinks. With one variable at
+//! `p + t` or `p - t`, they are sums of terms `c t^r` for small positive `t`, with expressions at the point as
+//! coefficients and real exponents (Puiseux series). `sqrt(abs(x))*sin(x)` at 0 is `t^(3/2) - ...`; smooth expressions
+//! have Taylor series.
 
 use super::series::Series;
 use super::slope::Facts;
@@ -91,7 +92,7 @@ impl Germs<'_> {
 
     fn product(&mut self, factors: &[ExprId]) -> Result<Series, Stop> {
         let factors: Vec<Series> = factors.iter().map(|factor| self.series(*factor)).collect();
-        // A pole beside a zero has no value: 0*inf.
+        // A pole multiplied by a zero has no value: 0*inf.
         let vanishes = |series: &Series| {
             let mut exponents = series.terms.iter().map(|term| term.0);
             !series.has_pole(self.pool) && !exponents.any(|e| e == ExprId::ZERO)

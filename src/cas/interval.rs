@@ -1,6 +1,6 @@
 //! Intervals of reals with outward rounding: each result contains the exact results for all points of the operands.
-//! Sums, products, quotients and square roots err outward by a unit in the last place at most; elementary functions by
-//! a few, more than the error of any current mathematical library.
+//! Sums, products, quotients and square roots are widened by at most one unit in the last place. Elementary functions
+//! are widened by a few units, more than the error of any current mathematical library.
 
 use super::number::power;
 use super::*;

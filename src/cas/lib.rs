@@ -1,11 +1,11 @@
-//! The computer algebra system: texts and coefficients enter, hash-consed canonical expressions ([`ExprId`]) live in an
-//! [`ExprPool`], and derivatives, rewritten forms, values, bounds and texts leave. Read [`ExprPool`] first for the
-//! invariants, then `build.rs` and `power.rs`, the constructors that keep them; `order.rs` says why equal sums print
-//! alike. Only the parser recurses on the machine's stack, to a limited depth; no hash map is iterated for a result.
+//! The computer algebra system. In: texts and coefficients. Out: derivatives, rewritten forms, values, bounds and texts
+//! of hash-consed canonical expressions ([`ExprId`]) in an [`ExprPool`]. Read [`ExprPool`] first for the invariants,
+//! then `build.rs` and `power.rs`, the constructors that ensure them; `order.rs` explains why equal sums print alike.
+//! Only the parser recurses on the machine's stack, to a limited depth; no hash map is iterated for a result.
 //!
 //! | files | |
 //! |---|---|
-//! | `node`, `function`, `number`, `pool`, `order` | what an expression is and how it is stored |
+//! | `node`, `function`, `number`, `pool`, `order` | expressions and their storage |
 //! | `build`, `power` | canonical constructors |
 //! | `parse`, `defined`, `display` | the grammar of candidate terms, both ways; constants without a value |
 //! | `interval`, `values` | values, and bounds over boxes |
@@ -31,7 +31,10 @@
 //! assert_eq!(pool.evaluate(slope, &|_| 0.0), -0.91);
 //! # Ok::<(), romc::symbolic::ParseError>(())
 //! ```
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 mod build;
 mod canonical;

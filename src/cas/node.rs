@@ -1,4 +1,4 @@
-//! What an expression is made of, and maps of expressions.
+//! Nodes of expressions, and maps of expressions.
 
 use super::*;
 

@@ -9,7 +9,7 @@ use super::*;
 
 /// Largest magnitude below which every integer is a float: `2^53`.
 const EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
-/// Most digits of a decimal fraction that is taken as exact.
+/// Most digits of a decimal fraction that is treated as exact.
 const MAX_DECIMALS: usize = 15;
 
 /// A finite real constant: exact, or a float with its bits. Integral floats up to `2^53` are stored as exact integers,
@@ -31,7 +31,7 @@ impl Number {
     pub(crate) const MINUS_ONE: Number = Number::integer(-1);
     pub(crate) const HALF: Number = Number(Repr::Rational(1, 2));
 
-    /// The exact integer `value` (`i64::MIN` is taken one higher, the range being symmetric).
+    /// The exact integer `value` (`i64::MIN` becomes `-i64::MAX`, because the range is symmetric).
     pub(crate) const fn integer(value: i64) -> Number {
         let numerator = if value == i64::MIN { -i64::MAX } else { value };
         Number(Repr::Rational(numerator, 1))
@@ -53,8 +53,8 @@ impl Number {
         }
     }
 
-    /// Reduces a ratio; what does not fit becomes a float. `None` for a zero denominator, and for what only rounding
-    /// would make whole: whole numbers are exact.
+    /// Reduces a ratio; a ratio beyond the range becomes a float. `None` for a zero denominator, and if only rounding
+    /// would make the float a whole number, because whole numbers are exact.
     fn from_ratio(numerator: i128, denominator: i128) -> Option<Number> {
         if denominator == 0 {
             return None;

@@ -1,4 +1,4 @@
-//! The structural order that makes canonical forms independent of how they were built: the constant first, then
+//! The structural order that makes canonical forms independent of how they were built. The constant comes first, then
 //! polynomial terms by degree (`z1`, `z2`, `dz1`, `z1^2`, `z1*z2`, ...), then everything else (`sin(z1)`, ...), as in a
 //! library of candidate terms. Coefficients do not matter, so that a term keeps its place when its sign changes.
 

@@ -30,7 +30,7 @@ type Literal<'p> = &'p dyn Fn(&mut ExprPool, &str) -> Option<ExprId>;
 pub struct ParseError {
     /// Character of the text, counted from 1.
     pub position: usize,
-    /// What is there and what could be; texts are cut after 40 characters.
+    /// The text found and the expected one; texts are cut after 40 characters.
     pub kind: ParseErrorKind,
 }
 
@@ -69,7 +69,7 @@ impl ParseErrorKind {
     }
 }
 
-/// What is written instead of a character that the grammar does not have.
+/// Replacement for a character that the grammar does not have.
 fn spelling(character: char) -> &'static str {
     match character {
         '²' | '³' | '⁴'..='⁹' | '⁻' => "a power such as `^2`",
@@ -90,11 +90,11 @@ fn short(token: &str) -> String {
 }
 
 impl ExprPool {
-    /// Reads an expression over the names that `allowed` accepts; function names are never variables. What
-    /// [`display`](ExprPool::display) prints reads back to the same id.
+    /// Reads an expression over the names that `allowed` accepts; function names are never variables. The text printed
+    /// by [`display`](ExprPool::display) reads back to the same id.
     ///
     /// # Errors
-    /// [`ParseError`] with the position, what was found and what was expected.
+    /// [`ParseError`] with the position, the text found and the expected text.
     pub fn parse(&mut self, text: &str, allowed: &dyn Fn(&str) -> bool) -> Result<ExprId> {
         Parser::of(self, text, allowed, &|_, _| None)?.expression(TokenKind::End)
     }
@@ -122,13 +122,13 @@ impl ExprPool {
 struct Parser<'p> {
     pool: &'p mut ExprPool,
     allowed: &'p dyn Fn(&str) -> bool,
-    /// What stands for the text of a number, if that is not its value.
+    /// Expression for the text of a number, if it is not the number's value.
     literal: Literal<'p>,
     text: &'p str,
     tokens: Vec<Token<'p>>,
     next: usize,
     depth: usize,
-    /// Whether constant parts without a value are refused, and what has to have one.
+    /// Whether constant parts without a value are refused, and the expressions that must have a value.
     needs_values: bool,
     guards: Guards,
 }
@@ -257,7 +257,7 @@ impl<'p> Parser<'p> {
         Err(refused.at(self.text, token.start))
     }
 
-    /// What stands between parentheses; the first is read, and is reported with `opener` if it is one too many.
+    /// The expression between parentheses; the first is read, and is reported with `opener` if it is one too many.
     fn parenthesis(&mut self, opener: Token<'p>) -> Result<ExprId> {
         self.deepen(opener)?;
         let expr = self.expression(TokenKind::Sign(')'))?;
@@ -407,7 +407,8 @@ fn name_length(text: &str) -> usize {
     end
 }
 
-/// A number token's value, exact if a fitting integer; nothing for what floats hold as infinity, or wrongly as zero.
+/// A number token's value, exact if a fitting integer; none if floats would represent it as infinity, or wrongly as
+/// zero.
 fn read_number(token: &str) -> Option<Number> {
     if token.bytes().all(|byte| byte.is_ascii_digit())
         && let Ok(integer) = token.parse::<i64>()

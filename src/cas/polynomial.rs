@@ -15,7 +15,7 @@ const MAX_POWER_TERMS: usize = 35;
 /// Exact coefficients by the exponents of common [`Bases`], in their units.
 type Monomials = BTreeMap<Vec<i64>, Number>;
 
-/// What polynomials are in: `x` of `x^2 + x`, `x` with the unit 1/2 of `x + sqrt(x)`, `exp(x)` of `exp(2*x) + exp(-x)`.
+/// Bases of polynomials: `x` in `x^2 + x`, `x` with the unit 1/2 in `x + sqrt(x)`, `exp(x)` in `exp(2*x) + exp(-x)`.
 struct Bases {
     /// In canonical order; all exponents of a base are multiples of its unit.
     units: Vec<(ExprId, Number)>,
@@ -34,8 +34,8 @@ impl Bases {
 }
 
 impl ExprPool {
-    /// The terms of a sum over one common denominator, with the numerator multiplied out and divided by parts of the
-    /// denominator where no remainder is left: `x/(x + y) + y/(x + y)` is `1`, `(x^2 - 1)/(x - 1)` is `1 + x`. Nothing
+    /// The terms of a sum over one common denominator. The numerator is multiplied out and divided by parts of the
+    /// denominator if no remainder is left: `x/(x + y) + y/(x + y)` is `1`, `(x^2 - 1)/(x - 1)` is `1 + x`. Nothing
     /// changes unless a denominator has a sum or function, or if there are too many different ones.
     pub(super) fn together(&mut self, expr: ExprId) -> ExprId {
         let terms = self.terms_of(expr);
@@ -98,7 +98,7 @@ impl ExprPool {
                 numerator = quotient;
                 left = left.checked_add(Number::MINUS_ONE).unwrap_or(Number::ZERO);
             }
-            // What is left may have a common divisor of fewer terms than either.
+            // The remaining fraction may have a common divisor of fewer terms than either part.
             if left.is_one()
                 && let Some((above, below)) = self.without_common_divisor(numerator, base)
             {
@@ -324,7 +324,7 @@ fn divided(dividend: Monomials, divisor: &Monomials) -> Option<(Monomials, Monom
 }
 
 /// `content` and `root` of a polynomial `content * root^power`, the root's coefficients being whole. Each next term of
-/// the root is what is left over, divided by the derivative of the power.
+/// the root is the remainder divided by the derivative of the power.
 fn root_of(polynomial: &Monomials, power: i64) -> Option<(Number, Monomials)> {
     let (highest, leading) = polynomial.last_key_value()?;
     let halved = |exponent: &i64| (exponent % power == 0).then_some(exponent / power);

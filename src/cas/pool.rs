@@ -6,12 +6,12 @@ use super::order::SymbolKey;
 use super::slope::Slope;
 use super::*;
 
-/// Owner of hash-consed, canonical expressions, made only by constructors ([`sum`](ExprPool::sum),
-/// [`product`](ExprPool::product), [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and what is built on them) with
-/// these invariants:
+/// Owner of hash-consed, canonical expressions. Only constructors make them ([`sum`](ExprPool::sum),
+/// [`product`](ExprPool::product), [`pow`](ExprPool::pow), [`apply`](ExprPool::apply) and functions that call these),
+/// with the following invariants:
 ///
-/// - sums and products are flat and sorted by [`compare`](ExprPool::compare), whatever the order
-///   of the operands given; constants are folded, like terms and like factors collected;
+/// - sums and products are flat and sorted by [`compare`](ExprPool::compare), independent of the order of the given
+///   operands; constants are folded, like terms and like factors collected;
 /// - a product has at most one number, in front (two only where folding would overflow);
 /// - a sum raised to an integer power, or a factor, has a positive first coefficient, and the
 ///   argument of an even or odd function does not start with a minus;
@@ -103,7 +103,7 @@ impl ExprPool {
         }
     }
 
-    /// Does `step` within so much work and within the limit around it; what would exceed that is left as it is.
+    /// Runs `step` within this amount of work and the limit around it; expressions that would exceed it stay unchanged.
     pub(super) fn limited<T>(&mut self, work: u64, step: impl FnOnce(&mut Self) -> T) -> T {
         let outer = self.limit_work(work);
         let result = step(self);
@@ -141,7 +141,7 @@ impl ExprPool {
         self.symbol_for(name, None, None)
     }
 
-    /// A variable that takes the place of a part while expressions are rewritten; no file has one of its name.
+    /// A variable that replaces a part while expressions are rewritten; no file has a variable of this name.
     pub(super) fn placeholder(&mut self, kind: &str, number: usize) -> SymbolId {
         self.symbol_id(&format!(" {kind} {number}"))
     }
@@ -166,7 +166,7 @@ impl ExprPool {
         self.symbols[symbol.index()].selection
     }
 
-    /// The symbol of a name; one of a selection is no variable, but what [`ExprPool::selection`] says.
+    /// The symbol of a name; the symbol of a selection is no variable, see [`ExprPool::selection`].
     pub(super) fn symbol_for(
         &mut self,
         name: &str,
@@ -272,7 +272,7 @@ impl ExprPool {
         }
     }
 
-    /// The factors of a product, each as often as its exponent says; nothing unless that is an integer from 0 to `most`.
+    /// The factors of a product, each repeated by its exponent; none unless that is an integer from 0 to `most`.
     pub fn repeated_factors(&self, expr: ExprId, most: usize) -> Option<Vec<ExprId>> {
         let mut factors = Vec::new();
         for &factor in self.factors_of(expr) {
@@ -294,13 +294,14 @@ impl ExprPool {
         operands.chain(selection.into_iter().flatten())
     }
 
-    /// Every expression that `roots` are made of, each once, operands before what uses them.
+    /// Every expression that occurs in `roots`, each once, operands before their users.
     pub fn reachable(&self, roots: &[ExprId]) -> Vec<ExprId> {
         self.walk(roots, |_| true, |_| true)
     }
 
-    /// As [`reachable`](ExprPool::reachable), without what fails `wanted` and all that is reached through it alone, and
-    /// not looking into what fails `opened`. Ids rise from operands to users, so sorting them is a topological order.
+    /// As [`reachable`](ExprPool::reachable), without expressions that fail `wanted` and those reached only through
+    /// them. Operands of expressions that fail `opened` are not visited. Ids increase from operands to users, so
+    /// sorting them is a topological order.
     pub(super) fn walk(
         &self,
         roots: &[ExprId],
@@ -336,7 +337,7 @@ impl ExprPool {
         self.facts[expr.index()].symbols & symbol_bit(symbol) != 0
     }
 
-    /// Whether the same symbols occur in both, those beyond the pool's first 63 taken as one.
+    /// Whether the same symbols occur in both; those beyond the pool's first 63 count as one.
     pub(super) fn have_same_symbols(&self, a: ExprId, b: ExprId) -> bool {
         self.facts[a.index()].symbols == self.facts[b.index()].symbols
     }

@@ -1,6 +1,6 @@
-//! Substitution, multiplying out within limits, and rewriting level by level. A *region* is what can be reached from an
-//! expression through sums, products and integer powers. Function calls and other powers are its atoms; their arguments
-//! are regions of their own.
+//! Substitution, multiplying out within limits, and rewriting level by level. A *region* consists of all expressions
+//! reached from an expression through sums, products and integer powers. Function calls and other powers are its atoms;
+//! their arguments are regions of their own.
 
 use super::*;
 
@@ -108,7 +108,7 @@ impl ExprPool {
         self.integer_power(factor).filter(is_sum)
     }
 
-    /// What `pick` takes of the factors of a product, and its other factors.
+    /// Results of `pick` for the factors of a product, and the factors without a result.
     pub(super) fn partition_factors<T>(
         &mut self,
         expr: ExprId,

@@ -193,7 +193,7 @@ impl ExprPool {
     }
 
     fn merge_roots(&mut self, expr: ExprId) -> ExprId {
-        // Each as its base and what is left beside one root of it.
+        // Each as its base and the remaining power after one root of it is removed.
         let (roots, mut outside) = self.partition_factors(expr, |pool, factor| {
             let (base, Exponent::Number(exponent)) = pool.base_and_exponent(factor) else {
                 return None;

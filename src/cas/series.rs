@@ -4,11 +4,11 @@ use super::*;
 
 /// Differences of exponents that count as zero: 0.1 + 0.9 and 1 are the same.
 const SAME_EXPONENT: f64 = 1e-12;
-/// Coefficients from this exponent on are taken not to vanish by chance with all before them.
+/// Coefficients from this exponent on are assumed not to vanish by chance together with all before them.
 const RARE: f64 = 3.0;
 const MOST_TERMS: i64 = 24;
 
-/// `sum coefficient t^exponent`, and what is left out: terms from the exponents of `rest` on.
+/// `sum coefficient t^exponent`, and the omitted terms: those from the exponents of `rest` on.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Series {
     /// Exponent and coefficient; exponents are distinct as expressions.
@@ -37,7 +37,7 @@ impl Series {
         self.terms.iter().any(|&(exponent, _)| number(exponent))
     }
 
-    /// Leaves out the value at the point, and what is smaller than `t`.
+    /// Omits the value at the point, and terms smaller than `t`.
     pub(super) fn keep_up_to_one(&mut self, pool: &ExprPool) {
         let number = |exponent| pool.as_number(exponent).map(Number::to_f64);
         let is_small = |exponent| number(exponent).is_some_and(|n| n > 1.0 + SAME_EXPONENT);
@@ -76,8 +76,8 @@ impl Germs<'_> {
         }
     }
 
-    /// Without terms from the order on, counted from zero or, of exponents that vary with the point, from the least of
-    /// those that differ by numbers; of what is left out the first terms.
+    /// The series without terms from the order on; `rest` receives the first omitted exponents. The order counts from
+    /// zero. For exponents that vary with the point it counts from the least of those that differ by numbers.
     pub(super) fn cut(&mut self, mut series: Series) -> Series {
         let exponents: Vec<ExprId> = series.terms.iter().map(|term| term.0).collect();
         let order = self.pool.constant(Number::integer(self.order));
@@ -183,7 +183,7 @@ impl Germs<'_> {
         self.facts.is_positive(self.pool, expr)
     }
 
-    /// Takes out the first term that is not zero: exponent and coefficient.
+    /// Removes and returns the first term that is not zero: exponent and coefficient.
     pub(super) fn lead(&mut self, series: &mut Series) -> Result<Option<(ExprId, ExprId)>, Stop> {
         while let Some(&(first, _)) = series.terms.first() {
             let mut least = first;

@@ -1,10 +1,10 @@
-//! Simplification: the shortest of several equal forms. A region (see `region.rs`) is brought to a normal form, in
+//! Simplification: the shortest of several equal forms. A region (see `region.rs`) is converted to a normal form, in
 //! which equal expressions tend to coincide: multiplied out, angles expanded, sines reduced to cosines, exponentials
-//! and logarithms merged, over a common denominator. Of a few shorter forms derived from it, the one with the least
+//! and logarithms merged, over a common denominator. A few shorter forms are derived from it. The one with the least
 //! [`cost`](ExprPool::cost) replaces the region if it is shorter. Every accepted step lowers the cost, a natural
 //! number, until none does: simplifying a result returns it. The work on one expression is bounded, counted in
-//! constructors; what exceeds that stays. All rewritings keep the value wherever there is one, up to rounding (see
-//! [`ExprPool`]); no term is dropped for being small.
+//! constructors; expressions beyond the bound stay unchanged. All rewritings preserve the value wherever there is one,
+//! up to rounding (see [`ExprPool`]); no term is dropped for being small.
 
 use super::cost::Costs;
 use super::*;
@@ -173,9 +173,9 @@ impl ExprPool {
         form
     }
 
-    /// Whether a symbol went when fractions in a divisor were put together, and did not without rounding: `0.3/(0.7 +
-    /// 0.3/(0.7 + x))`, nested deep, would become 0.3, which it is not where `x` is -1. Without a proof up to
-    /// [`PROVEN_LEVELS`] it counts as rounding.
+    /// Whether a symbol vanished when fractions in a divisor were combined, and would not vanish in exact arithmetic.
+    /// `0.3/(0.7 + 0.3/(0.7 + x))`, nested deep, would become 0.3, which is wrong at `x = -1`. Without a proof up to
+    /// [`PROVEN_LEVELS`] the loss is attributed to rounding.
     fn is_lost_by_rounding(&self, before: ExprId, form: ExprId) -> bool {
         if self.have_same_symbols(before, form) {
             return false;

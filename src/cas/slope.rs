@@ -1,9 +1,9 @@
-//! Derivatives that have values wherever the function has slopes: the rules give `g'/(2 sqrt(g))` for a root, which is
-//! `0/0` where `g` and `g'` vanish. The slope of an expression is the derivative, where it exists; otherwise the limit
-//! of slopes from above, or from below if there are no values above, which may be infinite. A jump itself adds nothing.
-//! Selections decide at run time which applies: the derivative by the rules where no argument of a root, magnitude,
-//! sign or power is zero, a slope from series (see `germ.rs`) where one is. Where that takes too many cases, a
-//! difference of values replaces a derivative that is not a number.
+//! Derivatives that have values wherever the function has slopes. The rules give `g'/(2 sqrt(g))` for a root, which is
+//! `0/0` where `g` and `g'` vanish. The slope of an expression is the derivative, where it exists. Otherwise it is the
+//! limit of slopes from above, or from below if there are no values above; it may be infinite. A jump itself adds
+//! nothing. Selections decide at run time: the derivative by the rules where no argument of a root, magnitude, sign or
+//! power is zero, otherwise a slope from series (see `germ.rs`). If that needs too many cases, a difference of values
+//! replaces a derivative that is not a number.
 
 use super::*;
 
@@ -148,7 +148,7 @@ impl Facts {
     }
 }
 
-/// What is zero exactly where an expression is, in floats: none but zero is a multiple of pi.
+/// An expression with the same zeros as `expr`, in floats: no multiple of pi but zero is a float.
 fn core(pool: &mut ExprPool, expr: ExprId) -> ExprId {
     if pool.as_number(expr).is_some() {
         return expr;
@@ -181,7 +181,7 @@ fn value_of_symbol(pool: &mut ExprPool, expr: ExprId) -> Option<(SymbolId, ExprI
     is_exact.then(|| (symbol, pool.scale(quotient, first)))
 }
 
-/// What the values beside a point have.
+/// Behaviour of the values next to a point.
 enum Outcome {
     Regular,
     Finite(ExprId),
@@ -224,7 +224,7 @@ impl ExprPool {
         slope
     }
 
-    /// The slope at all points: cases are divided by what is undecided, the first ones first.
+    /// The slope at all points: undecided tests split the cases, the first test first.
     fn selected(&mut self, expr: ExprId, symbol: SymbolId) -> Slope {
         let mut cases = vec![Facts::default()];
         // Of each case its test and the first of its two parts, or its outcome.

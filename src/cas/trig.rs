@@ -8,7 +8,7 @@ const MAX_MULTIPLE: i64 = 6;
 /// Most sines and cosines multiplied in one term that are combined.
 const MAX_TRIG_DEGREE: i64 = 8;
 
-/// The unit in which multiples of an angle are counted, by what stands beside the coefficient.
+/// The unit in which multiples of an angle are counted, by the angle without its coefficient.
 type Units = BTreeMap<ExprId, Number>;
 
 impl ExprPool {
@@ -215,7 +215,7 @@ impl ExprPool {
                 _ => others.push(factor),
             }
         }
-        // One divisor takes the place of two: 1/(sin(x)*cos(x)) = 2/sin(2*x).
+        // One divisor replaces two: 1/(sin(x)*cos(x)) = 2/sin(2*x).
         let divisor = self.sum_of_waves(&below);
         match divisor.filter(|divisor| !matches!(self.node(*divisor), Node::Sum(_))) {
             Some(divisor) => others.push(self.powi(divisor, -1)),

@@ -91,11 +91,11 @@ impl ExprPool {
         }
     }
 
-    /// An interval that contains every value of `expr` for symbols in the given intervals (others may be anything),
-    /// where it is defined; `slopes` are its derivatives by the symbols of `domain`. Where it is Lipschitz continuous
-    /// on the whole box, they sharpen [`evaluate_intervals`](ExprPool::evaluate_intervals): a symbol of which it is
-    /// monotone goes to its ends, for others the mean value form `f(c) + sum D_i (X_i - c_i)` around the centre is
-    /// used. `sin(x) - x` on `[-0.1, 0.1]` is bounded by 1.7e-4 this way, instead of by 0.2.
+    /// An interval that contains every value of `expr` for symbols in the given intervals (others are unbounded), where
+    /// it is defined. `slopes` are its derivatives by the symbols of `domain`. Where it is Lipschitz continuous on the
+    /// whole box, they sharpen [`evaluate_intervals`](ExprPool::evaluate_intervals). A symbol of which it is monotone
+    /// goes to its ends; for others the mean value form `f(c) + sum D_i (X_i - c_i)` around the centre is used.
+    /// `sin(x) - x` on `[-0.1, 0.1]` is bounded by 1.7e-4 this way, instead of by 0.2.
     pub fn bound_by_slopes(
         &self,
         expr: ExprId,

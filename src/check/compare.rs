@@ -141,7 +141,7 @@ fn decide(
     let decided = decide_with(Floats::Exact, files, ddz, phase, options);
     let are_models = ddz.map(|side| matches!(side, RightSide::Summands(_)));
     match decided.0 {
-        // A text says 1/3, a model can not.
+        // A text can contain 1/3, a model cannot.
         Verdict::Undecided(..) if are_models[0] != are_models[1] && !options.exact => {
             let rounded = decide_with(Floats::Rounded, files, ddz, phase, options);
             match rounded.0 {
@@ -207,7 +207,7 @@ fn decide_with(
     (verdict, found.one_sided)
 }
 
-/// A proof that what is left of both sides is equal wherever the restrictions have values.
+/// A proof that the remainders of both sides are equal wherever the restrictions have values.
 fn proof(
     pool: &ExprPool,
     restrictions: &[ExprId],
@@ -241,7 +241,7 @@ fn sum(pool: &mut ExprPool, side: usize, rows: &[&Row]) -> ExprId {
     pool.sum(&terms)
 }
 
-/// Terms of both sides by what they are without their numbers.
+/// Terms of both sides, identified without their numbers.
 struct Table {
     rows: Vec<Row>,
 }

@@ -1,7 +1,7 @@
-//! Whether two sets of equations say the same. Two files enter, each a model, equations as text, LaTeX or Markdown; a
-//! [`Comparison`] leaves: for each phase and acceleration a proof that the two sides are equal, or a point where they
-//! differ, by how much, and in which terms. Numbers count as the decimals that they are written as; those of LaTeX and
-//! Markdown as rounded in their last digit, unless [`CheckOptions::exact`].
+//! Whether two sets of equations are equal. In: two files, each a model, equations as text, LaTeX or Markdown. Out: a
+//! [`Comparison`]. For each phase and acceleration it has a proof that the two sides are equal, or a point where they
+//! differ, with the difference and its terms. Numbers count as the decimals that they are written as; those of LaTeX
+//! and Markdown as rounded in their last digit, unless [`CheckOptions::exact`].
 //!
 //! Read `compare.rs` first: it pairs phases and equations and proves equality by normal forms. `side.rs` reads a file,
 //! `point.rs` searches for a point of difference in interval arithmetic.
@@ -18,7 +18,10 @@
 //! # Ok::<(), romc::check::CheckError>(())
 //! ```
 
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 mod compare;
 mod point;

@@ -75,11 +75,11 @@ pub(super) struct Sides<'s> {
     pub(super) whole: [ExprId; 2],
     /// The same without the terms that both have; the difference is that of the whole sides.
     pub(super) rest: [ExprId; 2],
-    /// What has a value where each side as written has one.
+    /// Expressions with values exactly where each side as written has one.
     pub(super) guards: [&'s [ExprId]; 2],
 }
 
-/// All variables at once, and single groups with the others zero, so that a small term can be seen beside large ones.
+/// All variables at once, and single groups with the others zero, so that a small term is visible next to large ones.
 pub(super) fn search(
     sides: &Sides<'_>,
     phase: &str,
@@ -139,7 +139,7 @@ pub(super) fn search(
 }
 
 impl Sides<'_> {
-    /// NaN for a side that has no value, also if what has none cancelled; an infinity where floats overflow.
+    /// NaN for a side without a value, also if the undefined part cancelled; an infinity where floats overflow.
     fn at(&self, values: &BTreeMap<SymbolId, f64>) -> Gap {
         let value_of = |symbol: SymbolId| values.get(&symbol).copied().unwrap_or(0.0);
         let both = [0, 1].map(|side| {

@@ -70,7 +70,7 @@ pub(crate) fn read_sides(
 }
 
 impl Side {
-    /// `known` are names of phases that labels of LaTeX may end in, besides `contact` and `flight`.
+    /// `known` are names of phases that labels of LaTeX may end in, in addition to `contact` and `flight`.
     pub fn from_bytes(
         file: &str,
         bytes: &[u8],

@@ -23,7 +23,10 @@ pub(super) fn run(arguments: &CompileArguments) -> Result<Answer> {
     let rounding = match (arguments.equations.digits, arguments.equations.significant) {
         (Some(places), _) => Rounding::Decimals(places),
         (None, Some(digits)) => Rounding::Significant(digits),
-        (None, None) => (simplified.as_ref()).map_or(Rounding::default(), Outcome::rounding),
+        (None, None) => {
+            let chosen = simplified.as_ref().and_then(Outcome::rounding);
+            chosen.unwrap_or(arguments.code.units.usual_rounding())
+        }
     };
     let mut files = emit(equations, arguments, rounding)?;
     let (summary, certificate) = match &simplified {

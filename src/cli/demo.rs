@@ -1,7 +1,7 @@
 //! `romc demo`: the main job on the shipped model and recordings, which are part of the binary.
 
 use super::*;
-use crate::evaluate::Verdict;
+use crate::mpc::Solver;
 
 const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4.json"));
 const JUMP_1: &[u8] = include_bytes!("../../examples/recordings/go1/test_01.csv.gz");
@@ -31,11 +31,10 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     let mut files = deploy::emit(&Equations::of(&model), &targets, &options)?;
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
-    progress.set_message("running the controller");
+    progress.finish_and_clear();
     let control = mpc::run_with_both_lifts(&model, &jumps)?;
     let commands = mpc::command_table(&model, &control[0]).csv();
     files.push(EmittedFile::new("commands.csv", commands));
-    progress.set_message("drawing the report");
     let digests = JUMPS.map(|(name, bytes)| (PathBuf::from(name), sha256(bytes)));
     let verdict = verdict(&model, &evaluation, &mpc::judged(&control[0]));
     let content = Content {
@@ -52,18 +51,48 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     let report = report::page_of(&content, REPORT_TOLERANCE, vec!["romc demo".to_owned()])?;
     files.push(EmittedFile::new("report.html", report.page));
     let made = inputs.write_folder(folder, &files, arguments.force)?;
-    progress.set_message("checking the C code");
+    let progress = spinner("checking the C code");
     let self_test = self_test(&model, folder);
     progress.finish_and_clear();
 
     let failed: Vec<String> = control.iter().flat_map(|runs| failed_runs(runs)).collect();
-    let mut text = figures(&evaluation, &control[0], &failed, &verdict);
     let is_failed = !failed.is_empty() || self_test.is_err() || verdict.fails_predictions();
     let self_test = self_test.unwrap_or_else(|reason| format!("FAILED: {reason}"));
-    let _ = writeln!(text, "\nself-test of the emitted C: {self_test}\n");
-    let _ = writeln!(text, "made in {}:", folder.display());
-    let size = |file: &EmittedFile| format!("{} ({} bytes)", file.path, file.contents.len());
-    text += &lines("  ", files.iter().map(size));
+    let mut text = format!(
+        "romc demo: model {} on {} jumps of a simulated Go1 that training did not see\n\
+         1. The model\n{}\n\
+         2. Predictions from the first state and the recorded forces\n{}\n\
+         3. Control along the jumps, without the recorded torques\n{}\n\
+         4. Made in {}; open report.html next\n{}",
+        MODEL.0.trim_end_matches(".json"),
+        JUMPS.len(),
+        model_text(&model).replace("\n\n", "\n"),
+        predictions(&model, &evaluation)?,
+        controllers(&model, &jumps, &control[0])?,
+        folder.display(),
+        made_text(&model, &self_test)
+    );
+    if arguments.verbose {
+        let tables = [control_table(&control[0]), run_table(&control[0])];
+        text += &format!(
+            "{}\n{}\n{}\n",
+            baseline_table(&evaluation),
+            tables[0],
+            tables[1]
+        );
+        text += &lines("", verdict_lines(&verdict).lines());
+    } else {
+        let [fit, failed] = [&verdict.fit_for, &verdict.failed].map(|uses| uses.join(", "));
+        text += &lines(
+            "verdict: fit for ",
+            Some(fit).filter(|uses| !uses.is_empty()),
+        );
+        text += &lines(
+            "verdict: not fit for ",
+            Some(failed).filter(|uses| !uses.is_empty()),
+        );
+    }
+    text += &lines("FAILED along ", failures(&control[0]).iter().chain(&failed));
     let json = json!({
         "model": MODEL.0,
         "rollouts": assessment_json(&model, &evaluation),
@@ -76,23 +105,131 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     Ok(Answer::new(text, json).failed_if(is_failed))
 }
 
-/// What is printed of the rollouts and of the controller.
-fn figures(
-    evaluation: &Assessment,
-    runs: &[NamedRun],
-    failed: &[String],
-    verdict: &Verdict,
-) -> String {
-    let mut text = format!(
-        "romc demo: model {} on {} recorded jumps of a simulated Go1 that its training did not see\n\n{}\n{}\n{}",
-        MODEL.0,
-        JUMPS.len(),
-        baseline_table(evaluation),
-        control_table(runs),
-        run_table(runs)
-    );
-    text += &lines("FAILED along ", failures(runs).iter().chain(failed));
-    text + &verdict_lines(verdict)
+/// Errors of the body with the best of all baselines, and the height of the body over the first jump.
+fn predictions(model: &ReducedModel, evaluation: &Assessment<'_>) -> Result<String> {
+    let [whole, short] = &evaluation.constant_velocity;
+    let [latent_whole, latent_short] = &evaluation.constant_latent_velocity;
+    let horizons = [
+        ("0.1 s", &evaluation.restarted, [short, latent_short]),
+        ("whole jump", &evaluation.full, [whole, latent_whole]),
+    ];
+    let mut rows = Vec::new();
+    for (place, name) in ["body.x", "body.z"].into_iter().enumerate() {
+        for (horizon, own, [constant, in_latent]) in &horizons {
+            let rms = |sums| body_rms(evaluation, sums)[place];
+            let mut baselines = vec![
+                ("constant velocity", rms(constant)),
+                ("constant latent velocity", rms(in_latent)),
+            ];
+            baselines.extend(evaluation.baselines.iter().map(|baseline| {
+                let sums = match *horizon {
+                    "0.1 s" => &baseline.restarted,
+                    _ => &baseline.full,
+                };
+                (baseline.name, template_rms(sums)[place])
+            }));
+            let best = (baselines.into_iter())
+                .filter_map(|(of, rms)| Some((of, rms?)))
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            rows.push((format!("{name}, {horizon}"), rms(own), best));
+        }
+    }
+    let in_mm = |rms: f64| 1e3 * rms;
+    let table = Table::of(rows)
+        .column("root mean square error", "mm", |row| row.0.clone())
+        .column("model", "", |row| row.1.map(in_mm))
+        .column("best baseline", "", |row| row.2.map(|(_, rms)| in_mm(rms)))
+        .column("which", "", |row| row.2.map(|(name, _)| name))
+        .table();
+    let run = &evaluation.runs[0];
+    let recorded: Vec<f64> = run.segment.x.row(BODY_Z).iter().copied().collect();
+    let states = run.full.states(recorded.len());
+    let height = |state: &Option<(DVector<f64>, DVector<f64>)>| match state {
+        Some((z, _)) => Ok::<_, Error>(model.decode(z)?[BODY_Z]),
+        None => Ok(f64::NAN),
+    };
+    let predicted = states.iter().map(height).collect::<Result<Vec<_>>>()?;
+    let curves = [('.', recorded), ('*', predicted)];
+    let chart = chart::chart(&curves, 2);
+    Ok(format!(
+        "{table}  body height in {}, m: * model, . recorded\n{chart}",
+        JUMPS[0].0
+    ))
+}
+
+/// Torques and deviations after a push of the controller and its baselines, and the time of a step with both solvers.
+fn controllers(model: &ReducedModel, jumps: &[Recording], runs: &[NamedRun]) -> Result<String> {
+    let metrics: Vec<&ControlMetrics> = mpc::judged(runs);
+    let mean = |of: &dyn Fn(&ControlMetrics) -> Option<f64>| {
+        let values: Option<Vec<f64>> = metrics.iter().map(|metrics| of(metrics)).collect();
+        values.map(|values| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let mm = |metres: Option<f64>| metres.map(|metres| 1e3 * metres);
+    let rows = [
+        (
+            "romc",
+            mean(&|of| of.torque_r2.contact),
+            mean(&|of| mm(of.recovery_rms_m)),
+            "with the equations above",
+        ),
+        (
+            "no dynamics",
+            mean(&|of| of.baseline.no_dynamics.torque_r2.contact),
+            mean(&|of| mm(of.baseline.no_dynamics.recovery_rms_m)),
+            "with ddz = g u_lat",
+        ),
+        (
+            "no feedback",
+            None,
+            mean(&|of| mm(of.baseline.feedback_off.recovery_rms_m)),
+            "without measurements",
+        ),
+        (
+            "replay",
+            None,
+            mean(&|of| mm(of.baseline.replay.recovery_rms_m)),
+            "the recorded torques again",
+        ),
+    ];
+    let table = Table::of(rows)
+        .column("controller", "", |row| row.0)
+        .column("torques, R^2", "", |row| row.1)
+        .column("error after a push, mm", "", |row| row.2)
+        .column("", "", |row| row.3)
+        .table();
+    let settings = MpcSettings {
+        solver: Solver::Riccati,
+        ..usual_settings(model, jumps)
+    };
+    let mut structured = controller(model, settings)?;
+    let run = along_recording(
+        &mut structured,
+        &jumps[0],
+        ReferenceInput::Recorded,
+        |_, _| (),
+    )?;
+    let [clarabel, own] = [&runs[0].1, &run].map(|run| run.summary.step_us.p50);
+    Ok(format!(
+        "{table}  median time of a step: clarabel {clarabel:.0} us, structured solver {own:.0} us\n"
+    ))
+}
+
+/// The files by use, and where to go on.
+fn made_text(model: &ReducedModel, self_test: &str) -> String {
+    let name = model.identifier();
+    let files = [
+        (
+            format!("{name}.h, {name}.c, {name}/"),
+            format!("C99 (self-test {self_test}) and a Rust crate"),
+        ),
+        (
+            format!("{name}.tex, commands.csv"),
+            "equations for a paper; torques of every step".to_owned(),
+        ),
+    ];
+    files
+        .map(|(files, words)| format!("  {files:<29} {words}\n"))
+        .concat()
 }
 
 /// Compiles the emitted C with the machine's compiler and runs its self-test: what became of it, or why it failed.

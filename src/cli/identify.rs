@@ -39,18 +39,20 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     let losses = [
         ("viscous friction", "N m s/rad", viscous),
         ("dry friction", "N m", [dry, error.dry_nm]),
-        ("armature", "kg m^2", [armature, error.armature_kg_m2]),
+        ("rotor inertia", "kg m^2", [armature, error.armature_kg_m2]),
     ];
     let pair = |value, error| format!("{} ± {}", significant(value), two_digits(error));
     let joints = Table::of(losses)
-        .column("losses of a joint", "", |(name, ..)| *name)
+        .column("joint friction and inertia", "", |(name, ..)| *name)
         .column("unit", "", |(_, unit, _)| *unit)
         .column("hx", "", |(.., [value, error])| pair(value.hx, error.hx))
         .column("hy", "", |(.., [value, error])| pair(value.hy, error.hy))
         .column("kn", "", |(.., [value, error])| pair(value.kn, error.kn))
         .table();
     let moments: [(&str, &str, fn(&LegMoments) -> f64); 5] = [
-        ("first moment beside the hip", "kg m", |l| l.side_kg_m),
+        ("first moment, sideways from the hip", "kg m", |l| {
+            l.side_kg_m
+        }),
         ("first moment of the thigh", "kg m", |l| l.thigh_kg_m),
         ("first moment of the calf", "kg m", |l| l.calf_kg_m),
         ("second moment of the thigh", "kg m^2", |l| l.thigh_kg_m2),
@@ -62,8 +64,8 @@ fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     let by_forces = [alone.gravity_m_s2, alone.mass_kg];
     let by_all = [found.gravity_m_s2, found.mass_kg];
     let fits = [
-        ("the feet's forces alone", alone.r2, by_forces),
-        ("losses and legs too", found.r2, by_all),
+        ("forces of the feet alone", alone.r2, by_forces),
+        ("with friction, inertia and legs", found.r2, by_all),
     ];
     let fits = Table::of(fits)
         .column("trunk's acceleration by", "", |(name, ..)| *name)
@@ -84,7 +86,7 @@ fn quantities<const N: usize>(what: &str, rows: [(&str, &str, [f64; 2]); N]) -> 
     Table::of(rows)
         .column(what, "", |(name, ..)| *name)
         .column("unit", "", |(_, unit, _)| *unit)
-        .column("value", "", |(.., [value, _])| *value)
+        .column("value", "", |(.., [value, _])| significant(*value))
         .column("standard error", "", |(.., [_, error])| two_digits(*error))
         .table()
 }

@@ -66,10 +66,10 @@ fn guessed(arguments: &InspectArguments, robot: &Robot) -> Result<Answer> {
     Ok(Answer::new(text, json))
 }
 
-const PATTERN_WIDTH: usize = 120;
 const DOMINANT: usize = 4;
+const KINDS: usize = JOINT_DIM / 4; // joints of a leg
 const LATENT_ONLY: &str =
-    "latent-only: no encoder, so it says nothing about a robot's coordinates\n";
+    "no encoder: the latent coordinates have no relation to a robot's coordinates\n";
 
 fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     let (equations, file) = (Equations::of(model), path.display().to_string());
@@ -81,18 +81,22 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     );
     let description = Some(model.description()).filter(|text| !text.is_empty());
     text += &lines("  ", description);
-    text += &input_rule(model);
+    text += &format!("\n{}\n", model_text(model));
     let coefficients = equations.terms.len() * equations.latent_dim();
     let phases = equations.phases.iter().map(|phase| {
         let (feet, active) = (phase.feet.to_string(), phase.active_count());
         json!({"name": phase.name, "feet": feet, "active_terms": active, "coefficients": coefficients})
     });
     let phases: Vec<Value> = phases.collect();
-    let table = phase_table(&equations, coefficients);
-    text += &format!("\n{table}\n{}", exact_words(&equations));
-    if equations.terms.len() <= PATTERN_WIDTH {
-        text.extend((0..phases.len()).map(|phase| pattern(&equations, phase)));
+    let invariance = Invariance::of(model).unwrap_or_else(|error| {
+        note(&format!("{file}: known physics cannot be checked: {error}"));
+        None
+    });
+    if let Some(table) = invariance.as_ref().map(invariance_table) {
+        let _ = writeln!(text, "{table}");
     }
+    let table = phase_table(&equations, coefficients);
+    text += &format!("{table}\n{}", exact_words(&equations));
     let words: Vec<String> = (model.latent_words().iter())
         .map(ToString::to_string)
         .collect();
@@ -100,17 +104,11 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
     let [encoder, decoder] =
         [model.encoder_map(), model.decoder_map()].map(|map| map.ok().map(StateMap::summary));
     text += &match (&dominant, &encoder) {
-        (Some(dominant), _) => composition(dominant, &words),
+        (Some(dominant), _) => composition(dominant),
         (None, Some(_)) => lines("  encoder ", &encoder) + &lines("  decoder ", &decoder),
         (None, None) => LATENT_ONLY.to_owned(),
     };
-    let invariance = Invariance::of(model).unwrap_or_else(|error| {
-        note(&format!("{file}: invariance is not told: {error}"));
-        None
-    });
-    if let Some(table) = invariance.as_ref().map(invariance_table) {
-        let _ = write!(text, "\n{}\n\n{table}", table.caption);
-    }
+    text += &input_rule(model);
     let json = json!({
         "kind": "model",
         "file": file,
@@ -145,16 +143,14 @@ fn phase_table(equations: &Equations<'_>, coefficients: usize) -> Table {
 
 type Dominant = Vec<Vec<(String, f64)>>;
 
-fn composition(dominant: &Dominant, words: &[String]) -> String {
+fn composition(dominant: &Dominant) -> String {
     let line = |(latent, weights): (usize, &Vec<(String, f64)>)| {
         let part = |(name, weight): &(String, f64)| format!("{} {name}", significant(*weight));
         let parts: Vec<String> = weights.iter().map(part).collect();
-        let what = words
-            .get(latent)
-            .map_or(String::new(), |words| format!("{words}: "));
-        format!("  z{}  {what}{} ...\n", latent + 1, parts.join(", "))
+        fitted(&format!("  z{}: {} ...", latent + 1, parts.join(", ")))
     };
-    dominant.iter().enumerate().map(line).collect()
+    let largest: String = dominant.iter().enumerate().map(line).collect();
+    format!("largest weights of the encoder\n{largest}\n")
 }
 
 fn input_rule(model: &ReducedModel) -> String {
@@ -168,41 +164,49 @@ fn input_rule(model: &ReducedModel) -> String {
             "the world's axes, moments of roll, pitch and yaw, of feet that push"
         }
     };
-    let rule = format!("  inputs of robot {}: forces in {axes};", robot.name);
+    let rule = format!("inputs of robot {}: forces in {axes};", robot.name);
     let Some(actuators) = model.actuators() else {
-        return rule + " torques of the motors\n";
+        return fitted(&(rule + " motor torques"));
     };
+    let is_alike = |of: &[f64; JOINT_DIM]| (0..JOINT_DIM).all(|i| of[i] == of[i % KINDS]);
+    let all = [&actuators.viscous, &actuators.dry, &actuators.armature];
+    let (count, first) = match all.iter().all(|of| is_alike(of)) {
+        true => (KINDS, "*"),
+        false => (JOINT_DIM, ""),
+    };
+    let names = JOINT_NAMES[..count].iter();
+    let names = names.map(|name| first.to_owned() + &name[2 * first.len()..]);
     let mut table = Table::default();
     table
-        .column("joint", "", JOINT_NAMES)
-        .column("viscous", "N m s/rad", actuators.viscous)
-        .column("dry", "N m", actuators.dry)
-        .column("armature", "kg m^2", actuators.armature);
-    let legs = actuators.legs.map_or(String::new(), |legs| {
-        let first = [legs.side_kg_m, legs.thigh_kg_m, legs.calf_kg_m].map(significant);
-        let second = [legs.thigh_kg_m2, legs.calf_kg_m2].map(significant);
-        format!(
-            "\n  without the torques that carry and move the links of a leg on the ground: first moments beside the hip, of thigh and calf {} kg m, \
-             second moments of thigh and calf {} kg m^2\n",
-            first.join(", "),
-            second.join(", ")
-        )
-    });
-    format!("{rule} torques of the motors less what the joints take\n\n{table}{legs}")
+        .column("joint", "", names)
+        .column("viscous", "N m s/rad", actuators.viscous[..count].to_vec())
+        .column("dry", "N m", actuators.dry[..count].to_vec())
+        .column(
+            "rotor inertia",
+            "kg m^2",
+            actuators.armature[..count].to_vec(),
+        );
+    let rule = fitted(&(rule + " motor torques minus joint friction and rotor inertia"));
+    let legs = actuators.legs.as_ref().map_or(String::new(), leg_table);
+    format!("{rule}\n{table}{legs}")
 }
 
-fn pattern(equations: &Equations<'_>, phase: usize) -> String {
-    let name = &equations.phases[phase].name;
-    let mut text = format!("Xi of {name} (one column per term, + positive, - negative)\n");
-    for (output, row) in equations.coefficients(phase).column_iter().enumerate() {
-        let cells = row.iter().map(|value| match value {
-            value if *value > 0.0 => '+',
-            value if *value < 0.0 => '-',
-            _ => '.',
-        });
-        let _ = writeln!(text, "  ddz{}  {}", output + 1, cells.collect::<String>());
-    }
-    text + "\n"
+/// The moments by which the weight and the inertia of a leg on the ground are subtracted from its torques.
+fn leg_table(legs: &LegMoments) -> String {
+    let rows = [
+        ("first, sideways from the hip", "kg m", legs.side_kg_m),
+        ("first, thigh", "kg m", legs.thigh_kg_m),
+        ("first, calf", "kg m", legs.calf_kg_m),
+        ("second, thigh", "kg m^2", legs.thigh_kg_m2),
+        ("second, calf", "kg m^2", legs.calf_kg_m2),
+    ];
+    let table = Table::of(rows)
+        .column("moment of a leg's links", "", |row| {
+            format!("{}, {}", row.0, row.1)
+        })
+        .column("value", "", |row| row.2)
+        .table();
+    format!("\nweight and inertia of legs on the ground are subtracted\n\n{table}")
 }
 
 fn dominant_coordinates(model: &ReducedModel) -> Option<Dominant> {

@@ -4,6 +4,7 @@
 //! (`use super::*`).
 
 mod args;
+mod chart;
 mod check;
 mod compile;
 mod convert;
@@ -42,7 +43,7 @@ use std::path::{Path, PathBuf};
 use std::process::{self, ExitCode};
 
 use args::{PhaseSet, ReadingArguments, TrainArguments, TrainSettings, Widths, *};
-use clap::Parser;
+use console::style;
 use nalgebra::{DMatrix, DVector};
 use prepared_recordings::RecordedSets;
 use serde_json::{Map, Value, json};
@@ -79,7 +80,7 @@ use crate::report::{
     baseline_table, body_rms, control_figures, control_table, coordinate_table, dynamics_table,
     failed_runs, failures, figure_files, horizon_json, horizon_table, introduction,
     invariance_table, page, phase_table, plan_figures, plan_json, range, reach_figure, run_table,
-    study_figures, verdict_lines, walk_reach_figure, without_statistics,
+    study_figures, template_rms, verdict_lines, walk_reach_figure, without_statistics,
 };
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, JOINT_NAMES, Leg, LegMoments, Robot, WrenchFrame};
 use crate::robot_file::{self, RobotEntry, RobotOptions, read_actuators};
@@ -95,7 +96,10 @@ use crate::train::{
     assess, sha256,
 };
 use crate::typeset::words::counted;
-use crate::typeset::{Cell, NumberStyle, PrintOptions, Rounding, SymbolTable, Table, significant};
+use crate::typeset::{
+    COLUMNS, Cell, NumberStyle, PrintOptions, Rounding, SymbolTable, Table, model_text,
+    significant, wrapped,
+};
 use crate::{Error, artifact};
 
 type Result<T, E = Error> = std::result::Result<T, E>;
@@ -130,7 +134,7 @@ pub fn run() -> ExitCode {
 
 /// The same with the arguments of another program, the first of them its name; returns the exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let arguments = match Arguments::try_parse_from(arguments) {
+    let arguments = match Arguments::read(arguments) {
         Ok(arguments) => arguments,
         Err(refusal) => {
             // Help and the version are refusals of clap that go to stdout; a reader that has gone away is no failure.
@@ -147,12 +151,13 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Answer { text, json, code }) => {
             let text = match arguments.json {
                 true => format!("{}\n", printable_json(&json.to_string())),
-                false => printable(&text).into_owned(),
+                false => coloured(&printable(&text)),
             };
             if print(&text) { code } else { FAILED }
         }
         Err(error) => {
-            eprintln!("error: {}", printable(&error.to_string()));
+            let head = style("error:").for_stderr().red().bold();
+            eprintln!("{head} {}", printable(&error.to_string()));
             let first = std::error::Error::source(&error);
             for cause in std::iter::successors(first, |cause| cause.source()) {
                 eprintln!("  because: {}", printable(&cause.to_string()));
@@ -199,6 +204,27 @@ fn execute(arguments: &Arguments) -> Result<Answer> {
     let entries = std::mem::replace(&mut answer.json, json!({ "command": name }));
     extend(&mut answer.json, entries);
     Ok(answer)
+}
+
+/// The same text with the first words of failures, verdicts and notes in colour, where stdout is a terminal.
+fn coloured(text: &str) -> String {
+    if !console::colors_enabled() {
+        return text.to_owned();
+    }
+    let heads = [
+        ("FAILED", style("FAILED").red().bold()),
+        ("verdict:", style("verdict:").bold()),
+        ("warning:", style("warning:").yellow().bold()),
+        ("note:", style("note:").cyan()),
+    ];
+    let line = |line: &str| {
+        let head = heads.iter().find(|(head, _)| line.starts_with(head));
+        match head {
+            Some((head, styled)) => format!("{styled}{}", &line[head.len()..]),
+            None => line.to_owned(),
+        }
+    };
+    text.split_inclusive('\n').map(line).collect()
 }
 
 /// Prints to stdout, and says whether that worked; a reader that has gone away (`| head`) is no failure.

@@ -1,5 +1,7 @@
 //! `romc mpc`: the latent-space controller along recordings.
 
+use indicatif::ProgressBar;
+
 use super::*;
 use crate::evaluate::{Run, Verdict};
 
@@ -13,7 +15,15 @@ pub(super) fn run(arguments: &MpcArguments) -> Result<Answer> {
     let settings = settings(&model, arguments)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_turns(motions(&recordings), UNROLLED);
-    let runs = run_all(&model, &recordings, settings, arguments.reference_input)?;
+    let bar = control_bar(recordings.len());
+    let runs = run_all(
+        &model,
+        &recordings,
+        settings,
+        arguments.reference_input,
+        &bar,
+    )?;
+    bar.finish_and_clear();
     let runs = JudgedRuns::of(&model, &recordings, runs)?;
     let mut answer = answer(arguments, &settings, &runs);
     let figures = || Ok(control_figures(&model, &settings, &runs.runs));
@@ -57,7 +67,7 @@ impl JudgedRuns {
         let (runs, failed) = (&self.runs, &self.failed);
         let mut text = format!("{}\n{}\n", control_table(runs), run_table(runs));
         text += &lines("FAILED along ", failures(runs).iter().chain(failed));
-        text += &verdict_lines(&self.verdict);
+        text += &lines("", verdict_lines(&self.verdict).lines());
         text + &lines("note: ", &self.remarks)
     }
 
@@ -110,23 +120,33 @@ pub(super) fn judged(runs: &[NamedRun]) -> Vec<&ControlMetrics> {
     metrics.collect()
 }
 
-pub(super) fn run_all(
+/// Steps of progress of a run along a recording, and of its comparison with baselines.
+const STEPS: u64 = 1000;
+
+/// Progress of this number of runs with their comparisons.
+fn control_bar(runs: usize) -> ProgressBar {
+    progress_bar("running the controller", 2 * STEPS as usize * runs)
+}
+
+fn run_all(
     model: &ReducedModel,
     recordings: &[Recording],
     settings: MpcSettings,
     reference_input: ReferenceInput,
+    bar: &ProgressBar,
 ) -> Result<Vec<NamedRun>> {
     let mut controller = controller(model, settings)?;
     let mut runs = Vec::with_capacity(recordings.len());
     for recording in recordings {
         let path = recording.path.display();
-        let bar = progress_bar(format!("controlling along {path}"));
+        let begun = bar.position();
+        bar.set_message(format!("controlling along {path}"));
         controller.reset();
-        let progress = |done, total| show_progress(&bar, done, total);
+        let progress = |done, total| bar.set_position(begun + STEPS * done as u64 / total as u64);
         let mut run = along_recording(&mut controller, recording, reference_input, progress)?;
         bar.set_message(format!("comparing with baselines along {path}"));
         run.metrics = Some(control_metrics(model, recording, settings)?);
-        bar.finish_and_clear();
+        bar.set_position(begun + 2 * STEPS);
         runs.push((recording.path.clone(), run));
     }
     Ok(runs)
@@ -145,11 +165,14 @@ pub(super) fn run_with_both_lifts(
             1e3 * default.step_s
         ));
     }
+    let bar = control_bar(2 * recordings.len());
     let with = |lift| {
         let settings = MpcSettings { lift, ..usual };
-        run_all(model, recordings, settings, ReferenceInput::Recorded)
+        run_all(model, recordings, settings, ReferenceInput::Recorded, &bar)
     };
-    Ok([with(Lift::Transpose)?, with(Lift::Consistent)?])
+    let runs = [with(Lift::Transpose)?, with(Lift::Consistent)?];
+    bar.finish_and_clear();
+    Ok(runs)
 }
 
 fn answer(arguments: &MpcArguments, settings: &MpcSettings, judged: &JudgedRuns) -> Answer {

@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
         return Ok(answer);
     }
     if arguments.reach {
-        let bar = progress_bar("planning a grid of goals");
+        let bar = progress_bar("planning a grid of goals", 0);
         let progress = |done, total| show_progress(&bar, done, total);
         let reach = plan::reach(&model, &settings, progress)?;
         bar.finish_and_clear();
@@ -87,7 +87,13 @@ fn trusted(verdict: &Verdict, force: Overwrite) -> Result<()> {
             Err(Error::Distrusted(reasons.join("; ")))
         }
         Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
-            (reasons.iter()).for_each(|reason| eprintln!("warning: {}", printable(reason)));
+            (reasons.iter()).for_each(|reason| {
+                eprintln!(
+                    "{} {}",
+                    style("warning:").for_stderr().yellow().bold(),
+                    printable(reason)
+                )
+            });
             Ok(())
         }
         Verdict::Trusted => Ok(()),
@@ -181,25 +187,40 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
         table.row([name.into(), "s".into(), Cell::from(part.duration_s)]);
     }
     let (model, verdict) = (arguments.model.display().to_string(), &planned.verdict);
-    let margins = &planned.margins;
-    let [[slip, lift], [drift, sink]] =
-        [margins.foot_slip_m, margins.foot_drift_m].map(|of| of.map(|m| 1e3 * m));
     let ([distance, apex], word) = (planned.goal_m, verdict.word());
-    let (cost, deviation) = (planned.cost, planned.input_deviation);
-    let torque = 100.0 * margins.torque_share;
     let mut text = format!(
-        "{model}: a jump of {distance} m with an apex of {apex} m: {word}\n\n{table}\n\
-         cost {cost:.3}; largest deviation of the input from the recorded ones: {deviation:.2} standard deviations\n\
-         largest torque {torque:.0} % of its limit; feet on the ground move {slip:.1} mm along the floor and \
-         {lift:.1} mm above it beyond those of the training's mean jump to this goal, {drift:.1} mm along it and \
-         {sink:.1} mm below it in all\n{} convex programs, {:.0} ms\n",
-        planned.programs, planned.solve_ms,
+        "{model}: a jump of {distance} m with an apex of {apex} m: {word}\n\n{table}\n{}\n{}, {:.0} ms\n",
+        margins_table(planned),
+        counted(planned.programs, "convex program"),
+        planned.solve_ms,
     );
     text += &lines(&format!("{word}: "), verdict.reasons());
     let mut json = json!({ "model": model });
     extend(&mut json, plan_json(planned));
     json["output"] = json!(shown(&arguments.output));
     Answer::new(text, json)
+}
+
+/// How far the plan is from the recordings and from the limits.
+fn margins_table(planned: &Plan) -> Table {
+    let margins = &planned.margins;
+    let [[slip, lift], [drift, sink]] =
+        [margins.foot_slip_m, margins.foot_drift_m].map(|of| of.map(|m| 1e3 * m));
+    Table::of([
+        ("cost", planned.cost),
+        (
+            "input, standard deviations from the recorded inputs",
+            planned.input_deviation,
+        ),
+        ("torque, % of the limit", 100.0 * margins.torque_share),
+        ("feet along the floor, beyond the mean jump, mm", slip),
+        ("feet above the floor, beyond the mean jump, mm", lift),
+        ("feet along the floor, mm", drift),
+        ("feet below the floor, mm", sink),
+    ])
+    .column("largest", "", |row| row.0)
+    .column("value", "", |row| row.1)
+    .table()
 }
 
 fn walk_reach_answer(arguments: &PlanArguments, map: &WalkMap) -> Answer {

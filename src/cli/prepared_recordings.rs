@@ -70,11 +70,13 @@ impl RecordedSets {
     }
 
     pub(super) fn read(&mut self) -> Result<(), RecordingError> {
-        for set in [2, 0, 1] {
+        let progress = spinner("reading recordings");
+        let read = [2, 0, 1].into_iter().try_for_each(|set| {
             let files = &self.files[set];
-            self.sets[set].read(files, self.robot, &self.options, &self.reader)?;
-        }
-        Ok(())
+            self.sets[set].read(files, self.robot, &self.options, &self.reader)
+        });
+        progress.finish_and_clear();
+        read
     }
 
     /// Which jumps came into which set, file and first row of each, if they were divided: in words and as JSON.

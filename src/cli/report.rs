@@ -1,6 +1,7 @@
 //! `romc report`: a one-page assessment of a model, and its figures as files; or a page on a controller's log.
 
 use super::mpc::{judged, of_usual_lift, run_with_both_lifts};
+use super::simplification::LADDER_STEPS;
 use super::*;
 use crate::recording::ControllerLog;
 use crate::report::{LogFacts, log_figures, log_page};
@@ -26,7 +27,7 @@ fn of_log(arguments: &ReportArguments, path: &Path) -> Result<Answer> {
     let figures = log_figures(&log, &facts);
     let page = log_page(path, &facts, &figures)?;
     let (shown, bytes) = (output.display().to_string(), page.len());
-    let mut text = format!("{}\n{}", facts.headline, lines("", &facts.sentences));
+    let mut text = lines("", [&facts.headline]) + &lines("", &facts.sentences);
     text += &format!("{shown}: {} kB, {} figures\n", bytes / 1000, figures.len());
     let json = json!({ "log": path.display().to_string(), "output": shown, "bytes": bytes });
     let mut answer = Answer::new(text, json);
@@ -53,13 +54,12 @@ fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer>
     let plan = plan.transpose()?;
     let progress = spinner("rolling the model out");
     let assessment = Assessment::over(&model, &recordings, arguments.restart_every)?;
-    progress.set_message("running the controller");
+    progress.finish_and_clear();
     let can_control = without_statistics(&model).is_none();
     let runs = can_control.then(|| run_with_both_lifts(&model, &recordings));
     // Without statistics of the inputs there are no runs, and the page says so.
     let [plain, consistent] = runs.transpose()?.unwrap_or_default();
     let usual = of_usual_lift(&model, [&plain, &consistent]);
-    progress.set_message("drawing");
     let paths = recordings.iter().map(|recording| &recording.path);
     // A file that is gone by now has no digest, and counts as one that the model does not name.
     let digest = |path: &PathBuf| Some((path.clone(), sha256(&std::fs::read(path).ok()?)));
@@ -76,7 +76,6 @@ fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer>
     };
     let commands = commands(arguments, model_path, can_control);
     let made = page_of(&content, arguments.tolerance, commands)?;
-    progress.finish_and_clear();
     // The figures come first: files that romc did not make are refused with nothing written.
     let written = match &arguments.figures {
         Some(folder) => inputs.write_folder(folder, &made.files, arguments.force)?,
@@ -142,9 +141,11 @@ pub(super) fn page_of(
     tolerance: Tolerance,
     commands: Vec<String>,
 ) -> Result<Made> {
+    let progress = progress_bar("drawing the page", LADDER_STEPS);
     let figures = all_figures(content)?;
     let [ladder, equations, changes] =
-        simplification::ladder(content.model, content.assessment, tolerance)?;
+        simplification::ladder(content.model, content.assessment, tolerance, &progress)?;
+    progress.finish_and_clear();
     let errors = format!("Errors of each ddz within {tolerance}, scaled units per s²");
     let bounds = format!("Every change within {tolerance}, with its bound");
     let options = PageOptions {

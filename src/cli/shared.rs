@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
 use serde::de::DeserializeOwned;
 
 use super::*;
@@ -225,7 +225,7 @@ pub(super) fn motions(recordings: &[Recording]) -> impl Iterator<Item = &Segment
 
 pub(super) const CUT: &str = "predictions are of pieces, each in the axes of its heading";
 pub(super) const UNROLLED: &str =
-    "a controller follows them only in the axes of their path, see docs/walking.md";
+    "a controller follows them only in the axes of their path, see docs/explanation/walking.md";
 
 pub(super) fn read_recordings(
     paths: &[PathBuf],
@@ -237,13 +237,14 @@ pub(super) fn read_recordings(
 }
 
 pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Recording>> {
-    let progress = spinner("reading recordings");
+    let progress = progress_bar("reading recordings", paths.len());
     let mut notes = ReadingNotes::default();
     let read = (paths.iter())
         .map(|path| {
             progress.set_message(printable(&format!("reading {}", path.display())).into_owned());
             let reading = reader.read(path)?;
             notes.add(&reading);
+            progress.inc(1);
             Ok(reading.recording)
         })
         .collect();
@@ -253,7 +254,7 @@ pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Record
 }
 
 pub(super) fn note(text: &str) {
-    eprintln!("note: {}", printable(text));
+    eprintln!("{} {}", console::style("note:").for_stderr().cyan(), printable(text));
 }
 
 pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
@@ -315,9 +316,26 @@ fn escaped(text: &str, written: impl Fn(char) -> String) -> Cow<'_, str> {
     text.chars().map(shown).collect()
 }
 
+/// Each item after the same words, on lines that fit a terminal.
 pub(super) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>) -> String {
-    let lines = items.into_iter().map(|item| format!("{words}{item}\n"));
+    let lines = items
+        .into_iter()
+        .map(|item| fitted(&format!("{words}{item}")));
     lines.collect()
+}
+
+/// Text on lines that fit a terminal; those after the first are indented by two characters more. Text that has lines
+/// already, such as a table, stays as it is.
+pub(super) fn fitted(text: &str) -> String {
+    let bare = text.trim_start_matches([' ', '\n']);
+    if bare.contains('\n') {
+        return format!("{text}\n");
+    }
+    let start = &text[..text.len() - bare.len()];
+    let indent = start.matches(' ').count();
+    let lines = wrapped(bare, COLUMNS - 2 - indent);
+    let joint = format!("\n{}", " ".repeat(indent + 2));
+    format!("{start}{}\n", lines.join(&joint))
 }
 
 pub(super) fn shown(path: &Option<PathBuf>) -> Option<String> {
@@ -345,17 +363,44 @@ pub(super) fn named(given: Option<&str>, output: &Path) -> String {
 }
 
 pub(super) fn spinner(message: &'static str) -> ProgressBar {
-    let bar = styled(ProgressBar::new_spinner(), "{spinner} {msg} [{elapsed}]");
+    let bar = styled(ProgressBar::new_spinner(), ELAPSED);
     bar.enable_steady_tick(Duration::from_millis(120));
     bar.with_message(message)
 }
 
-pub(super) fn progress_bar(message: impl Into<String>) -> ProgressBar {
-    styled(ProgressBar::new(0), "{msg} {wide_bar} {pos}/{len}").with_message(message.into())
+/// Progress of work in several steps, with an estimate of the remaining time.
+pub(super) fn progress_bar(message: impl Into<String>, steps: usize) -> ProgressBar {
+    let bar = styled(ProgressBar::new(steps as u64), ESTIMATED);
+    bar.enable_steady_tick(Duration::from_secs(1));
+    bar.with_message(message.into())
 }
 
+/// Begins a part of the work: a number of steps, or unknown.
+pub(super) fn begin_part(bar: &ProgressBar, message: &'static str, steps: Option<usize>) {
+    bar.set_message(message);
+    bar.set_style(style(steps.map_or(ELAPSED, |_| ESTIMATED)));
+    bar.set_length(steps.unwrap_or(0) as u64);
+    bar.set_position(0);
+    bar.reset_eta();
+}
+
+const ELAPSED: &str = "{spinner} {msg} [{elapsed}]";
+const ESTIMATED: &str = "{msg} {wide_bar} {percent} %{left}";
+
 fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
-    bar.with_style(ProgressStyle::with_template(template).expect("templates are constants"))
+    bar.with_style(style(template))
+}
+
+fn style(template: &str) -> ProgressStyle {
+    let style = ProgressStyle::with_template(template).expect("templates are constants");
+    style.with_key(
+        "left",
+        |state: &ProgressState, text: &mut dyn std::fmt::Write| {
+            if state.pos() > 0 {
+                let _ = write!(text, ", {:#} left", HumanDuration(state.eta()));
+            }
+        },
+    )
 }
 
 pub(super) fn show_progress(bar: &ProgressBar, done: usize, total: usize) {

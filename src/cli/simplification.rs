@@ -1,5 +1,7 @@
 //! Simplification for the commands that offer it: the domain from files, the effect on rollouts.
 
+use indicatif::ProgressBar;
+
 use super::*;
 use crate::sim::LatentSegment;
 
@@ -26,7 +28,7 @@ pub(super) fn run(
     if files.is_empty() {
         return Ok(None);
     }
-    let progress = spinner("simplifying");
+    let progress = progress_bar("simplifying", 2); // and rollouts, which take about as long
     let mut recordings = Vec::new();
     let ranges = ranges(original, arguments)?;
     if ranges.is_none() {
@@ -51,6 +53,7 @@ pub(super) fn run(
     };
     let tolerance = arguments.tolerance.unwrap_or(Tolerance::Absolute(0.0));
     let made = simplify(equations, &domain, samples.as_ref(), tolerance)?;
+    progress.inc(1);
     progress.set_message("rolling out");
     let basis = RolloutBasis {
         domain: &domain,
@@ -106,12 +109,9 @@ impl Outcome {
         Ok(())
     }
 
-    /// How coefficients are printed unless digits are given: in full if simplification has already chosen their digits.
-    pub(super) fn rounding(&self) -> Rounding {
-        match self.certificate.n_changes() {
-            0 => Rounding::default(),
-            _ => Rounding::Exact,
-        }
+    /// Coefficients in full where simplification has already chosen their digits.
+    pub(super) fn rounding(&self) -> Option<Rounding> {
+        (self.certificate.n_changes() > 0).then_some(Rounding::Exact)
     }
 
     /// Adds the certificate, and a comment to files that can hold one; `equations` are those of the model as printed.
@@ -197,12 +197,15 @@ pub(super) fn exact_words(equations: &Equations<'_>) -> String {
 }
 
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
+/// Its steps of progress: those within no tolerance and the chosen one are included.
+pub(super) const LADDER_STEPS: usize = LADDER.len() + 2;
 
 /// Sizes, errors and rollouts within several tolerances; errors of each equation within `chosen`; changes within it.
 pub(super) fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,
     chosen: Tolerance,
+    progress: &ProgressBar,
 ) -> Result<[Table; 3]> {
     let latent: Vec<&LatentSegment> = assessment.runs.iter().map(|run| &run.latent).collect();
     let samples = Samples::of(model, &latent);
@@ -214,7 +217,11 @@ pub(super) fn ladder(
         restart_every_s: assessment.restart_every_s,
     };
     let equations = &Equations::of(model);
-    let within = |tolerance| simplify(equations, &domain, Some(&samples), tolerance);
+    let within = |tolerance| {
+        let made = simplify(equations, &domain, Some(&samples), tolerance);
+        progress.inc(1);
+        made
+    };
     let [whole, short] =
         [&assessment.full, &assessment.restarted].map(|sums| body_rms(assessment, sums));
     let unchanged = [0, 1].map(|axis| [whole[axis], short[axis]]);

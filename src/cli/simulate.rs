@@ -17,8 +17,9 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer> {
         true => Horizon::all(&model, &assessment)?,
         false => Vec::new(),
     };
-    progress.set_message("judging");
-    let (verdict, unmeasured) = verdict_by_default(&model, &recordings, &assessment);
+    begin_part(&progress, "running the controller", Some(recordings.len()));
+    let judged = |done, total| show_progress(&progress, done, total);
+    let (verdict, unmeasured) = verdict_by_default(&model, &recordings, &assessment, judged);
     progress.finish_and_clear();
     let unmeasured =
         unmeasured.map(|reason| format!("torques and control are not judged: {reason}"));
@@ -27,9 +28,12 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer> {
         arguments.model.display(),
         counted(assessment.runs.len(), "segment"),
         counted(recordings.len(), "recording"),
-        metrics_text(&model, &assessment, &horizons),
-        verdict_lines(&verdict)
+        metrics_text(&model, &assessment, &horizons, arguments.verbose),
+        lines("", verdict_lines(&verdict).lines())
     );
+    if arguments.verbose {
+        text = format!("{}\n{text}", model_text(&model));
+    }
     text += &lines("note: ", &unmeasured);
     if let Some(path) = &arguments.output {
         let table = trajectory_table(&model, &assessment)?;
@@ -50,7 +54,12 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer> {
     Ok(Answer::new(text, json).failed_if(verdict.fails_predictions()))
 }
 
-fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>, horizons: &[Horizon]) -> String {
+fn metrics_text(
+    model: &ReducedModel,
+    assessment: &Assessment<'_>,
+    horizons: &[Horizon],
+    is_verbose: bool,
+) -> String {
     let mut text = format!("{}\n", coordinate_table(model, assessment));
     let sums = [&assessment.full, &assessment.restarted].into_iter();
     let kinds = ["full", "restarted"].into_iter().zip(sums);
@@ -72,32 +81,43 @@ fn metrics_text(model: &ReducedModel, assessment: &Assessment<'_>, horizons: &[H
             }
         }
     }
-    text += &format!(
-        "root mean square by phase, restarted every {} s\n\n{}\n{}\n",
-        assessment.restart_every_s,
-        phase_table(model, assessment),
-        baseline_table(assessment)
-    );
+    text += &format!("{}\n", baseline_table(assessment));
+    if is_verbose {
+        text += &details(model, assessment);
+    }
+    text + &lines("note: ", &assessment.remarks)
+}
+
+/// Errors by phase, constants of the baselines, dynamics, and the lift of recorded inputs.
+fn details(model: &ReducedModel, assessment: &Assessment<'_>) -> String {
     let baselines = assessment.baselines.iter();
     let constants = baselines.map(|of| format!("{}: {}", of.name, of.template.constants()));
-    text += &lines("  ", constants);
-    text += &format!("\n{}\n", dynamics_table(model, assessment));
-    text += &lines("", assessment.stride.as_ref().map(StrideGrowth::words));
-    let mean_square = assessment.decoder_mean_square().map(significant);
-    let mean_square = mean_square.map(|value| format!("{value} (scaled units)"));
-    text += &lines("decoder mean square: ", mean_square);
-    let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-    let (lift, r2) = (&assessment.lift, assessment.lift.torque.r2());
-    let (all, loss) = (lift.torque.r2_all(), assessment.combined_loss());
-    let figures = [loss, r2.contact, r2.flight, all, lift.inconsistency()];
-    let [loss, contact, flight, all, inconsistency] = figures.map(shown);
+    let mut text = lines("  ", constants);
     text += &format!(
-        "active terms: {}, combined loss L_mod: {loss}\n\
-         plain lift of exactly projected inputs: torque R^2 {contact} in contact, {flight} in flight, {all} over all \
-         samples; inconsistency {inconsistency}\n",
-        assessment.active_terms
+        "\nroot mean square error over {} s by phase\n\n{}\n{}\n",
+        assessment.restart_every_s,
+        phase_table(model, assessment),
+        dynamics_table(model, assessment)
     );
-    text + &lines("\nnote: ", &assessment.remarks)
+    text += &lines("", assessment.stride.as_ref().map(StrideGrowth::words));
+    let (lift, r2) = (&assessment.lift, assessment.lift.torque.r2());
+    let table = Table::of([
+        (
+            "mean square of the decoder, scaled units",
+            assessment.decoder_mean_square(),
+        ),
+        ("combined loss L_mod", assessment.combined_loss()),
+        ("torque R^2 in contact", r2.contact),
+        ("torque R^2 in flight", r2.flight),
+        ("torque R^2 of all samples", lift.torque.r2_all()),
+        ("inconsistency", lift.inconsistency()),
+    ])
+    .column("recorded inputs projected and lifted by W_e^T", "", |row| {
+        row.0
+    })
+    .column("value", "", |row| row.1.map(significant))
+    .table();
+    format!("{text}\n{table}\n")
 }
 
 /// `segment, time, phase`, then recorded, full and restarted of each latent coordinate, of its velocity, the latent

@@ -61,13 +61,12 @@ fn trained(arguments: &StudyArguments) -> Result<Store> {
         ));
     }
     let store = Store::create(&arguments.out_dir, plan)?;
-    let bar = spinner("training");
-    let total = store.plan.cells().len();
-    let finished = |_| {
-        let left = store.missing().len();
-        bar.set_message(format!("{} of {total} models trained", total - left));
-    };
     let shard = arguments.shard.unwrap_or(Shard::WHOLE);
+    let missing = store.missing();
+    let mut own = shard.of(&store.plan.cells());
+    own.retain(|id| missing.contains(id));
+    let bar = progress_bar("training models", own.len());
+    let finished = |_| bar.inc(1);
     let sets = [training, validation];
     study::run(&store, shard, sets, robot, &base, &finished)?;
     bar.finish_and_clear();

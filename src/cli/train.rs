@@ -34,8 +34,12 @@ pub(super) fn run(arguments: &TrainArguments) -> Result<Answer> {
 
     let bar = spinner("training");
     let mut listener = |progress: Progress| match progress {
-        Progress::Stage { name, .. } => bar.set_message(name),
-        Progress::Done { text, .. } => bar.set_message(text),
+        Progress::Stage { name, steps } => begin_part(&bar, name, steps),
+        Progress::Done { text } => {
+            bar.set_message(text);
+            bar.inc(1);
+        }
+        Progress::Step => bar.inc(1),
     };
     let mut monitor = Monitor::new(&mut listener, stop_on_interrupt());
     let mut trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;
@@ -147,12 +151,10 @@ fn command_line(
 fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetrics>) -> Answer {
     let (report, latent_dim) = (&trained.report, trained.model.latent_dim());
     let output = arguments.output.display().to_string();
-    let words = trained.model.latent_words().into_iter().zip(1..);
-    let words = words.map(|(words, number)| format!("  z{number}  {words}\n"));
     let text = format!(
-        "{output}: {latent_dim} latent coordinates from {} recordings\n{}\n{}{}",
-        arguments.recordings.len(),
-        words.collect::<String>(),
+        "{output}: {latent_dim} latent coordinates from {}\n\n{}\n{}{}",
+        counted(arguments.recordings.len(), "recording"),
+        model_text(&trained.model),
         metrics_table(report, tested),
         seed_table(report)
     );
@@ -179,28 +181,28 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
         let cells = (sets.iter()).map(|(_, set)| set.map(cell).unwrap_or_default());
         table.row([name.into(), unit.into()].into_iter().chain(cells));
     };
-    let lift = "torque R^2 of the plain lift, all samples";
-    let (short, whole) = ("fixed steps over 0.1 s", "fixed steps, whole motion");
+    let lift = "torque R^2 of the transpose lift";
+    let (short, whole) = ("over 0.1 s", "over the whole motion");
     row("decoder mean square", "scaled", &|m| Some(m.decoder_mse));
     row(lift, "", &|m| Some(m.torque_r2));
-    row(&format!("body x, {short}"), "m", &|m| {
+    row(&format!("error of body x {short}"), "m", &|m| {
         Some(m.prediction_x_m)
     });
-    row(&format!("body z, {short}"), "m", &|m| {
+    row(&format!("error of body z {short}"), "m", &|m| {
         Some(m.prediction_z_m)
     });
-    row(&format!("body x, {whole}"), "m", &|m| m.rollout_x_m);
-    row(&format!("body z, {whole}"), "m", &|m| m.rollout_z_m);
+    row(&format!("error of body x {whole}"), "m", &|m| m.rollout_x_m);
+    row(&format!("error of body z {whole}"), "m", &|m| m.rollout_z_m);
     for (phase, terms) in report.active_terms.iter().enumerate() {
         let (name, active) = (&terms.phase, terms.active);
-        let name = format!("smoothed ddz R^2 in {name} ({active} terms)");
+        let name = format!("R^2 of smoothed ddz, {name} ({})", counted(active, "term"));
         row(&name, "", &|m| m.ddz_r2.get(phase).copied());
     }
     let mut of_all = |name: String, value: f64| {
         table.row([name.into(), "".into(), Cell::from(value)]);
     };
     for score in &report.deviations {
-        let name = format!("ddz R^2 of deviations in {}, motion left out", score.part);
+        let name = format!("R^2 of deviations of ddz, {}", score.part);
         of_all(name, score.ddz_r2);
     }
     if let Some(overlap) = report.support_overlap {

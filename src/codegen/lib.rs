@@ -1,8 +1,11 @@
-//! The equations of a model, and what is printed of them: programs, code and text.
+//! The equations of a model, and their output as programs, code and text.
 //!
 //! [`equations`] are the accelerations over the expressions of `romc-cas`, [`lower`] makes an [`ir::Program`] of them;
 //! [`typeset`] and [`codegen`] print both. `romc` re-exports every module; depend on that.
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 use romc_cas as symbolic;
 use romc_model::{files, model};

@@ -1,5 +1,9 @@
-//! Recordings of legged robots, and what is identified from them. `romc` re-exports every module; depend on that.
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
+//! Recordings of legged robots, and the identification of parameters from them. `romc` re-exports every module; depend
+//! on that.
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 use romc_model::{files, robot_file};
 use romc_robot as robot;

@@ -5,7 +5,7 @@ use crate::typeset::{PrintOptions, TypesetError, latex, markdown, mathml};
 use clap::ValueEnum as _;
 use once_cell::unsync::OnceCell;
 
-/// What can be generated.
+/// A target of code generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Target {
     /// Equations, table of coefficients and nomenclature for papers
@@ -26,7 +26,7 @@ pub enum Target {
     Matlab,
     /// The controller as a crate with a C interface
     Controller,
-    /// The controller in C99 alone: one source file beside the model's
+    /// The controller in C99, one file next to the model's
     ControllerC,
 }
 
@@ -56,7 +56,7 @@ pub enum EmitError {
     #[error("the controller cannot be generated")]
     Control(#[from] MpcError),
     #[error(
-        "model `{model}`: generated controllers take affine encoders and decoders, this one has \
+        "model `{model}`: generated controllers need affine encoders and decoders, this one has \
          layers with an activation"
     )]
     Nonlinear { model: String },
@@ -82,7 +82,7 @@ pub struct EmitOptions {
     pub print: PrintOptions,
     /// Floating-point numbers of C and Rust.
     pub precision: Precision,
-    /// What computes sines and cosines in C and Rust.
+    /// Implementation of sines and cosines in C and Rust.
     pub sines: SineCosine,
     /// Units of robot coordinates in generated code.
     pub units: Units,
@@ -91,8 +91,8 @@ pub struct EmitOptions {
 }
 
 /// The files of the chosen targets, with paths below the output folder; a target chosen twice gives them once. Equal
-/// equations and options give equal bytes. Controllers compute in the scaled units of the model's maps, whatever the
-/// units of the equations.
+/// equations and options give equal bytes. Controllers compute in the scaled units of the model's maps, for any units
+/// of the equations.
 pub fn emit(
     equations: &Equations<'_>,
     targets: &[Target],

@@ -1,4 +1,4 @@
-//! A jump, planned or recorded, as C arrays: what examples and self-tests of generated controllers jump.
+//! A jump, planned or recorded, as C arrays for examples and self-tests of generated controllers.
 
 use super::controller_c::source::{Numbers, integers, list, nested};
 use super::*;
@@ -76,7 +76,7 @@ impl PlannedJump {
         }
     }
 
-    /// Path and text of `NAME_jump.h`, with `what` it is in words.
+    /// Path and text of `NAME_jump.h`; `what` describes the jump in words.
     pub(super) fn constants(
         &self,
         what: &str,

@@ -178,7 +178,8 @@ fn phases(
     used: &[Assigned<'_>],
 ) -> Read<Vec<PhasePattern>> {
     let mut rules = options.phases.clone();
-    // Sorted by name: as `any` takes every pattern with a foot down, the order of the two known phases is free.
+    // Sorted by name: `any` selects every pattern with a foot down, so the order of the two known phases does not
+    // matter.
     for assigned in used {
         if let Role::Xi(name) = &assigned.role
             && options.given(name).is_none()

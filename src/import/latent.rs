@@ -1,6 +1,6 @@
-//! Equations as text to library and coefficients. A coefficient is the number in front of a term, bit for bit; sums
-//! inside a product with a number are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`), products of sums stay one term
-//! (`z1*(1 + dz1)`).
+//! From equations as text to library and coefficients. A coefficient is the number in front of a term, bit for bit.
+//! Sums inside a product with a number are multiplied out (`2*(0.5*z1 - u1)` is `z1 - 2*u1`); products of sums stay one
+//! term (`z1*(1 + dz1)`).
 
 use super::equations::{Equation, Section};
 use super::run::ReadEquation;
@@ -199,7 +199,7 @@ fn union(
 
 pub(super) type Coefficients = HashMap<ExprId, Number>;
 
-/// Coefficients of `expr` as a sum over terms; `None` if one overflows. A sum that is a term is taken whole.
+/// Coefficients of `expr` as a sum over terms; `None` if one overflows. A sum that is itself a term is not divided.
 pub(super) fn coefficients(
     pool: &ExprPool,
     expr: ExprId,

@@ -1,8 +1,9 @@
 //! Models trained elsewhere: safetensors, NumPy's npz, arrays in memory, equations as text.
 //!
-//! A file enters, with [`ImportOptions`] for what tensors do not carry; a model checked like any other leaves, with an
-//! [`ImportReport`], or an [`ImportError`] with file, place, found and expected. Read `run.rs` first; `assign.rs`
-//! decides the use of each tensor, `assemble.rs` makes parts of a model of them, `latent.rs` takes equations apart.
+//! In: a file, with [`ImportOptions`] for data that tensors do not carry. Out: a checked model with an
+//! [`ImportReport`], or an [`ImportError`] with file, place, the text found and the text expected. Read `run.rs` first.
+//! `assign.rs` decides the use of each tensor, `assemble.rs` makes parts of a model of them, `latent.rs` decomposes
+//! equations.
 //!
 //! ```
 //! use romc::import::{Format, ImportOptions, import_from_bytes};

@@ -1,5 +1,5 @@
 //! Options of an import: everything that tensors do not carry.
-#![allow(missing_docs, reason = "the names say it")]
+#![allow(missing_docs, reason = "the names are self-explanatory")]
 
 use clap::ValueEnum;
 
@@ -9,13 +9,13 @@ use crate::robot::{Actuators, Robot, WrenchFrame};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// Tensors in a safetensors file, such as a PyTorch state dict
+    /// Tensors, such as a PyTorch state dict
     Safetensors,
     /// NumPy arrays
     Npz,
-    /// Equations as text: `[contact]`, then `ddz1 = 0.36 - 0.16*dz1 + u1` and so on
+    /// Text such as `[contact]` and `ddz1 = 0.36 - 0.16*dz1 + u1`
     Equations,
-    /// Equations as LaTeX, in a .tex or Markdown file
+    /// LaTeX in a .tex or Markdown file
     Latex,
 }
 
@@ -38,7 +38,7 @@ impl Format {
                 }
                 _ => {
                     "a file that ends in .safetensors, .npz, .txt (equations), .tex or .md (LaTeX), \
-                     or --format to say what it is"
+                     or --format with its format"
                 }
             };
             ImportError::at(&path.display().to_string(), Place::Whole, found, expected)

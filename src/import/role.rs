@@ -1,5 +1,5 @@
 //! Parts of a model that a tensor can be.
-#![allow(missing_docs, reason = "the names say it")]
+#![allow(missing_docs, reason = "the names are self-explanatory")]
 
 use super::*;
 
@@ -27,7 +27,7 @@ impl Part {
     }
 }
 
-/// What a tensor is used as; written `encoder.weight`, `xi.contact` and so on.
+/// The use of a tensor; written `encoder.weight`, `xi.contact` and so on.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Role {
     /// `W_e` or `W_d`, or the weights of one of several layers by its number.
@@ -45,7 +45,7 @@ pub(crate) enum Role {
     StateScaling,
     /// `s_u`, one factor per input coordinate.
     InputScaling,
-    /// Mean of the training's states, SI units, taken off before they were scaled.
+    /// Mean of the training's states, SI units, subtracted before they were scaled.
     StateMean,
     /// Standard deviations by which the training divided states: `1 / s_x`.
     StateStd,
@@ -106,10 +106,10 @@ impl FromStr for Role {
 }
 
 const SEPARATORS: [char; 3] = ['.', '_', '/'];
-/// Words of the names of what an optimiser keeps beside the tensors that it changes.
+/// Words in the names of tensors that an optimiser stores in addition to the parameters.
 const OF_OPTIMISERS: &str = "adam optimizer momentum momentums rmsprop adagrad";
 
-/// What follows the first word of a name, whatever its case, and a separator.
+/// The rest of a name after its first word, in any case, and a separator.
 fn after<'t>(head: &str, text: &'t str) -> Option<&'t str> {
     let (first, tail) = text.split_at_checked(head.len())?;
     let tail = tail.strip_prefix(SEPARATORS)?;

@@ -1,5 +1,5 @@
-//! The way from a foreign file to a checked model, and the record of what was decided on it.
-#![allow(missing_docs, reason = "the names say it")]
+//! From a foreign file to a checked model, with the record of all decisions.
+#![allow(missing_docs, reason = "the names are self-explanatory")]
 
 use std::fs::File;
 
@@ -19,7 +19,7 @@ pub struct Imported {
 /// Imports a model trained elsewhere.
 ///
 /// # Errors
-/// [`ImportError`] with the place, what was found and what was expected.
+/// [`ImportError`] with the place, the text found and the expected text.
 pub(crate) fn import(path: &Path, options: &ImportOptions) -> Read<Imported> {
     let (file, bytes) = read_file(path, MAX_FILE_BYTES).map_err(|fault| {
         let foreign = magic::arrays_by_neighbours(path);
@@ -42,7 +42,7 @@ pub(super) fn read_file(path: &Path, max: u64) -> Read<(String, Vec<u8>)> {
 /// Imports a model from a file in memory; `file` names it in errors.
 ///
 /// # Errors
-/// As `import`. Never panics, whatever the bytes are.
+/// As `import`. Never panics, for any bytes.
 pub fn import_from_bytes(
     file: &str,
     format: Format,
@@ -232,7 +232,7 @@ pub struct ImportReport {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct UsedTensor {
-    /// What it is used as, such as `encoder.weight`.
+    /// Its use, such as `encoder.weight`.
     pub role: String,
     pub tensor: String,
     pub shape: Vec<usize>,
@@ -241,7 +241,7 @@ pub(crate) struct UsedTensor {
     pub layout: Layout,
 }
 
-/// Who decided what a tensor is.
+/// Origin of the use of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Chosen {

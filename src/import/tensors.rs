@@ -1,7 +1,7 @@
 //! Named arrays of numbers, in a foreign file or in memory. Headers are read first, and later no more bytes than they
-//! announce: a small file cannot fill the memory. In an npz (zip) file, an array is `\x93NUMPY`, two bytes of the
-//! version (1 to 3), the length of the rest (2 or 4 bytes, little endian), and a Python dictionary: `{'descr': '<f8',
-//! 'fortran_order': False, 'shape': (18, 4), }`.
+//! announce: a small file cannot fill the memory. In an npz (zip) file, an array begins with `\x93NUMPY`, two bytes of
+//! the version (1 to 3) and the length of the rest (2 or 4 bytes, little endian). A Python dictionary follows:
+//! `{'descr': '<f8', 'fortran_order': False, 'shape': (18, 4), }`.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -25,7 +25,7 @@ pub struct Tensor<'t> {
     pub name: String,
     /// Dimensions.
     pub shape: Vec<usize>,
-    /// As many numbers as the dimensions say.
+    /// As many numbers as the product of the dimensions.
     pub values: &'t [f64],
     /// The first index runs fastest (Fortran), not the last (C).
     pub is_column_major: bool,
@@ -304,7 +304,7 @@ fn numbers(file: &str, bytes: &[u8], info: &TensorInfo, length: usize) -> Read<C
     }
 }
 
-/// The description in an array's header, without name and member; else what was found and expected.
+/// The description in an array's header, without name and member; otherwise the text found and the expected text.
 fn read_header(reader: &mut impl io::Read) -> Result<TensorInfo, (String, &'static str)> {
     let io = |error: io::Error| (error.to_string(), "a readable .npy array");
     let mut fixed = [0; 8];

@@ -1,5 +1,8 @@
 //! Training, simulation, control, planning and evaluation of reduced-order models; `romc` re-exports every module.
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 use romc_cas as symbolic;
 use romc_codegen::{ir, lower};

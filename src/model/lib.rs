@@ -2,7 +2,10 @@
 //! them.
 //!
 //! `romc` re-exports every module; depend on that.
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 use romc_cas as symbolic;
 use romc_robot as robot;

@@ -202,7 +202,7 @@ fn commands(content: &Content<'_>) -> Option<String> {
     };
     let recovery = (!recoveries.is_empty()).then(|| {
         let (own, off) = (mean(0), mean(1));
-        format!(" After a push of 0.1 m/s the body stays off by {own} on average, and by {off} with feedback off.")
+        format!(" After a push of 0.1 m/s the body stays off by {own} on average, and by {off} with no feedback.")
     });
     let recovery = recovery.unwrap_or_default();
     (steps > 0).then(|| {

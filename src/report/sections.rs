@@ -77,7 +77,7 @@ pub(super) fn tiles(content: &Content<'_>) -> Vec<(String, String)> {
         over,
         &restarted,
         "torque R² in contact that the controller finds itself: worst recording; no dynamics",
-        "deviation after a push, mm: worst recording; feedback off",
+        "deviation after a push, mm: worst recording; no feedback",
         "size alone: latent coordinates, active terms, combined loss of accuracy and size L_mod",
         "encoder and decoder alone, whatever the dynamics: torque R² of the plain lift, contact",
     ];

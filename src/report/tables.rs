@@ -2,6 +2,8 @@
 
 use super::introduction::headline;
 use super::*;
+use crate::evaluate::PhaseInvariance;
+
 use crate::plan;
 
 pub(crate) type NamedRun = (PathBuf, Run);
@@ -27,7 +29,8 @@ fn coordinates(assessment: &Assessment<'_>) -> Table {
 }
 
 pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>) -> Table {
-    let every = format!("restarted every {} s", assessment.restart_every_s);
+    let every = format!("error over {} s", assessment.restart_every_s);
+    let every_r2 = format!("R^2 over {} s", assessment.restart_every_s);
     let mut table = coordinates(assessment);
     let first = assessment.runs.first();
     let modelled = first.and_then(|run| modelled(model, run).ok());
@@ -36,8 +39,8 @@ pub(crate) fn coordinate_table(model: &ReducedModel, assessment: &Assessment<'_>
         _ => r2(*fit),
     };
     for (title, coefficient, sums) in [
-        ("full rms", "full R^2", &assessment.full),
-        (&every, "restarted R^2", &assessment.restarted),
+        ("error, whole motion", "R^2, whole motion", &assessment.full),
+        (&every, &every_r2, &assessment.restarted),
     ] {
         let fits = sums.fits();
         table.column(title, "", fits.iter().copied().map(rms));
@@ -71,18 +74,31 @@ pub(crate) fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
 }
 
 pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
-    let every = format!("restarted every {} s", assessment.restart_every_s);
+    let every = format!("{} s", assessment.restart_every_s);
     let rows = ["body.x", "body.z"].map(|name| ["whole motion", &every].map(|kind| (name, kind)));
     let rows = rows.concat().into_iter();
     let rows = rows.map(|(name, kind)| format!("{name}, {kind}"));
     let mut table = Table::default();
-    table.column("rms error", "m", rows);
+    table.column("root mean square error", "m", rows);
     let sums = [&assessment.full, &assessment.restarted];
     let mut column = |name: &str, [full, restarted]: [[Option<f64>; 2]; 2]| {
         let cells = [full[0], restarted[0], full[1], restarted[1]];
         table.column(name, "", cells);
     };
     column("model", sums.map(|sums| body_rms(assessment, sums)));
+    let constant = [
+        ("constant velocity", &assessment.constant_velocity),
+        (
+            "constant latent velocity",
+            &assessment.constant_latent_velocity,
+        ),
+    ];
+    for (name, [full, restarted]) in constant {
+        column(
+            name,
+            [full, restarted].map(|sums| body_rms(assessment, sums)),
+        );
+    }
     for baseline in &assessment.baselines {
         let sums = [&baseline.full, &baseline.restarted];
         column(baseline.name, sums.map(template_rms));
@@ -187,24 +203,43 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
         .table()
 }
 
+const ROUNDED: f64 = 1e-9; // below, a difference is the rounding of zero
+
+/// Gravity, mass and symmetries of the equations, which nothing gave them.
 pub(crate) fn invariance_table(invariance: &Invariance) -> Table {
-    let shown = |value: Option<f64>| value.map_or("-".to_owned(), significant);
-    let words = format!(
-        "What the model says of physics that is known: gravity in flight {} m/s^2, mass {} kg, rotation {} rad/s^2 per N m; decoded joints \
-         move by up to {} rad for a body 1 m further on; by phase, change of the body's acceleration per metre of \
-         shift along x and y, and difference between mirror images",
-        shown(invariance.gravity_m_s2),
-        shown(invariance.mass_kg),
-        shown(invariance.rotation_rad_s2_per_nm),
-        significant(invariance.joint_shift_rad_m)
-    );
-    Table::of(&invariance.phases)
-        .column("phase", "", |phase| &phase.phase)
-        .column("shift in x", "1/s^2", |phase| phase.shift_x)
-        .column("shift in y", "1/s^2", |phase| phase.shift_y)
-        .column("mirror", "m/s^2", |phase| phase.mirror_asymmetry)
+    let phases = invariance.phases.iter();
+    let worst = |of: fn(&PhaseInvariance) -> f64| {
+        let worst = phases.clone().map(of).fold(0.0, f64::max);
+        Some(if worst < ROUNDED { 0.0 } else { worst })
+    };
+    let rotation = invariance.rotation_rad_s2_per_nm;
+    let joints = Some(invariance.joint_shift_rad_m);
+    let rows = [
+        ("gravity in flight", "m/s^2", invariance.gravity_m_s2),
+        ("mass", "kg", invariance.mass_kg),
+        ("pitch acceleration per moment", "rad/s^2 per N m", rotation),
+        ("joints moved by a body 1 m further on", "rad", joints),
+        (
+            "acceleration changed by a shift in x",
+            "1/s^2",
+            worst(|phase| phase.shift_x),
+        ),
+        (
+            "acceleration changed by a shift in y",
+            "1/s^2",
+            worst(|phase| phase.shift_y),
+        ),
+        (
+            "difference between mirror images",
+            "m/s^2",
+            worst(|phase| phase.mirror_asymmetry),
+        ),
+    ];
+    Table::of(rows)
+        .column("known physics", "", |row| format!("{}, {}", row.0, row.1))
+        .column("value", "", |row| row.2.map(significant))
         .table()
-        .captioned(words)
+        .captioned("Known physics that the equations reproduce")
 }
 
 type Driven<'a> = (
@@ -222,12 +257,14 @@ pub(crate) fn control_table(runs: &[NamedRun]) -> Table {
     Table::of(rows)
         .column("recording", "", |(path, _)| file_name(path))
         .column("controller", "", |(_, row)| row.0)
-        .column("x one stage ahead", "mm", stage(|e| 1e3 * e.body_x_m))
-        .column("z one stage ahead", "mm", stage(|e| 1e3 * e.body_z_m))
-        .column("joints one stage ahead", "rad", stage(|e| e.joints_rad))
-        .column("own input: torque R^2 contact", "", |row| row.1.2.contact)
-        .column("torque R^2 flight", "", |(_, row)| row.2.flight)
-        .column("off after a push", "mm", |(_, row)| row.3.map(|m| 1e3 * m))
+        .column("x, one step ahead", "mm", stage(|e| 1e3 * e.body_x_m))
+        .column("z, one step ahead", "mm", stage(|e| 1e3 * e.body_z_m))
+        .column("joints, one step ahead", "rad", stage(|e| e.joints_rad))
+        .column("torque R^2, contact", "", |row| row.1.2.contact)
+        .column("torque R^2, flight", "", |(_, row)| row.2.flight)
+        .column("error after a push", "mm", |(_, row)| {
+            row.3.map(|m| 1e3 * m)
+        })
         .table()
 }
 
@@ -245,7 +282,7 @@ fn driven(metrics: &ControlMetrics) -> [Driven<'_>; 5] {
         ("model", own, metrics.torque_r2, metrics.recovery_rms_m),
         ("no dynamics", blinds, blind.torque_r2, blind.recovery_rms_m),
         ("constant velocity", constant, none, None),
-        ("feedback off", None, none, off),
+        ("no feedback", None, none, off),
         ("replay", None, none, replay),
     ]
 }
@@ -323,8 +360,9 @@ pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
         .column("lift R^2 flight", "", |(_, run)| run.lift_r2.flight)
         .column("limit violations", "", |(_, run)| run.limit_violations)
         .column("friction violations", "", |row| row.1.friction_violations)
-        .column("step, median", "us", |(_, run)| whole(run.step_us.p50))
-        .column("step, p99", "us", |(_, run)| whole(run.step_us.p99))
+        .column("step, median, p99", "us", |(_, run)| {
+            [run.step_us.p50, run.step_us.p99].map(whole).join(", ")
+        })
         .table()
 }
 
@@ -401,7 +439,7 @@ fn rollouts_json(model: &ReducedModel, of: &Assessment<'_>, sums: &CoordinateSum
     })
 }
 
-/// A plan under the names of `docs/planning.md`.
+/// A plan under the names of `docs/reference/plan-settings.md`.
 pub fn plan_json(planned: &Plan) -> Value {
     let durations = (planned.parts.iter()).map(|part| (part.name.clone(), json!(part.duration_s)));
     json!({

@@ -8,7 +8,7 @@ use super::joints::{
 };
 use super::leg::{LEAST_HEIGHT, LEAST_SPAN, LegShape, Posture, write_force_map};
 
-/// A leg: axes and links at its zero posture in the body's axes, and what follows from them.
+/// A leg: axes and links at its zero posture in the body's axes, and quantities derived from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LegGeometry {
     /// Unit vectors of the joints' axes, from the trunk to the foot; the last two are parallel.
@@ -49,8 +49,8 @@ fn is_usual(axes: &[[f64; 3]; 3], [hip, thigh, calf]: &[[f64; 3]; 3]) -> bool {
 }
 
 impl LegGeometry {
-    /// A leg of axes and links. Lengths are those across the second joint's axis; of a leg of the usual shape, whose
-    /// calf may have the foot a little before or behind its end, they are along thigh and calf.
+    /// A leg of axes and links. Lengths are those across the second joint's axis. In a leg of the usual shape the foot
+    /// may be a little before or behind the end of the calf; its lengths are along thigh and calf.
     pub fn new(axes: [[f64; 3]; 3], links: [[f64; 3]; 3]) -> Self {
         let [first, normal, third] = axes.map(Vector3::from);
         let [hip, thigh, calf] = links.map(Vector3::from);
@@ -123,7 +123,7 @@ impl LegGeometry {
     }
 
     /// Span of thigh and calf over the product of their lengths, and height of the foot over the length of the
-    /// stretched leg, as absolute values: what [`LEAST_SPAN`] and [`LEAST_HEIGHT`] are compared with.
+    /// stretched leg, both as absolute values. Their lower bounds are [`LEAST_SPAN`] and [`LEAST_HEIGHT`].
     pub fn spans(&self, q: &[f64; 3]) -> [f64; 2] {
         let (posture, [thigh, calf]) = (self.posture(q), self.lengths_m);
         let [area, lever] = [posture.area(), posture.lever()].map(f64::abs);
@@ -193,8 +193,8 @@ impl Robot {
         &self.legs[leg.index()]
     }
 
-    /// How a joint's angle on the left, mirrored, reads on the right: 1 where both turn alike in a mirrored motion (the
-    /// usual flexions), -1 where they turn against each other (abductions about the same axis).
+    /// Sign of a joint's angle on the right in a mirrored motion: 1 if both sides turn with the same sign (the usual
+    /// flexions), -1 if with opposite signs (abductions about the same axis).
     pub fn mirror_sign(&self, joint: usize) -> f64 {
         let of_pair = |leg: Leg| self.geometry(leg).axes[joint % LEG_JOINT_DIM];
         let (left, right) = match joint / LEG_JOINT_DIM < 2 {

@@ -1,10 +1,11 @@
-//! From a measured sample to the generalised input `u = [tau; F; M]`, the one definition. A model states which rule its
-//! inputs were made by; training, simulation, control and generated code all follow it.
+//! From a measured sample to the generalised input `u = [tau; F; M]`, the only definition. A model states the rule that
+//! produced its inputs; training, simulation, control and generated code all follow it.
 //!
-//! `tau` are the torques at the links: a motor torque `t` less the joint's losses, `t - b dq - c tanh(dq / v) - I ddq`
-//! ([`Actuators`]): viscous friction, dry friction (smooth around standstill, `v` = [`DRY_SPEED_RAD_S`]) and the
-//! rotor's inertia seen through the gear (armature); in [`WrenchFrame::Ground`] also less the torques that carry and
-//! move the links of a leg whose foot is on the ground ([`MovingLeg`]). `F` and `M` follow through the feet in contact.
+//! `tau` are the torques at the links. They are the motor torques `t` minus the joint's losses,
+//! `t - b dq - c tanh(dq / v) - I ddq` ([`Actuators`]): viscous friction, dry friction (smooth around standstill, `v` =
+//! [`DRY_SPEED_RAD_S`]) and the rotor's inertia seen through the gear (armature). In [`WrenchFrame::Ground`] the
+//! torques that carry and move the links of a leg whose foot is on the ground ([`MovingLeg`]) are also subtracted. `F`
+//! and `M` follow through the feet in contact.
 
 use nalgebra::{Matrix3, SMatrix, Vector6};
 
@@ -16,19 +17,19 @@ use super::joints::{
 use super::leg::{Real, turn_to_world, write_world_axes};
 use super::links::{LegMoments, MovingLeg, TrunkMotion};
 
-/// Axes of the force and moment in an input, and what the ground does.
+/// Axes of the force and moment in an input, and the treatment of feet on the ground.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum WrenchFrame {
     /// As published: axes parallel to the body's, the arm of each moment is the foot in its own hip frame.
     #[default]
     Body,
     /// The generalised forces of the body's recorded coordinates: the force in world axes, and the moments about the
-    /// body's origin that do work on the rates of roll, pitch and yaw. Their sum `F . v + M . (d roll, d pitch, d yaw)`
-    /// is the power of the feet on the body, which is what `W_e^T u_lat` stands for.
+    /// body's origin that do work on the rates of roll, pitch and yaw. `F . v + M . (d roll, d pitch, d yaw)` is the
+    /// power of the feet on the body, as the input map `W_e^T u_lat` requires.
     World,
-    /// As `World`, and feet only push: one in contact whose torques would need a downward force adds nothing, as at the
-    /// end of a stance. Torques of a leg on the ground are those that reach it, without those that carry and move its links.
-    /// In the air rotors and links are what the input accelerates, so that their inertia is no loss.
+    /// As `World`, and feet only push. A foot in contact whose torques would need a downward force adds nothing, as at
+    /// the end of a stance. For a leg on the ground, the torques that carry and move its links are subtracted. In the
+    /// air the input accelerates rotors and links, so their inertia is no loss.
     Ground,
 }
 
@@ -88,7 +89,7 @@ impl InputRule {
         self.robot
     }
 
-    /// What the joints take; none if torques count as they are.
+    /// Friction and rotor inertia of the joints; none if measured torques are used unchanged.
     pub fn actuators(&self) -> Option<&Actuators> {
         self.actuators.as_ref()
     }
@@ -112,8 +113,8 @@ impl InputRule {
         is_grounded || self.frame != WrenchFrame::Ground
     }
 
-    /// The part of the motors' torques that does not enter the input, N m: [`joint_loss`] of every joint, and
-    /// [`Self::leg_torques`], at a state `x`, `dx` and `ddx` (rad, m, s); zero without actuators.
+    /// The part of the motors' torques that does not enter the input, N m: [`joint_loss`] of every joint plus
+    /// [`Self::leg_torques`], at a state `x`, `dx` and `ddx` (rad, m, s). Zero without actuators.
     pub fn losses(
         &self,
         [x, dx, ddx]: [&[f64; STATE_DIM]; 3],
@@ -136,8 +137,8 @@ impl InputRule {
         losses
     }
 
-    /// Torques that carry and move the links of the legs on the ground, N m; zero for the others, and where they are not
-    /// subtracted.
+    /// Torques that carry and move the links of the legs on the ground, N m. Zero for legs in the air, and under rules
+    /// that do not subtract them.
     pub fn leg_torques(
         &self,
         [x, dx, ddx]: [&[f64; STATE_DIM]; 3],
@@ -196,8 +197,8 @@ impl InputRule {
         self.wrench(x, net, pushing)
     }
 
-    /// Force and moment on the body `[F; M]`, in N and N m, of the torques at the links `net` (N m) at a state `x`
-    /// (joint angles and attitude count), by the feet in contact, linear in `net`; damped as in
+    /// Force and moment on the body `[F; M]`, in N and N m, by the feet in contact, of the torques at the links `net`
+    /// (N m). Of the state `x` only joint angles and attitude are used. Linear in `net`; damped as in
     /// [`Robot::damped_force_map`].
     pub fn wrench(
         &self,

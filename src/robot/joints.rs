@@ -1,5 +1,5 @@
-//! Names and order of joints, legs and body coordinates, the same everywhere: legs front right, front left, rear right,
-//! rear left; in each hip abduction, hip flexion, knee; then the body's position and its roll, pitch and yaw.
+//! Names and order of joints, legs and body coordinates, used everywhere. Legs: front right, front left, rear right,
+//! rear left. Joints of a leg: hip abduction, hip flexion, knee. Then the body's position and its roll, pitch and yaw.
 
 use std::fmt;
 

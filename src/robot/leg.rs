@@ -1,10 +1,10 @@
 //! One leg of three joints with any axes, of which the last two are parallel.
 //!
 //! The frame of the leg's plane is (forward, normal, up): the normal is the axis of the second joint, and the first
-//! joint turns the frame as a whole. In it thigh and calf are `(forward, up)`, turned by the second angle and by the sum
-//! of the last two; with `(l_f, l_u)` their sum, `(c_f, c_u)` the calf's share and the first joint's axis times the foot
-//! `(m_f, m_n, m_u)`, the Jacobian has the columns `m`, `(l_u, 0, -l_f)` and `(c_u, 0, -c_f)`. Of `J^T F = -tau`
-//! (equation 4) follows
+//! joint turns the frame as a whole. In it thigh and calf are `(forward, up)`, turned by the second angle and by the
+//! sum of the last two. Let `(l_f, l_u)` be their sum, `(c_f, c_u)` the calf's share, and `(m_f, m_n, m_u)` the first
+//! joint's axis times the foot. Then the Jacobian has the columns `m`, `(l_u, 0, -l_f)` and `(c_u, 0, -c_f)`, and
+//! `J^T F = -tau` (equation 4) gives
 //!
 //! ```text
 //! F_f = (l_f tau_2 - c_f tau_1) / area     area  = l_u c_f - l_f c_u
@@ -12,8 +12,8 @@
 //! F_n = (tau_0 + m_f F_f + m_u F_u) / lever
 //! ```
 //!
-//! in which, near a singularity, `1 / d` of both divisors becomes `d / max(d^2, least^2)`: equal outside, continuous,
-//! and at most `1 / least`. `romc-translate` makes the legs of the controller in C of this file.
+//! Near a singularity `1 / d` of both divisors is replaced by `d / max(d^2, least^2)`: equal outside, continuous, and
+//! at most `1 / least`. `romc-translate` generates the legs of the controller in C from this file.
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -28,7 +28,7 @@ pub(crate) const SINGULAR_BOUND: Real = 1e-3;
 pub const LEAST_SPAN: f64 = 0.3;
 
 /// Smallest height of the foot above or below its hip in the plane of the leg, over the length of the stretched leg, at
-/// which torques are turned into forces without damping.
+/// which torques are converted to forces without damping.
 pub const LEAST_HEIGHT: f64 = 0.12;
 
 /// Error of pitch beyond which legs turn no further, rad.
@@ -90,8 +90,8 @@ where
         }
     }
 
-    /// Turns a leg whose foot is along the normal where it should be; of sines and cosines the third is that of the
-    /// calf's angle, the sum of the second and third joint's.
+    /// Updates a leg from its joint angles, where the foot's offset along the normal is already set. The third sine and
+    /// cosine are those of the calf's angle, the sum of the second and third joint's.
     pub fn turn(&mut self, leg: &LegShape, sine: &[T; 3], cosine: &[T; 3]) {
         for k in 0..3 {
             for i in 0..3 {
@@ -215,8 +215,9 @@ fn minus_inverse_transpose(j: &[[Real; 3]; 3], out: &mut [[Real; 3]; 3]) -> bool
     true
 }
 
-/// Writes `-J^-T` of a leg, which takes its torques (N m) to its force on the body (N), and where its foot is from the
-/// first joint, m. With levers that are never shorter than the least; or exact, then false where the leg is stretched.
+/// Writes `-J^-T` of a leg, which maps its torques (N m) to its force on the body (N), and the position of the foot
+/// relative to the first joint, m. Levers are never shorter than the least; in the exact variant the result is false if
+/// the leg is stretched.
 pub(crate) fn write_force_map(
     leg: &LegShape,
     q: &[Real],
@@ -250,8 +251,8 @@ pub fn foot_height(leg: &LegShape, hip: &[Real], x: &[Real], q: &[Real]) -> Real
     x[14] - x[16].sin() * (hip[0] + foot[0]) + x[16].cos() * (aside + above)
 }
 
-/// Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false
-/// if the torques are not finite or the leg has no force map. The angles must be finite.
+/// Adds force and moment on the body of a leg's torques to a wrench, with the moment about the origin of the
+/// hip's position vector. False if the torques are not finite or the leg has no force map. The angles must be finite.
 pub(crate) fn add_wrench(
     leg: &LegShape,
     hip: &[Real],
@@ -298,9 +299,9 @@ pub(crate) fn write_wrench_map(leg: &LegShape, hip: &[Real], q: &[Real], out: &m
     true
 }
 
-/// Turns the foot of a leg about the body's origin by the opposite of an error `e` of pitch (rad), because nothing holds
-/// the pitch of a body in the air and its feet would land elsewhere than planned. To first order in the joints, `q + J^-1
-/// (R_y(-e) - 1) (h + p(q))` with the hip `h`; a foot that cannot be moved stays.
+/// Turns the foot of a leg about the body's origin by the opposite of an error `e` of pitch (rad). Nothing holds the
+/// pitch of a body in the air, so its feet would otherwise land elsewhere than planned. To first order the joints
+/// become `q + J^-1 (R_y(-e) - 1) (h + p(q))` with the hip `h`. A foot that cannot be moved stays.
 pub(crate) fn turn_leg(leg: &LegShape, hip: &[Real], error: Real, q: &mut [Real]) {
     let mut map: [[Real; 3]; 3] = [[0.0; 3]; 3];
     let mut foot: [Real; 3] = [0.0; 3];
@@ -330,8 +331,8 @@ fn write_moment(hip: &[Real], foot: &[Real], force: &[Real], moment: &mut [Real]
     moment[2] = arm[0] * force[1] - arm[1] * force[0];
 }
 
-/// Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to
-/// the generalised moments of roll, pitch and yaw, which are the angles (rad).
+/// Writes rows of two maps at an attitude of roll, pitch and yaw (rad): the rotation from the body's axes to the
+/// world's, and the map from moments about the body's axes to the generalised moments of roll, pitch and yaw.
 pub(crate) fn write_world_axes(
     attitude: &[Real],
     turned: &mut [[Real; 3]; 3],
@@ -363,8 +364,9 @@ pub(crate) fn write_world_axes(
     }
 }
 
-/// Turns `count` columns of forces and moments in the body's axes into generalised forces of position and of roll, pitch
-/// and yaw, the attitude (rad): `[R F; E^T M]` with the angular velocity `E (d roll, d pitch, d yaw)` in the body's axes.
+/// Turns `count` columns of forces and moments in the body's axes into generalised forces of position and of the
+/// attitude, roll, pitch and yaw (rad). The result is `[R F; E^T M]`, where `E (d roll, d pitch, d yaw)` is the angular
+/// velocity in the body's axes.
 pub(crate) fn turn_to_world(attitude: &[Real], count: usize, wrench: &mut [Real]) {
     let mut turned: [[Real; 3]; 3] = [[0.0; 3]; 3];
     let mut rates: [[Real; 3]; 3] = [[0.0; 3]; 3];

@@ -1,9 +1,9 @@
 //! Joints, legs, geometry and limits of quadrupeds.
 //!
-//! Joint angles, torques and contact flags enter; foot positions, leg Jacobians, the force and moment of the legs on
-//! the body (equations 4 to 8, 22 and 23) and limits of commands leave. Read `joints` for names and order first, then
-//! `leg` for one leg, `wrench` for all four and [`InputRule`] for the inputs of a model; `romc_model::robot_file`
-//! reads robots from files; generated controllers hold these sources.
+//! In: joint angles, torques and contact flags. Out: foot positions, leg Jacobians, the force and moment of the legs on
+//! the body (equations 4 to 8, 22 and 23) and limits of commands. Read `joints` for names and order first, then `leg`
+//! for one leg, `wrench` for all four and [`InputRule`] for the inputs of a model. `romc_model::robot_file` reads
+//! robots from files; generated controllers contain these sources.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};

@@ -9,7 +9,7 @@ use super::leg::Real;
 /// First and second moments of the moving parts of one leg, the same for every leg.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LegMoments {
-    /// Mass times distance beside the axis of abduction, kg m.
+    /// Mass times lateral distance from the axis of abduction, kg m.
     pub side_kg_m: f64,
     /// Mass times distance from the hip along the thigh; the calf's mass counts at the knee, kg m.
     pub thigh_kg_m: f64,
@@ -41,7 +41,7 @@ impl LegMoments {
     }
 }
 
-/// What formulas of vectors need of a number: numbers, and values of a program.
+/// Operations that vector formulas require of a scalar: numbers, or values of a program.
 pub trait Scalar:
     Copy + Neg<Output = Self> + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
@@ -118,8 +118,8 @@ pub struct TrunkMotion<T> {
 }
 
 impl<T: Scalar> TrunkMotion<T> {
-    /// Of sines and cosines of roll, pitch and yaw, their rates (rad/s) and accelerations (rad/s^2), and the acceleration
-    /// of the trunk's origin in world axes with the gravity added upwards (m/s^2).
+    /// From sines and cosines of roll, pitch and yaw, their rates (rad/s) and accelerations (rad/s^2), and the
+    /// acceleration of the trunk's origin. The last is in world axes, with gravity added upwards (m/s^2).
     pub fn of(
         [[s_r, s_p, s_y], [c_r, c_p, c_y]]: [[T; 3]; 2],
         [roll, pitch, yaw]: [T; 3],
@@ -174,9 +174,10 @@ impl<'a> MovingLeg<'a> {
         }
     }
 
-    /// Torques of abduction, flexion and knee (N m) that carry and move the links of a leg without a foot on the ground,
-    /// at sines and cosines of the first angle, of the second and of the calf's, with joint velocities (rad/s) and
-    /// accelerations (rad/s^2). A mass at `s` from a joint that accelerates by `a` needs the moment `s x (a + s'')`.
+    /// Torques of abduction, flexion and knee (N m) that carry and move the links of a leg without a foot on the
+    /// ground. Arguments are sines and cosines of the first angle, of the second and of the calf's, with joint
+    /// velocities (rad/s) and accelerations (rad/s^2). A mass at `s` from a joint that accelerates by `a` needs the
+    /// moment `s x (a + s'')`.
     pub fn torques<T: Scalar>(
         &self,
         trunk: &TrunkMotion<T>,

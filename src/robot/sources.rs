@@ -6,7 +6,7 @@ macro_rules! sources {
     };
 }
 
-/// File name and text; `lib.rs` declares this module last, and what stands from there on is not for generated crates.
+/// File name and text. `lib.rs` declares this module last; generated crates omit the text from that line on.
 pub const SOURCES: &[(&str, &str)] = sources! {
     error geometry input_rule joints leg lib links wrench
 };

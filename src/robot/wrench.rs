@@ -15,8 +15,8 @@ use super::joints::{BODY_DIM, ContactFlags, JOINT_DIM, Leg};
 use super::leg::{SINGULAR_BOUND, add_wrench, turn_leg, write_wrench_map};
 
 impl Robot {
-    /// The matrix `-J^-T` that takes a leg's torques (N m: abduction, flexion, knee) to its force on the body (N, equation
-    /// 4), at joint angles `q` in rad.
+    /// The matrix `-J^-T` that maps a leg's torques (N m: abduction, flexion, knee) to its force on the body (N,
+    /// equation 4), at joint angles `q` in rad.
     ///
     /// # Errors
     /// [`RobotError::SingularLeg`] at full extension (see `SINGULAR_BOUND`), [`RobotError::NotFinite`].
@@ -27,17 +27,18 @@ impl Robot {
     }
 
     /// As [`Robot::foot_force_map`], for any posture. Near a singularity (a stretched knee, or a foot at the height of
-    /// its hip, where the abduction has no lever) small torques would mean any force; levers there stay above
-    /// [`LEAST_SPAN`](super::leg::LEAST_SPAN) thigh calf over the distance of the foot and
-    /// [`LEAST_HEIGHT`](super::leg::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm. Elsewhere it is exact.
+    /// its hip, where the abduction has no lever) small torques would cause arbitrarily large forces. Levers are
+    /// therefore limited from below by [`LEAST_SPAN`](super::leg::LEAST_SPAN) thigh calf over the distance of the foot
+    /// and by [`LEAST_HEIGHT`](super::leg::LEAST_HEIGHT) (thigh + calf), on a Go1 some 3 and 5 cm. Elsewhere the map is
+    /// exact.
     pub fn damped_force_map(&self, leg: Leg, q: &[f64; 3]) -> Result<Matrix3<f64>, RobotError> {
         self.require_finite(leg, "joint angle", q)?;
         let map = self.geometry(leg).force_map(q, false);
         map.ok_or_else(|| self.singular(leg, q))
     }
 
-    /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5 to 7, 22): sums of `F_k` and of `x_k x F_k`
-    /// over the feet in contact, in axes parallel to the body's, with the arms of a frame.
+    /// Force and moment on the body `[F_lin; F_ang]`, in N and N m (equations 5 to 7, 22). They are sums of `F_k` and
+    /// of `x_k x F_k` over the feet in contact, in axes parallel to the body's, with the arms of a frame.
     pub(super) fn wrench_by_arms(
         &self,
         frame: WrenchFrame,
@@ -149,7 +150,7 @@ impl fmt::Display for FeetRule {
 }
 
 impl FeetRule {
-    /// The rule of a phase that holds whatever the feet do: all patterns.
+    /// The rule of a phase that holds for any feet: all patterns.
     pub fn always() -> Self {
         FeetRule::Patterns(Self::all_patterns().collect())
     }

@@ -33,7 +33,7 @@ impl std::iter::Sum for BeforeAfter {
 pub(crate) enum ChangeKind {
     Dropped,
     Constant,
-    /// A straight line took its place: multiples of variables, perhaps with a constant.
+    /// Replaced by a straight line: multiples of variables, perhaps with a constant.
     Linear,
     Rounded,
 }
@@ -55,7 +55,7 @@ pub(crate) struct Change {
     pub digits: Option<usize>,
     #[serde(flatten)]
     pub own: Effect,
-    /// Coefficients that took over.
+    /// Coefficients that changed in compensation.
     #[serde(rename = "others")]
     pub effects: Vec<Effect>,
     /// Contains `ddz` before this change minus `ddz` after it at every point of the domain.
@@ -113,15 +113,16 @@ pub(crate) struct PhaseCertificate {
     pub equations: Vec<EquationCertificate>,
 }
 
-/// How far a simplified model can differ from its original, and why: at every point `(z, dz, u_lat)` of a phase's
-/// domain at which the model is defined, `ddz_i - ddz_i,simplified` lies in `EquationCertificate::bound`, in real
-/// numbers. Floating-point rounding, about 1e-16 of the largest summand, comes on top for both models.
+/// Bound of the difference between a simplified model and its original, with the reasons. At every point
+/// `(z, dz, u_lat)` of a phase's domain at which the model is defined, `ddz_i - ddz_i,simplified` lies in
+/// `EquationCertificate::bound`, in real numbers. Floating-point rounding, about 1e-16 of the largest summand, is
+/// additional for both models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
     pub(crate) tolerance: Tolerance,
-    /// What exact simplification did before: equal as real functions, without any error.
+    /// The preceding steps of exact simplification: equal as real functions, without any error.
     pub(crate) exact: Vec<ExactStep>,
-    /// One entry a phase; differences are those to the exactly simplified equations.
+    /// One entry per phase; differences are those to the exactly simplified equations.
     pub(crate) phases: Vec<PhaseCertificate>,
 }
 

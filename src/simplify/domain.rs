@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::*;
 use crate::lower::LowerError;
 
-/// How far a domain reaches beyond the samples unless given, as a share of each variable's range.
+/// Default extension of a domain beyond the samples, as a share of each variable's range.
 pub const MARGIN: f64 = 0.1;
 
 #[derive(Debug, thiserror::Error)]
@@ -24,11 +24,11 @@ pub enum SimplifyError {
     )]
     NoSamples,
     #[error(
-        "a margin widens the box around recordings; the ranges of a .toml file are taken as they are"
+        "a margin widens the box around recordings; the ranges of a .toml file are used unchanged"
     )]
     Margin,
     #[error(
-        "internal error: in phase `{phase}`, ddz{output} of the simplified model is off by {measured:e} at a recorded sample, beyond the bound {bound:e}", output = output + 1
+        "internal error: in phase `{phase}`, ddz{output} of the simplified model has an error of {measured:e} at a recorded sample, beyond the bound {bound:e}", output = output + 1
     )]
     Contradiction {
         phase: String,

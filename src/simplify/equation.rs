@@ -76,7 +76,7 @@ impl Ranges<'_> {
         all
     }
 
-    /// The replacement with a constant that puts the middle of the error at zero, where that is worth it.
+    /// The replacement with a constant that centres the error at zero, if the reduction justifies it.
     fn centred(
         &self,
         kind: ChangeKind,
@@ -212,7 +212,7 @@ impl Equation {
         }
     }
 
-    /// Rounds coefficients: what costs least goes first, one digit after another, as long as all together fit.
+    /// Rounds coefficients: the cheapest digits go first, one after another, as long as all together fit.
     fn round(&mut self, terms: &mut Ranges<'_>, allowed: f64) {
         let mut chosen: Vec<Option<Change>> = vec![None; self.xi.len()];
         // sums of floats select candidates; accepted changes are checked with intervals
@@ -277,7 +277,7 @@ impl Equation {
         let mut effects = Vec::new();
         for &(part, factor) in &rewrite.parts {
             let (old, new) = (self.xi[part], self.xi[part] + before * factor);
-            // what the sum of floats is off by
+            // rounding error of the sum of floats
             let exact = Interval::point(before) * Interval::point(factor);
             let rounding = exact - (Interval::point(new) - Interval::point(old));
             bound = bound + rounding * terms.term(part);

@@ -113,7 +113,7 @@ pub(crate) struct RolloutErrors {
     pub outside: [Option<f64>; 2],
 }
 
-/// Rollouts of a model and of its simplification beside the recordings.
+/// Rollouts of a model and of its simplification, compared with the recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RolloutEffect {
     pub names: Vec<String>,

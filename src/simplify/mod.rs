@@ -1,9 +1,12 @@
-//! Simplification with a certificate: fewer terms and digits, and bounds of the error of `ddz`. A model, a [`Domain`]
-//! (a box of latent states and inputs per phase, from recordings or given) and a [`Tolerance`] enter; a simpler model
-//! leaves with a [`Certificate`] that lists every change with the interval in which its error lies over the whole box,
-//! and with its error at the recorded samples. `docs/simplification.md` has the mathematics. Read `run.rs` first, then
+//! Simplification with a certificate: fewer terms and digits, and bounds of the error of `ddz`. In: a model, a
+//! [`Domain`] (a box of latent states and inputs per phase, from recordings or given) and a [`Tolerance`]. Out: a
+//! simpler model with a [`Certificate`]. It lists every change with the interval of its error over the whole box, and
+//! with its error at the recorded samples. `docs/explanation/simplification.md` has the mathematics. Read `run.rs` first, then
 //! `equation.rs` (the changes made to one equation) and `ranges.rs` (the intervals).
-#![allow(missing_docs, reason = "names say it all where there is no comment")]
+#![allow(
+    missing_docs,
+    reason = "names are self-explanatory where there is no comment"
+)]
 
 mod certificate;
 #[cfg(test)]

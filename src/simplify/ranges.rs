@@ -121,7 +121,7 @@ pub(super) struct Ranges<'a> {
     pub pool: ExprPool,
     domain: Vec<(SymbolId, Interval)>,
     known: Vec<Option<Interval>>,
-    /// What may take each term's place, once it was asked for.
+    /// Possible replacements of each term, computed on request.
     pub rewrites: Vec<Option<Vec<Rewrite>>>,
 }
 

@@ -9,18 +9,18 @@ use crate::ir::{Program, Statement};
 use crate::lower::Form;
 use crate::robot::{BODY_Z, GRAVITY_M_S2};
 
-/// What the search may use is lowered to this share of itself until the final evaluation confirms the tolerance.
+/// Factor by which the budget of the search is reduced until the final evaluation confirms the tolerance.
 const RETREAT: f64 = 0.8;
 const MAX_RETREATS: usize = 40;
 /// Relative error of evaluating a sample in floating point, with room to spare.
 const EVALUATION: f64 = 1e-9;
 
-/// A simplified model and what is known about it.
+/// A simplified model with its certificate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simplified {
     /// The model, equal to its original if nothing was changed. Provenance: tolerance, digest of the original, bounds.
     pub model: ReducedModel,
-    /// What was changed and how far that can make `ddz` differ.
+    /// The changes, and bounds of the resulting differences in `ddz`.
     pub certificate: Certificate,
 }
 
@@ -185,8 +185,9 @@ impl<'a> PhaseProblem<'a> {
         self.xi.column(output).iter().copied().collect()
     }
 
-    /// Simplifies an equation, and encloses its difference from the original anew. Should that exceed what is allowed,
-    /// although the changes' own bounds do not, the search gets less, and in the end the equation stays as it is.
+    /// Simplifies an equation, and encloses its difference from the original again. If that exceeds the allowed
+    /// difference, although the changes' own bounds do not, the budget of the search is reduced. In the end the
+    /// equation stays unchanged.
     fn search(&self, terms: &mut Ranges<'_>, output: usize, allowed: f64) -> (Equation, Interval) {
         let mut budget = allowed;
         for _ in 0..MAX_RETREATS {

@@ -123,7 +123,7 @@ pub fn certificate_page(models: [&ReducedModel; 2], certificate: &Certificate) -
     markdown(models, certificate, None, &[])
 }
 
-/// The certificate and its effect on rollouts, with what printing rounds, as a page of Markdown.
+/// The certificate and its effect on rollouts, with the effect of rounding when printed, as a page of Markdown.
 pub(crate) fn markdown(
     models: [&ReducedModel; 2],
     certificate: &Certificate,

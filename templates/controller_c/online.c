@@ -56,7 +56,7 @@
 
 #define ONLINE_LIFT_ITERATIONS 60
 
-/* How many steps are not too long between two measurements, whatever the bound says. */
+/* A gap of up to this many steps between two measurements is always accepted. */
 #define ONLINE_LONGEST_STEPS 1.5
 
 /* Time over which velocities are compared with positions, s. */
@@ -65,8 +65,8 @@
 /* Error of pitch beyond which legs turn no further, rad. */
 #define ONLINE_MOST_TURN_RAD (real)0.3
 
-/* The first measurement must be within this share of the distances from the reference. Every later one must be within it of a
- * prediction: the last good measurement moved by its velocity, or by the mean of both velocities. */
+/* The first measurement must be within this share of the distances from the reference. Every later one must be within
+ * it of a prediction: the last good measurement moved by its velocity, or by the mean of both velocities. */
 #define ONLINE_NEAR (real)0.5
 
 /* Phase of feet that select none. */
@@ -78,8 +78,9 @@
 /* How long measurements are refused before they are a fault, s. */
 #define ONLINE_PATIENCE_S 0.019
 
-/* How far ahead of the middle of the time that it is held for a posture is commanded, in stages. A joint PD that holds the
- * posture of the end of a stage is ahead of the motion and adds to the thrust; that of the middle takes from it. */
+/* Lead of the commanded posture, in stages, relative to the middle of the time for which it is held. A joint PD that
+ * holds the posture of the end of a stage leads the motion and adds to the thrust; with that of the middle it reduces
+ * the thrust. */
 #define ONLINE_POSTURE_LEAD 0.4
 
 /* Weight of the one from before the motion, in first steps. */
@@ -92,15 +93,15 @@
  * from full extension. */
 #define ONLINE_SINGULAR_BOUND (real)1e-3
 
-/* Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all multipliers near one and
- * needs two iterations more if it has to bring them to 100. */
+/* Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all multipliers near one. It
+ * needs two iterations more to increase them to 100. */
 #define ONLINE_SLACK_PRICE (real)10.0
 
 /* Angle over which the height of a foot is differentiated, rad. */
 #define ONLINE_SMALL_TURN (real)1e-3
 
-/* Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the rows that were
- * left out may hide. */
+/* Violation of a joint limit, in half ranges, above which a plan counts as softened. It is larger than the violation
+ * that omitted rows may hide. */
 #define ONLINE_SOFTENED_FROM (real)(1.05 * 0.02)
 
 /* Distance from the reference, in its standard deviations, within which joint limits matter. */
@@ -124,8 +125,8 @@
 /* Share of a stage from which on a command counts as held for all of it. */
 #define ONLINE_WHOLE_STAGE 0.75
 
-/* What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
- * docs/control.md, "The supervisor", says what each is compared with. */
+/* Bounds of measurements, and the damping that follows a violation; infinite bounds and counts of zero disable a
+ * check. docs/explanation/supervisor.md, "The supervisor", defines the quantity that each bound limits. */
 typedef struct {
     real tilt_rad;
     real joint_margin_rad;
@@ -145,7 +146,7 @@ typedef struct {
 /* Whether the feet are where the reference has them. */
 typedef enum { ONLINE_AS_SCHEDULED, ONLINE_EARLY, ONLINE_LATE, ONLINE_UNKNOWN } online_contact;
 
-/* What the controller does while it has no plan to trust. */
+/* Behaviour of the controller without a trusted plan. */
 typedef struct {
     /* How many stages of the last good plan may be used after a failure. */
     int plan_stages;
@@ -155,7 +156,7 @@ typedef struct {
     real damping_nm_s;
     /* Deviation from the prediction, in standard deviations of the reference, that is not believed at first. */
     real jump_deviations;
-    /* How many steps in a row a measurement is disbelieved before it is taken for true. */
+    /* Number of consecutive steps in which a measurement is refused as a jump before it is accepted. */
     int jump_patience;
 } online_fallback_settings;
 
@@ -305,8 +306,8 @@ static MAYBE_UNUSED void online_add_correction(const real *gain, const real *cov
     }
 }
 
-/* Turns a leg whose foot is along the normal where it should be; of sines and cosines the third is that of the
- * calf's angle, the sum of the second and third joint's. */
+/* Updates a leg from its joint angles, where the foot's offset along the normal is already set. The third sine and
+ * cosine are those of the calf's angle, the sum of the second and third joint's. */
 static MAYBE_UNUSED void online_posture_turn(online_posture *restrict self, const online_leg_shape *leg,
         const real *sine, const real *cosine)
 {
@@ -433,8 +434,9 @@ static MAYBE_UNUSED void online_posture_write_damped(online_posture *self, const
     }
 }
 
-/* Writes -J^-T of a leg, which takes its torques (N m) to its force on the body (N), and where its foot is from the
- * first joint, m. With levers that are never shorter than the least; or exact, then false where the leg is stretched. */
+/* Writes -J^-T of a leg, which maps its torques (N m) to its force on the body (N), and the position of the foot
+ * relative to the first joint, m. Levers are never shorter than the least; in the exact variant the result is false if
+ * the leg is stretched. */
 static MAYBE_UNUSED bool online_write_force_map(const online_leg_shape *leg, const real *q, bool is_exact,
         real map[restrict 3][3], real foot[restrict 3])
 {
@@ -464,8 +466,8 @@ static MAYBE_UNUSED void online_write_moment(const real *hip, const real *foot, 
     moment[2] = arm[0] * force[1] - arm[1] * force[0];
 }
 
-/* Adds force and moment on the body of a leg's torques to a wrench, with the moment about what its hip is from; false
- * if the torques are not finite or the leg has no force map. The angles must be finite. */
+/* Adds force and moment on the body of a leg's torques to a wrench, with the moment about the origin of the
+ * hip's position vector. False if the torques are not finite or the leg has no force map. The angles must be finite. */
 static MAYBE_UNUSED bool online_add_wrench(const online_leg_shape *leg, const real *hip, const real *q,
         const real *torque, real *restrict wrench)
 {
@@ -514,7 +516,7 @@ static MAYBE_UNUSED void online_change_rows(const real *hessian, const real *dev
     }
 }
 
-/* The torque within a limit that is nearest to this one; zero for what is not a number. */
+/* The nearest torque within a limit; zero for NaN. */
 static MAYBE_UNUSED real online_clamped_torque(real torque, real limit)
 {
     return torque >= -limit ? (torque > limit ? limit : torque) : torque < 0 ? -limit : 0;
@@ -622,7 +624,7 @@ static MAYBE_UNUSED real online_smaller(real value, real other)
     return value < other ? value : other;
 }
 
-/* Legs in the air keep the torques of the reference, or none at the links where those are not known, within the limits. */
+/* Legs in the air get the torques of the reference, or zero at the links if it has none, clamped to the limits. */
 static MAYBE_UNUSED void online_keep_swing(bool *is_down, bool is_known, const real *limit_nm, const real *losses_nm,
         real *restrict mean, real *restrict deviation)
 {
@@ -645,7 +647,7 @@ static MAYBE_UNUSED real online_joint_loss(const real *of, real dq, real ddq)
     return of[0] * dq + of[1] * TANH(dq / ONLINE_DRY_SPEED_RAD_S) + of[2] * ddq;
 }
 
-/* Loss of a joint over a time, N m, at the mean of its velocities at both ends with their difference as acceleration; at
+/* Loss of a joint, N m, over a time between two velocities: at their mean, with their difference as acceleration. At
  * most the limit. */
 static MAYBE_UNUSED real online_planned_loss(const real *of, real before, real after, real step_s, real limit)
 {
@@ -654,11 +656,11 @@ static MAYBE_UNUSED real online_planned_loss(const real *of, real before, real a
     return online_clamped_torque(online_joint_loss(of, dq, ddq), limit);
 }
 
-/* Returns the limit by which unit rows are divided; for cones the friction coefficient; 0 if the settings do not ask for
- * the kind. */
+/* Returns the limit by which unit rows are divided, for cones the friction coefficient. Zero if the settings do not
+ * request this kind. */
 static MAYBE_UNUSED real online_row_size(online_row_kind kind, const online_settings *settings)
 {
-    /* The consistent lift keeps the torque limits by itself. */
+    /* The consistent lift enforces the torque limits by itself. */
     if (kind == ONLINE_TORQUE_LIMIT && settings->lift != (int)ONLINE_CONSISTENT) {
         return 1;
     }
@@ -722,8 +724,8 @@ static MAYBE_UNUSED int online_stages_between(double from_s, double to_s, double
     return is_within ? (int)whole : 0;
 }
 
-/* Makes a defect that of a reference which is itself a trajectory: none about it, else less what nominal, the model's
- * step from the reference, leaves of its end. */
+/* Computes the defect for a reference that is itself a trajectory. It is zero when linearised about the reference.
+ * Otherwise the defect of nominal, the model's step from the reference, is subtracted. */
 static MAYBE_UNUSED void online_trust_reference(bool is_about_plan, const real *nominal, const real *end, int d,
         real *restrict defect)
 {
@@ -748,9 +750,9 @@ static MAYBE_UNUSED void online_turn_force(const real *rotation, const real *x, 
     }
 }
 
-/* Turns the foot of a leg about the body's origin by the opposite of an error e of pitch (rad), because nothing holds
- * the pitch of a body in the air and its feet would land elsewhere than planned. To first order in the joints, q + J^-1
- * (R_y(-e) - 1) (h + p(q)) with the hip h; a foot that cannot be moved stays. */
+/* Turns the foot of a leg about the body's origin by the opposite of an error e of pitch (rad). Nothing holds the
+ * pitch of a body in the air, so its feet would otherwise land elsewhere than planned. To first order the joints
+ * become q + J^-1 (R_y(-e) - 1) (h + p(q)) with the hip h. A foot that cannot be moved stays. */
 static MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, const real *hip, real error, real *restrict q)
 {
     real map[3][3] = {{0}};
@@ -773,8 +775,8 @@ static MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, const real
     }
 }
 
-/* Writes rows of the rotation from the body's axes to the world's, and of the map from moments about the body's axes to
- * the generalised moments of roll, pitch and yaw, which are the angles (rad). */
+/* Writes rows of two maps at an attitude of roll, pitch and yaw (rad): the rotation from the body's axes to the
+ * world's, and the map from moments about the body's axes to the generalised moments of roll, pitch and yaw. */
 static MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turned[restrict 3][3],
         real rates[restrict 3][3])
 {
@@ -804,8 +806,9 @@ static MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turn
     }
 }
 
-/* Turns count columns of forces and moments in the body's axes into generalised forces of position and of roll, pitch
- * and yaw, the attitude (rad): [R F; E^T M] with the angular velocity E (d roll, d pitch, d yaw) in the body's axes. */
+/* Turns count columns of forces and moments in the body's axes into generalised forces of position and of the
+ * attitude, roll, pitch and yaw (rad). The result is [R F; E^T M], where E (d roll, d pitch, d yaw) is the angular
+ * velocity in the body's axes. */
 static MAYBE_UNUSED void online_turn_to_world(const real *attitude, int count, real *restrict wrench)
 {
     real turned[3][3] = {{0}};
@@ -848,7 +851,7 @@ static MAYBE_UNUSED real online_violation(const real *q, const real *lower, cons
     return largest;
 }
 
-/* Writes what is between two states of the robot, or what else changes along a straight line. */
+/* Interpolates linearly between two states of the robot, or between other quantities. */
 static MAYBE_UNUSED void online_write_between(const real *earlier, const real *later, real share, int count,
         real *restrict state)
 {
@@ -857,8 +860,8 @@ static MAYBE_UNUSED void online_write_between(const real *earlier, const real *l
     }
 }
 
-/* What a step next with derivatives (A B) at (x, u) leaves of the dynamics at a reference (state, input) that
- * goes to end: next + A (state - x) + B (input - u) - end. */
+/* Residual of the dynamics at a reference (state, input) that goes to end, by a step next with derivatives (A
+ * B) at (x, u): next + A (state - x) + B (input - u) - end. */
 static MAYBE_UNUSED void online_write_defect(const real *next, const real *by, const real *x, const real *u,
         const real *state, const real *input, const real *end, int d, real *restrict defect)
 {
@@ -965,8 +968,9 @@ static MAYBE_UNUSED void online_write_pyramid(const real *force, const real *roo
     }
 }
 
-/* Scale of (z, dz) for a trajectory that stands still: the change of each latent alone that moves some joint by
- * STILL_SHARE of half its range, and that change within STILL_TIME_S; decoder has d columns. */
+/* Scale of (z, dz) for a trajectory that stands still. For a position it is the change of this latent alone that
+ * moves some joint by STILL_SHARE of half its range. For a velocity it is that change within STILL_TIME_S;
+ * decoder has d columns. */
 static MAYBE_UNUSED void online_write_still(const real *decoder, const real *lower, const real *upper, int d,
         real *restrict still)
 {
@@ -981,8 +985,8 @@ static MAYBE_UNUSED void online_write_still(const real *decoder, const real *low
     }
 }
 
-/* Writes the torques with which a leg, at a state of the robot, presses on the ground with a vertical force, N m: the
- * force times minus the gradient of the foot's height. */
+/* Writes the torques, N m, with which a leg at a state of the robot presses on the ground with a vertical force. They
+ * are the force times minus the gradient of the foot's height. */
 static MAYBE_UNUSED void online_write_support(const online_leg_shape *leg, const real *hip, const real *x,
         const real *q, real force, real *restrict torque)
 {
@@ -1053,8 +1057,8 @@ static MAYBE_UNUSED bool online_write_wrench_map(const online_leg_shape *leg, co
     return true;
 }
 
-/* Writes F(x, u) and (A B), row by row, for a stage of step_s. The memory has room for two states, two matrices
- * of the size of (A B) and the entries of a Jacobian. */
+/* Writes F(x, u) and (A B), row by row, for a stage of step_s. The memory holds two states, two matrices of
+ * the size of (A B) and the entries of a Jacobian. */
 static MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynamics *restrict self, int phase, const real *x,
         const real *u, int d, real step_s, real *restrict next, real *restrict by, real *restrict memory)
 {
@@ -1133,7 +1137,8 @@ static MAYBE_UNUSED void online_latent_dynamics_write_gain(online_latent_dynamic
     }
 }
 
-/* Takes the joint velocities of a measurement, if no number of it is undefined or absurd; whether none is. */
+/* Stores the joint velocities of a measurement if all its numbers are finite and plausible; returns whether they
+ * are. */
 static MAYBE_UNUSED bool online_memory_accepts(online_memory *restrict self, double time_s, const real *x,
         const real *dx)
 {
@@ -1156,7 +1161,8 @@ static MAYBE_UNUSED double online_memory_since_command(online_memory *self, doub
     return is_known ? passed_s : step_s;
 }
 
-/* Writes what holds the posture, without one the middle of the ranges: fading torques that damp the joints. */
+/* Writes a hold: the last posture, or the middle of the joint ranges if there is none, and fading torques with
+ * damping. */
 static MAYBE_UNUSED void online_memory_hold(online_memory *restrict self, const online_fallback_settings *fallback,
         double time_s, double step_s, const real *limit, const real *lower, const real *upper, real *restrict torque,
         real *restrict joints)
@@ -1172,7 +1178,7 @@ static MAYBE_UNUSED void online_memory_hold(online_memory *restrict self, const 
     }
 }
 
-/* The position within the limits that is nearest to this one; the lower limit for what is not a number. */
+/* The nearest position within the limits; the lower limit for NaN. */
 static MAYBE_UNUSED real online_clamped_joint(real position, real lower, real upper)
 {
     return online_smaller(online_greater(position, lower), upper);
@@ -1260,15 +1266,16 @@ static MAYBE_UNUSED double online_plan_time_posture_s(online_plan_time *self, do
     return now_s + (ONLINE_POSTURE_LEAD * self->step_s + 0.5 * held_s);
 }
 
-/* Whether a time is in a stage or beyond the last. Up to half a stage before the first, as where a clock jitters, it
- * belongs to the first. */
+/* Whether a time is in a stage or beyond the last. Times up to half a stage before the first count as the first,
+ * because clocks jitter. */
 static MAYBE_UNUSED bool online_plan_time_reaches(online_plan_time *self, double time_s)
 {
     return online_plan_time_passed(self, time_s) > -0.5;
 }
 
-/* The stage that a time belongs to, or otherwise for a time that is not in the stages before that one or has no plan:
- * the last stage stands for all that is later, the number of stages means none. */
+/* The stage at a time, among the stages before otherwise; otherwise for a time outside these stages or without
+ * a plan. Pass the last stage to use it for all later times, or the number of stages to detect that there is no
+ * stage. */
 static MAYBE_UNUSED int online_plan_time_stage_at(online_plan_time *self, double time_s, int otherwise)
 {
     /* A time that is a stage's beginning but for rounding belongs to that stage. */
@@ -1416,9 +1423,9 @@ static MAYBE_UNUSED online_share online_share_unknown(void)
     return (online_share){.estimate = 1, .weight = 0, .weighted = 0, .unit = 0};
 }
 
-/* Updates the estimate from a measurement at passed stages into the plan, up to 1.1. states are those at the
- * beginning and end of the first stage, input is its input; at_command and drives are the latent inputs that
- * the drives had at the command and have now. */
+/* Updates the estimate from a measurement at passed stages into the plan, up to 1.1. states are the states at
+ * the beginning and end of the first stage, input is its input. at_command and drives are the latent inputs
+ * of the joint PD at the command and now. */
 static MAYBE_UNUSED void online_share_update(online_share *restrict self, double passed, real step_s,
         real time_constant_s, const real *by_input, const real *input, const real *states, const real *measured,
         const real *deviation, const real *at_command, const real *drives, int d)
@@ -1453,7 +1460,7 @@ static MAYBE_UNUSED void online_share_update(online_share *restrict self, double
     const real weight = kept * self->weight + own;
     const real weighted = kept * self->weighted + own * self->estimate * (1 + agreement / size);
     const real mean = (ONLINE_PRIOR_WEIGHT + weighted) / (ONLINE_PRIOR_WEIGHT + weight);
-    /* The quotient of a large and a tiny number may be infinite: such a step says nothing. */
+    /* The quotient of a large and a tiny number may be infinite: such a step is ignored. */
     if (solver_is_finite_number(mean)) {
         self->unit = unit;
         self->weight = weight;
@@ -1463,7 +1470,7 @@ static MAYBE_UNUSED void online_share_update(online_share *restrict self, double
 }
 
 /* Writes torques that fade from the last ones into the damping of joint velocities, and a posture that fades into
- * the measured one; the share that is left of the joint PD. passed_s is the time since the last command. */
+ * the measured one. Returns the remaining share of the joint PD. passed_s is the time since the last command. */
 static MAYBE_UNUSED real online_supervisor_fade(online_supervisor *restrict self, const online_bounds *bounds,
         real damping, double passed_s, const real *joints, const real *velocity, const real *limit,
         const real *lower, const real *upper, const real *last_torque, const real *last_posture,
@@ -1502,7 +1509,7 @@ static MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self)
     }
 }
 
-/* Adds up steps without a good plan, passed_s after the last one; what is wrong. */
+/* Adds up the time of steps without a good plan, passed_s after the last one; returns the fault. */
 static MAYBE_UNUSED online_fault online_supervisor_judge(online_supervisor *restrict self,
         const online_bounds *bounds, bool is_poor, double passed_s)
 {
@@ -1523,7 +1530,7 @@ static MAYBE_UNUSED void online_supervisor_reset(online_supervisor *self)
     self->faded_s = 0.0;
 }
 
-/* Takes the height of a foot that the reference has on the ground, m. */
+/* Raises the floor to the height, m, of a foot that the reference has on the ground. */
 static MAYBE_UNUSED void online_supervisor_take_floor(online_supervisor *self, bool is_first, real height)
 {
     self->floor_m = is_first ? height : online_greater(height, self->floor_m);
@@ -1687,8 +1694,8 @@ static MAYBE_UNUSED bool online_supervisor_is_unexplained(online_supervisor *res
     return largest / ONLINE_MEMORY_S > bounds->velocity_mismatch;
 }
 
-/* Whether contacts cannot be for too long: a foot on the ground is above the floor, or a body that no foot holds does
- * not fall. */
+/* Whether contacts have been impossible for too long: a foot on the ground is above the floor, or a body without a
+ * foot on the ground does not fall. */
 static MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor *restrict self, const online_bounds *bounds,
         double time_s, real rises, const real *heights, bool *is_down)
 {
@@ -1737,8 +1744,9 @@ static MAYBE_UNUSED bool online_supervisor_opposes(online_supervisor *restrict s
     return is_opposed && bounds->contact_mismatch_steps > 0 && time_s - self->opposed_s > ONLINE_OPPOSED_S;
 }
 
-/* Takes a finite measurement of state and velocity, 18 each, with the reference's state, the heights of the feet, m, those
- * on the ground and those that a walk has there (otherwise the measured ones); what is wrong. */
+/* Checks a finite measurement of state and velocity, 18 each, and returns the fault. nominal is the reference's
+ * state, heights those of the feet (m), is_down the feet on the ground. walks_on are the feet that a walk
+ * has on the ground, for other references the measured ones. */
 static MAYBE_UNUSED online_fault online_supervisor_watch(online_supervisor *restrict self,
         const online_bounds *bounds, double time_s, const real *x, const real *dx, const real *nominal,
         const real *heights, bool *is_down, bool *walks_on, const real *lower, const real *upper, const real *speed)
@@ -1886,8 +1894,9 @@ static MAYBE_UNUSED void online_trajectory_mean_input(online_trajectory *self, d
     }
 }
 
-/* Moves an input of the stage from a time on to the part of it for which a command is held, as the trajectory's own
- * input moves. Does nothing for commands that are held for whole stages. */
+/* Shifts the input of a stage to the time for which a command is held. The shift is the difference of the
+ * trajectory's own mean inputs over that time and over the stage. Does nothing for commands that are held for
+ * whole stages. */
 static MAYBE_UNUSED void online_trajectory_move_input(online_trajectory *self, double stage_s, double step_s,
         double now_s, double held_s, real *restrict input)
 {
@@ -2061,8 +2070,8 @@ static MAYBE_UNUSED void online_trajectory_write_deviations(online_trajectory *s
     }
 }
 
-/* Takes other scales for latent coordinates along x, y and yaw, if they are given: place has for each coordinate how
- * far it moves with each of the three (3 d), SI. */
+/* Replaces the scales of latent coordinates along x, y and yaw by the given ones that are positive. place
+ * contains for each coordinate the displacement with each of the three (3 d), SI. */
 static MAYBE_UNUSED void online_trajectory_write_place_scales(online_trajectory *self, const real *place,
         real place_m, real heading_rad, real *restrict deviation)
 {

@@ -41,12 +41,12 @@ typedef struct {
     int phase;
 } online_plan_time;
 
-/* What is wrong. Each has a status. */
+/* A kind of fault. Each has a status. */
 typedef enum { ONLINE_NONE, ONLINE_TILT, ONLINE_JOINT_BEYOND, ONLINE_JOINT_SPEED, ONLINE_BODY_FAR, ONLINE_JOINTS_FAR, ONLINE_BODY_LEAP, ONLINE_JOINTS_LEAP, ONLINE_NOT_AT_START, ONLINE_CLOCK_STANDS, ONLINE_CLOCK_BACK, ONLINE_CLOCK_LEAPS, ONLINE_FROZEN, ONLINE_VELOCITY_MISMATCH, ONLINE_CONTACT_MISMATCH, ONLINE_POOR_STEPS } online_fault;
 
-/* What the supervisor remembers. */
+/* State of the supervisor between measurements. */
 typedef struct {
-    /* What is wrong, until a reset. */
+    /* The present fault; it stays until a reset. */
     online_fault fault;
     /* Time in which torques have faded so far, s. */
     double faded_s;

@@ -69,7 +69,7 @@ typedef struct {
 } solver_links;
 
 /* Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, and columns 8 to
- * 11 of the rows from the eighth on; what stands right of the diagonal is not read. */
+ * 11 of the rows from the eighth on. Entries right of the diagonal are not read. */
 typedef struct {
     real blocks[SOLVER_WIDE / 4][NU][4];
 } solver_lower;
@@ -112,8 +112,8 @@ typedef struct {
     int soft;
     /* Rows that link the input to that of the stage before; their coefficients are in Links. */
     int link;
-    /* How many pairs of opposite rows on the input come first, the two sides of a limit: row, -row. Each takes the
-     * products and squares of one row. */
+    /* Number of leading pairs of opposite rows on the input, the two sides of a limit: row, -row. The products and
+     * squares of each pair are computed once. */
     int pairs;
 } solver_shape;
 
@@ -311,7 +311,7 @@ static inline void solver_add_wide(real factor, const real *row, real out[restri
 static inline void solver_add_products_nx_nx(real left[NX][NX], real x[NX][NX], real v[NX][SOLVER_WIDE],
         real out_x[restrict NX][NX], real out_v[restrict NX][SOLVER_WIDE])
 {
-    /* Two rows at a time: what is read of x and v serves both. */
+    /* Two rows at a time: each load of x and v serves both. */
     for (int i = 0; i < NX - NX % 2; i += 2) {
         real first_x[NX];
         memcpy(first_x, out_x[i], sizeof first_x);
@@ -344,7 +344,7 @@ static inline void solver_add_products_nx_nx(real left[NX][NX], real x[NX][NX], 
 static inline void solver_add_products_wide_nu(real left[NX][SOLVER_WIDE], real x[NX][NX], real v[NX][SOLVER_WIDE],
         real out_x[restrict NU][NX], real out_v[restrict NU][SOLVER_WIDE])
 {
-    /* Two rows at a time: what is read of x and v serves both. */
+    /* Two rows at a time: each load of x and v serves both. */
     for (int i = 0; i < NU - NU % 2; i += 2) {
         real first_x[NX];
         memcpy(first_x, out_x[i], sizeof first_x);
@@ -388,7 +388,7 @@ static inline bool solver_factorise(real matrix[NU][SOLVER_WIDE], real factor[re
         real pivot = matrix[j][j];
         real scaled[NU] = {0};
         for (int k = 0; k < j; ++k) {
-            /* The inverse of D is what is kept: L_jk D_k is the entry before its division. */
+            /* The inverse of D is stored: L_jk D_k is the entry before its division. */
             scaled[k] = factor[k][j];
             pivot = pivot - factor[j][k] * scaled[k];
         }
@@ -631,9 +631,9 @@ static inline void solver_add_transposed_nx_nx(real matrix[NX][NX], const real *
     }
 }
 
-/* Gradient pass: from p at the stage's end, with the cost's gradient there added already, to p at its
- * beginning, and from the gradient h by the input to the whole one; the constant part of the input is
- * overwritten. */
+/* Gradient pass from the stage's end to its beginning. On input p is the gradient at the end, including the
+ * cost's own, and h the gradient by the input. On output p is the gradient at the beginning and h the whole
+ * gradient by the input. Overwrites the constant part of the input. */
 static inline void solver_stage_pull(solver_stage *restrict self, real p[restrict NX], real h[restrict NU])
 {
     solver_add_transposed_nx_nu(self->b, p, h);
@@ -920,7 +920,7 @@ static inline void solver_rows_write_multipliers(solver_rows *self, int soft, in
     }
 }
 
-/* Takes the point of the gains for the solution: no row is active. */
+/* Uses the point of the gains as the solution: no row is active. */
 static inline void solver_program_take_gains(solver_program *self)
 {
     solver_shape shape = self->shape;
@@ -1158,7 +1158,7 @@ static inline void solver_lower_add_square(solver_lower *restrict self, real w, 
     }
 }
 
-/* Adds sum of w row row^T, and to sum sum of y row, of count rows, of which so many pairs of opposite ones come first. */
+/* Adds sum of w row row^T, and to sum sum of y row, of count rows. The first pairs pairs of them are opposite rows. */
 static inline void solver_lower_add_rows(solver_lower *restrict self, const real *w, const real *y, real (*rows)[NU],
         int pairs, int count, real sum[restrict NU])
 {
@@ -1303,7 +1303,7 @@ static inline void solver_subtract_multiple_nu(real factor, const real *row, rea
     }
 }
 
-/* Takes what a stage's input answers off the gradient by the input before: - K_before^T h. */
+/* Subtracts the response of a stage's input from the gradient by the input before: - K_before^T h. */
 static inline void solver_take_answer(real gain[NU][NU], const real *h, real by_before[restrict NU])
 {
     for (int i = 0; i < NU; ++i) {
@@ -1311,8 +1311,8 @@ static inline void solver_take_answer(real gain[NU][NU], const real *h, real by_
     }
 }
 
-/* Becomes the cost of the input before a stage that was eliminated, with weights and multipliers of its count
- * links, their rows of both stages, and the gradient h by the stage's own input. Writes the gain. */
+/* Becomes the cost of the input before a stage that was eliminated. It uses weights and multipliers of the stage's
+ * count links, their rows of both stages, and the gradient h by the stage's own input. Writes the gain. */
 static inline void solver_before_write(solver_before *restrict self, solver_stage *stage, real gain[restrict NU][NU],
         const real *w, const real *y, real (*own)[NU], real (*earlier)[NU], int count, const real *h)
 {
@@ -1347,8 +1347,8 @@ static inline void solver_before_write(solver_before *restrict self, solver_stag
     solver_take_answer(gain, h, self->linear);
 }
 
-/* Gains with the weights of the rows, and the constant parts of the inputs' changes for a step that does not
- * centre; left is the share of the rows' residuals that is left. */
+/* Gains with the weights of the rows, and the constant parts of the inputs' changes for the predictor. left is
+ * the remaining share of the rows' residuals. */
 static inline bool solver_program_predict(solver_program *self, real left)
 {
     solver_shape shape = self->shape;
@@ -1544,7 +1544,7 @@ static inline void solver_program_pull_all(solver_program *self, real left, real
     }
 }
 
-/* Takes the answer to the input before a stage off its own: - K_before v_before. */
+/* Adds the response to the input before a stage to the stage's own input: - K_before v_before. */
 static inline void solver_answer_before(real gain[NU][NU], const real *before, real v[restrict NU])
 {
     for (int i = 0; i < NU; ++i) {
@@ -1583,8 +1583,8 @@ static inline void solver_rows_change_corrected(solver_rows *self, real left)
     }
 }
 
-/* Changes of slacks and multipliers of a step that does not centre, from the products of the rows in target;
- * into target, how often they go into what is left of each. */
+/* Changes of slacks and multipliers in the predictor, from the products of the rows in target. Writes to
+ * target the reciprocal of the largest step that each row permits. */
 static inline void solver_rows_change(solver_rows *self, real left)
 {
     for (int i = 0; i < self->count; ++i) {
@@ -1655,7 +1655,7 @@ static inline void solver_program_move_by(solver_program *restrict self, real le
     const int horizon = self->stages_len;
     const bool linked = LINKED;
     const real softness = self->links.softness;
-    /* The rows are linear: each step takes its share of all residuals. */
+    /* The rows are linear: each step reduces all residuals by its share. */
     const real rest = 1 - length;
     real sum = 0;
     real largest = 0;
@@ -1712,8 +1712,8 @@ static inline real solver_program_step(solver_program *restrict self, solver_poi
     const real share = solver_boundary_share(complementarity);
     real longest = 0;
     real aim = 0;
-    /* A loop of two turns, so that the passes over the stages are compiled once: the first looks for the step that
-     * does not centre, the second takes the one that does. */
+    /* A loop of two turns, so that the passes over the stages are compiled once. The first turn computes the
+     * predictor, a step without centring; the second computes the corrector. */
     for (int turn = 0; turn < 2; ++turn) {
         const bool is_corrected = turn > 0;
         if (is_corrected) {
@@ -1722,7 +1722,7 @@ static inline real solver_program_step(solver_program *restrict self, solver_poi
         solver_reach reach = solver_program_advance(self, point->kept, is_corrected);
         longest = share / solver_or_larger(reach.times, share);
         if (!is_corrected) {
-            /* What is left of the products, exactly: a change that does not centre cancels their first order. */
+            /* The products that remain, exactly: the predictor cancels their first order. */
             const real rest = 1 - longest;
             const real square = longest * longest;
             solver_point predicted = {.left = rest * point->left, .kept = rest * point->kept,
@@ -1836,7 +1836,7 @@ static inline bool solver_residuals_within(solver_residuals *self, real limit)
 
 /* Solves the program from an initial state, with the gains of Program::prepare for the present stages.
  *
- * is_warm says that inputs and multipliers are a guess at the solution, such as the last one's, shifted by a
+ * is_warm means that inputs and multipliers are a guess at the solution, such as the last solution shifted by a
  * stage. */
 static inline solver_report solver_program_solve(solver_program *restrict self, const real *x0, bool is_warm,
         solver_settings *settings)
@@ -1878,7 +1878,7 @@ static inline solver_report solver_program_solve(solver_program *restrict self, 
             iterations += 1;
             const real length = solver_program_step(self, &point, settings);
             if (length < 0) {
-                /* Where rounding ends the progress the residuals decide what the point is worth. */
+                /* Rounding prevents further progress: the residuals decide whether the point is accepted. */
                 break;
             }
             if ((may_restart && length < (real)SOLVER_SHORT_STEP) || iterations % SOLVER_PATIENCE == 0) {

@@ -48,7 +48,8 @@ static MAYBE_UNUSED real walk_smaller(real value, real other)
     return value < other ? value : other;
 }
 
-/* Velocity, amplitude and share of the stride of one more sample. A velocity changes at most by its range in range_s. */
+/* Velocity, amplitude and share of the stride of one more sample. A velocity changes at most by its range in
+ * range_s. */
 static MAYBE_UNUSED void walk_walker_pace(walk_walker *restrict self, const walk_gait *gait, double range_s)
 {
     const real part = (real)(WALK_SPACING_S / range_s);
@@ -109,8 +110,8 @@ static MAYBE_UNUSED real walk_walker_at_node(walk_walker *self, const real *node
     return value;
 }
 
-/* One more sample at the end, in place of the first. Its torques are in torque; Walker::keep_input takes the input
- * that they make. */
+/* One more sample at the end, in place of the first. Its torques are in torque; pass the input that they produce
+ * to Walker::keep_input. */
 static MAYBE_UNUSED void walk_walker_advance(walk_walker *restrict self, const walk_gait *gait, const real *nodes,
         double range_s)
 {
@@ -176,7 +177,7 @@ static MAYBE_UNUSED void walk_walker_clear(walk_walker *restrict self, const wal
     }
 }
 
-/* Takes a command, kept within what can be commanded. */
+/* Sets the commanded velocity, clamped to the allowed range. */
 static MAYBE_UNUSED void walk_walker_command(walk_walker *restrict self, const walk_gait *gait, const real *velocity)
 {
     self->stops = false;
@@ -186,7 +187,7 @@ static MAYBE_UNUSED void walk_walker_command(walk_walker *restrict self, const w
     }
 }
 
-/* Takes the generalised input (18) of the last sample's stride. */
+/* Stores the generalised input (18) of the last sample's stride. */
 static MAYBE_UNUSED void walk_walker_keep_input(walk_walker *restrict self, const walk_gait *gait, const real *u)
 {
     for (int i = 0; i < 18; ++i) {
@@ -235,7 +236,8 @@ static MAYBE_UNUSED void walk_walker_move_to_path(walk_walker *self, double time
     dx[17] -= at[5];
 }
 
-/* Whether a walk stands at a time: it was to stop, or has no sample any more, where no supervisor saw the clock leap. */
+/* Whether a walk stands at a time: it was stopped, or it has no samples left because the clock leapt without a
+ * supervisor. */
 static MAYBE_UNUSED bool walk_walker_rests(walk_walker *self, double time_s)
 {
     const bool stands = self->stops && self->amplitude <= 0 && time_s >= self->rest_s;

@@ -1,7 +1,7 @@
 /* @generated from src/control/online by `cargo run -p romc-translate`: types of walks.
  * Names that are defined elsewhere: real, the type of numbers; NX and NU, how many states and inputs there are. */
 
-/* The samples of a walk and what the next one follows from. */
+/* The samples of a walk and the state from which the next sample is computed. */
 typedef struct {
     /* Velocity that is commanded, and that of the last sample. */
     real asked[3];
@@ -22,7 +22,8 @@ typedef struct {
     real dx[18 * WALK_WINDOW];
     real u[18 * WALK_WINDOW];
     bool feet[4 * WALK_WINDOW];
-    /* Of each sample the path's place (2) and heading where the walk began, its length along and across (2), its turning. */
+    /* For each sample the path's place (2) and heading in the axes of its beginning, its length along and across
+     * (2), and its turning rate. */
     double path[6 * WALK_WINDOW];
 } walk_walker;
 

@@ -6,6 +6,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser as _};
 
 use super::Arguments;
+use super::args::Command;
 use romc::Error;
 use romc::limits::{Range, table};
 
@@ -93,7 +94,7 @@ const IDLE: [(&str, &str); 34] = [
 ];
 
 /// The same flags where they do something.
-const USED: [&str; 11] = [
+const USED: [&str; 12] = [
     "compile m.json --out-dir o --emit c --precision f32 --units scaled --sincos library",
     "compile m.json --out-dir o --emit latex --digits 3 --rename z1=x --form align --siunitx",
     "compile m.json --out-dir o --emit c --digits 3 --domain r.csv --clock recorded",
@@ -103,6 +104,7 @@ const USED: [&str; 11] = [
     "check a.json b.tex --exact --symbols z1=x",
     "mpc m.json r.csv --torque-rate 100",
     "plan m.json --distance 0.3 --apex 0.1 --output p.csv --start r.csv --clock recorded",
+    "plan m.json --distance 0.3 --apex 0.1 --figures f",
     "import n.npz --output m.json --robot go1 --order body,fl,fr,rl,rr --inputs-from r.csv --clock recorded",
     "robot r.urdf --feet a,b,c,d",
 ];
@@ -224,4 +226,49 @@ fn every_flag_that_takes_a_number_refuses_what_lies_outside_its_range() {
         }
     }
     assert!(met.len() >= 25, "{met:?}");
+}
+
+/// What a training depends on, given these flags of `romc train`.
+fn training(flags: &str) -> String {
+    let line = format!("train r.csv --latent-dim 4 --output m.json {flags}");
+    let Command::Train(arguments) = parsed(line.trim_end()).command else {
+        panic!("{line}: another command");
+    };
+    let (settings, robot) = (arguments.settings, romc::robot_file::by_name("go1"));
+    let robot = robot.expect("a known robot");
+    let options = settings.options(4, "m".to_owned(), robot).expect("options");
+    let (method, others) = (settings.method(), settings.conditioning());
+    format!("{options:?} {others:?} {method:?} {}", settings.actuators())
+}
+
+#[test]
+fn defaults_in_the_help_of_train_are_those_of_the_training() {
+    // Of these the option is another than none, with the same effect.
+    const SAME: [&str; 3] = ["body", "degree", "clock"];
+    let command = Arguments::command();
+    let train = command.find_subcommand("train").expect("a command");
+    let mut checked = BTreeSet::new();
+    for argument in train.get_arguments() {
+        let help = argument.get_help().map(ToString::to_string);
+        let (Some(flag), Some(help)) = (argument.get_long(), help) else {
+            continue;
+        };
+        let defaults = help.split_once("[default: ").map(|(_, after)| after);
+        let defaults = defaults.map_or("", |after| after.trim_end_matches(']'));
+        for default in defaults.split("; ").filter(|_| !SAME.contains(&flag)) {
+            let (value, others) = match default.strip_suffix(" with --paper") {
+                Some(value) => (value, "--paper --method joint"),
+                None => (default, "--method closed-form"),
+            };
+            let is_value = !value.contains(' ') && (value != "none" || flag == "actuators");
+            if is_value && !value.is_empty() && flag != "method" {
+                let given = training(&format!("{others} --{flag} {value}"));
+                assert_eq!(given, training(others), "--{flag} {default}");
+                checked.insert((flag, others));
+            }
+        }
+    }
+    assert!(checked.len() >= 38, "{checked:?}");
+    assert_eq!(training(""), training("--method closed-form"));
+    assert_eq!(training("--paper"), training("--paper --method joint"));
 }

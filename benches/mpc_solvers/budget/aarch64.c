@@ -1,5 +1,6 @@
-/* From reset to main on an aarch64 processor without an operating system: memory is cached, as unaligned access needs, and
- * output goes through the debugger's semihosting. What gcc and libm need of a C library, which needs an operating system, is here. */
+/* From reset to main on an aarch64 processor without an operating system: memory is cached, because unaligned access
+ * needs it, and output goes through the debugger's semihosting. Also the functions of a C library that gcc and libm
+ * need, because the library itself needs an operating system. */
 #include <stddef.h>
 #include <stdint.h>
 

@@ -1,7 +1,8 @@
-/* Steps of a generated controller, counted: for each of them a line of how it was called (prepared, lift), its status, its
- * iterations, instructions and bytes of stack. `run.py` compiles it with a controller in which `is_endless` takes the solver's
- * tolerance away, so that an extra first step and every twentieth run into the cap. On an emulated processor whose clock is the count of its
- * instructions the program reads that clock; elsewhere callgrind counts calls of `counted`. */
+/* Counts of the steps of a generated controller. For each step it prints a line with its call (prepared, lift), its
+ * status, its iterations, instructions and bytes of stack. `run.py` compiles it with a controller in which `is_endless`
+ * disables the solver's tolerance, so that an extra first step and every twentieth run into the cap. On an emulated
+ * processor whose clock counts its instructions the program reads that clock; elsewhere callgrind counts calls of
+ * `counted`. */
 #include HEADER
 #include JUMP
 

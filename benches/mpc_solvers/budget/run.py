@@ -78,7 +78,7 @@ def measured(folder, name, real, processor, level):
 
 
 def emitted(romc, work, dimension, precision):
-    """Folder and name of a generated controller whose tolerance can be taken away."""
+    """Folder and name of a generated controller whose tolerance can be disabled."""
     name, folder = f"go1_d{dimension}", work / precision
     run([romc, "compile", ROOT / f"models/go1-d{dimension}.json", "--emit", "controller-c", "--precision", precision,
          "--out-dir", folder], ROOT)

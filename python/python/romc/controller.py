@@ -102,7 +102,7 @@ class Controller:
     """Latent model-predictive control: a reference, then one command per measurement.
 
     `horizon` stages of `step` seconds. `lift` makes torques of the latent input: `transpose` (`u = W_e^T u_lat`) or
-    `consistent` (torques whose own ground forces come closest). Others of the controller's settings (`docs/control.md`)
+    `consistent` (torques whose own ground forces come closest). Others of the controller's settings (`docs/reference/controller-settings.md`)
     are keywords under the names in `settings`: a number, or the word of `lift`, `solver`, `linearisation`, `after_end`.
     `float("inf")` switches a bound off, 0 a count and a limit that is 0 by default; `None` is the default.
 

@@ -189,7 +189,7 @@ Columns = Union[PathLike, Mapping[str, Any]]
 def read(path: PathLike, *, columns: Optional[Columns] = None, clock: str = "repaired") -> Recording:
     """Reads a recording: `.csv`, `.csv.gz`, `.mcap`, or another program's log by a map of its columns.
 
-    - `columns`: the map (`docs/logs.md`), a TOML file, or its tables as a dictionary,
+    - `columns`: the map (`docs/reference/column-maps.md`), a TOML file, or its tables as a dictionary,
       `{"time": {"column": "stamp", "unit": "ms"}, ...}`; with it `path` may be a folder of files.
     - `clock`: as in the commands that compute, times and angular rates that disagree with the motion are mended
       (`repaired`), which a `RomcWarning` says, or kept (`recorded`).

@@ -25,7 +25,7 @@ pub struct CanonicalForms<'p> {
     /// Largest difference between arguments of functions that only rounding of decimals explains.
     pub rounding: f64,
     is_rounded: bool,
-    /// Whether no numbers round to all decimals whose arguments were taken as equal: then equal forms prove nothing.
+    /// Whether no numbers round to all decimals whose arguments were treated as equal: then equal forms prove nothing.
     pub is_contradictory: bool,
     n_fraction_tries: usize,
 }
@@ -98,8 +98,8 @@ impl<'p> CanonicalForms<'p> {
         self.forms[&expr].clone()
     }
 
-    /// The form with all reciprocals of sums, tangents and hyperbolic tangents removed, and magnitudes of sums whose
-    /// signs occur: times a factor that is zero nowhere in the interior of the domain. `None` if it grows too large.
+    /// The form times a factor that is zero nowhere in the interior of the domain. All reciprocals of sums, tangents
+    /// and hyperbolic tangents are removed, and magnitudes of sums whose signs occur. `None` if it grows too large.
     pub fn without_fractions(&mut self, form: &CanonicalForm) -> Option<CanonicalForm> {
         let mut form = form.clone();
         for _ in 0..MAX_REMOVALS {
@@ -281,7 +281,7 @@ impl<'p> CanonicalForms<'p> {
         if let Some(known) = self.equal_fraction(&exact) {
             return known;
         }
-        // The same digits with fewer numbers left for them than another argument took away.
+        // The same digits, but with a smaller range of possible numbers than before.
         self.is_contradictory |= self.known.contains(&exact);
         self.known.insert(exact.clone());
         self.arguments.push(Argument {
@@ -319,7 +319,7 @@ impl<'p> CanonicalForms<'p> {
     fn is_removable(&self, atom: u32) -> bool {
         match &self.atoms[atom as usize] {
             Atom::Sum(_) | Atom::Call(Function::Tan | Function::Tanh, _) => true,
-            // `|x + y| = (x + y) sign(x + y)`; what one atom is has rules of its own.
+            // `|x + y| = (x + y) sign(x + y)`; magnitudes of single atoms have their own rules.
             Atom::Call(Function::Abs, base) => {
                 let sign = Atom::Call(Function::Sign, base.clone());
                 base.as_atom().is_none() && self.numbers.contains_key(&sign)
@@ -337,7 +337,8 @@ pub(super) struct Argument {
 }
 
 impl Argument {
-    /// Takes another form as this one if numbers can be the same, and narrows them; the coefficients' largest distance.
+    /// Accepts another form as equal to this one if their numbers can be the same, and narrows the possible numbers.
+    /// Returns the coefficients' largest distance.
     fn take(&mut self, other: &CanonicalForm) -> Option<f64> {
         let radius = |form: &CanonicalForm, monomial: &Monomial| {
             form.terms.get(monomial).map_or(0.0, |c| c.radius())

@@ -1,7 +1,7 @@
 //! A normal form with exact coefficients, which decides whether two expressions are equal.
 //!
 //! Sines, cosines and exponentials become `exp(P)` with complex rational polynomials `P`, so that products, squares,
-//! sums and multiples of angles need no rules; sums of `c * x^k * exp(P)` with distinct `x^k exp(P)` are zero only if
+//! sums and multiples of angles need no rules. Sums of `c * x^k * exp(P)` with distinct `x^k exp(P)` are zero only if
 //! every `c` is. Roots, logarithms, magnitudes, tangents and reciprocals of sums are atoms with arguments in normal
 //! form; [`CanonicalForms::without_fractions`] removes the last two kinds by multiplying out. A number may carry a
 //! radius, half a unit of the last digit of a printed decimal. Radii add up through all operations; arguments of

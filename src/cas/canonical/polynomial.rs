@@ -8,7 +8,7 @@ pub(super) use num_rational::BigRational as Rational;
 
 const MAX_TERMS: usize = 2_000;
 
-/// A factor that is not taken apart.
+/// A factor that is not decomposed.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Atom {
     Symbol(SymbolId),
@@ -18,7 +18,7 @@ pub(super) enum Atom {
     Root(CanonicalForm, u32),
     /// A function that is no exponential and no root.
     Call(Function, CanonicalForm),
-    /// An expression that is too large to take apart, or has no value.
+    /// An expression that is too large to decompose, or has no value.
     Opaque(ExprId),
 }
 
@@ -129,7 +129,7 @@ impl CanonicalForm {
         self.terms.values().all(Coefficient::is_zero)
     }
 
-    /// Whether zero is among the sums that it may stand for, each coefficient taken by itself.
+    /// Whether zero is among the sums that the form may represent, each coefficient considered separately.
     pub fn may_be_zero(&self) -> bool {
         self.terms.values().all(Coefficient::may_be_zero)
     }

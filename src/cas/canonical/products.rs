@@ -144,7 +144,7 @@ impl CanonicalForms<'_> {
             let reciprocal = (coefficient.reciprocal()?, monomial.reciprocal());
             return self.settled(vec![reciprocal]);
         }
-        // A real factor: the sum of a real form is real, as magnitudes, signs and roots take it to be.
+        // A real factor: the sum of a real form is real, as magnitudes, signs and roots assume.
         let (normed, size, sign) = form.normed()?;
         let normed = self.argument(normed);
         let atom = Monomial::atom(self.number(Atom::Sum(normed)), -1);

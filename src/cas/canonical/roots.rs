@@ -53,7 +53,7 @@ impl CanonicalForms<'_> {
             }
         }
         let sign = coefficient * &inverse;
-        // What is real has real factors: there is no other reading of its root.
+        // A real radicand has real factors: its root has no other interpretation.
         sign.as_real()?;
         match rest.powers[..] {
             [] if sign.is_one() => {}
@@ -177,7 +177,7 @@ impl CanonicalForms<'_> {
         Some(root)
     }
 
-    /// What stands under a root, with its index; anything else with 1.
+    /// The radicand of a root, with the root's index; anything else with 1.
     pub(super) fn radicand(&self, base: CanonicalForm) -> (CanonicalForm, u32) {
         match base.as_atom().map(|atom| &self.atoms[atom as usize]) {
             Some(Atom::Root(radicand, index)) => (radicand.clone(), *index),
@@ -307,7 +307,7 @@ impl CanonicalForms<'_> {
         signs.next()
     }
 
-    /// Whether each factor has a sign that can be told from that of the others.
+    /// Whether the sign of each factor can be determined independently of the others.
     fn have_signs(&self, powers: &[(u32, i32)]) -> bool {
         powers.iter().all(|(atom, _)| {
             let atom = &self.atoms[*atom as usize];
@@ -327,7 +327,7 @@ pub(super) struct Split {
 
 const LARGEST_DIVISOR: u64 = 2_000;
 
-/// A positive number as a product of primes to integer powers. What is left after small divisors counts as a prime.
+/// A positive number as a product of primes to integer powers. The remainder after small divisors counts as a prime.
 fn prime_powers(value: &Rational) -> Vec<(CanonicalForm, i32)> {
     let form = |prime: BigUint| CanonicalForm::constant(Rational::from(BigInt::from(prime)).into());
     let mut powers = Vec::new();

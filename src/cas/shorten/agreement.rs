@@ -1,14 +1,15 @@
-//! Whether a shorter form may replace a sum: it has its values, also far out. There the sum is enclosed over inputs
-//! that reach a few units in the last place around a point. Where this is narrow and code of the sum, in 64 or 32 bits,
-//! would hit it, code of the form has to hit it too, and its derivatives are numbers where those of the sum are
-//! accurate. Sums and products of variables and bounded functions need no test: equal ones have the same degrees.
+//! Whether a shorter form may replace a sum: it must have the same values, also far out. There the sum is enclosed over
+//! inputs that reach a few units in the last place around a point. Where the enclosure is narrow and code of the sum,
+//! in 64 or 32 bits, would evaluate to a value inside it, code of the form must do so as well. Its derivatives must be
+//! finite where those of the sum are accurate. Sums and products of variables and bounded functions need no test: equal
+//! ones have the same degrees.
 
 use std::rc::Rc;
 
 use super::*;
 use crate::interval::power_by;
 
-/// Ranges from which the variables of the points near the origin are taken.
+/// Ranges of the variables for the points near the origin.
 const NEAR: [(f64, f64); 6] = [
     (0.11, 1.03),
     (1.27, 2.9),
@@ -31,7 +32,7 @@ struct Precision {
     round: fn(f64) -> f64,
     /// Relative distance of the inputs that are enclosed around a point.
     inputs: f64,
-    /// Relative error that evaluation far out may have, beside one relative to the summands.
+    /// Relative error that evaluation far out may have, in addition to one relative to the summands.
     evaluation: f64,
     rounding: f64,
     /// Least number with all its digits.

@@ -8,7 +8,7 @@ const MAX_NUMERATOR: f64 = 4096.0;
 const MAX_DENOMINATOR: i32 = 64;
 
 impl Shortener<'_> {
-    /// The shortest form of a sum that is shorter and agrees with what was written first, if there is one.
+    /// The shortest form of a sum that is shorter and agrees with the original summands, if there is one.
     pub(super) fn shortest(&mut self, old: &Summands, original: &Summands) -> Option<Summands> {
         let (unit, scaled) = in_units(old);
         let before = self.length(unit, &scaled);
@@ -154,7 +154,7 @@ impl Shortener<'_> {
         candidates
     }
 
-    /// Forms of what is left of the terms beside the factors that all have: `z*tanh(a)` is found so.
+    /// Forms of the terms divided by their common factors: finds `z*tanh(a)`.
     fn beside_common_factors(&mut self, unit: Number, singles: &Scaled) -> Vec<Scaled> {
         let [(_, first), others @ ..] = &singles[..] else {
             return Vec::new();
@@ -342,7 +342,7 @@ pub(super) fn collected(
             let at = *place.entry(rest).or_insert(result.len());
             let term = number.checked_mul(factor);
             if at == result.len() {
-                // What overflows stays as written.
+                // A term that overflows stays as written.
                 let fallback = (number, if factor.is_one() { rest } else { expr });
                 result.push(term.map_or(fallback, |term| (term, rest)));
                 continue;

@@ -88,8 +88,8 @@ impl Shortener<'_> {
         pairs
     }
 
-    /// A sum of one wave for each angle of the terms, which fixes the units of multiples, and for half the angle of
-    /// `cos(2*x)` beside a term with which it is `1 - cos(2*x)` or `1 + cos(2*x)`.
+    /// A sum of waves that fixes the units of multiples: one for each angle of the terms. Half the angle of `cos(2*x)`
+    /// is added if another term makes it `1 - cos(2*x)` or `1 + cos(2*x)`.
     pub(super) fn all_angles(&mut self, summands: &[(f64, ExprId)]) -> ExprId {
         let mut sines = Vec::new();
         for &(coefficient, expr) in summands {
@@ -152,7 +152,7 @@ impl Shortener<'_> {
         links
     }
 
-    /// What a term with sines, cosines or sums in its denominator can be added to.
+    /// The terms to which a term with sines, cosines or sums in its denominator can be added.
     fn links_of_fraction(&mut self, expr: ExprId) -> Vec<Link> {
         let mut links = Vec::new();
         for base in self.denominators(expr) {

@@ -7,16 +7,16 @@ use crate::cost::Costs;
 
 const MAX_ROUNDS: usize = 4;
 
-/// Summands that a shorter form takes the place of.
+/// Summands that a shorter form replaces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shortened {
     /// Positions of the replaced summands, ascending.
     pub replaced: Vec<usize>,
-    /// What they are together; nothing if they cancel.
+    /// Their sum in shorter form; empty if they cancel.
     pub by: Vec<(f64, ExprId)>,
 }
 
-/// Shortens sums over one pool, and remembers what it found about their terms.
+/// Shortens sums over one pool, and caches results about their terms.
 #[derive(Debug)]
 pub struct Shortener<'a> {
     pub pool: &'a mut ExprPool,
@@ -102,7 +102,7 @@ impl<'a> Shortener<'a> {
             }
         }
         self.pool.work_limit = outer;
-        // What agrees step by step may not in the end: parts were variables of their own.
+        // Agreement of each step does not imply agreement of the result: parts were replaced by variables.
         let new = blocks.into_iter().filter(|block| {
             let replaced = block.positions.iter().map(|&at| summands[at]).collect();
             block.is_new && Agreement::with(self.pool, &replaced).holds(self.pool, &block.summands)
@@ -145,7 +145,7 @@ impl<'a> Shortener<'a> {
                 continue;
             }
             is_changed = true;
-            // The blocks that lost a summand become one, with what they have left.
+            // The blocks that lost a summand become one, with their remaining summands.
             let mut places: Vec<usize> = (new.positions.iter())
                 .map(|&at| moved[flat[at].0])
                 .collect();
@@ -188,7 +188,8 @@ impl<'a> Shortener<'a> {
         }
     }
 
-    /// The summands with variables for sums that are angles, and these sums: finds what is true of an angle as a whole.
+    /// The summands with variables for sums that are angles, and these sums. This finds identities of an angle as a
+    /// whole.
     fn whole_angles(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let exprs: Vec<ExprId> = summands.iter().map(|&(_, expr)| expr).collect();
         let order = self.pool.reachable(&exprs);
@@ -235,8 +236,8 @@ impl<'a> Shortener<'a> {
         Some((whole.collect(), variables))
     }
 
-    /// The summands with a variable of its own in the place of each sum that is a factor, and of each function other
-    /// than waves that is a factor of several terms: `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
+    /// The summands with a variable for each sum that is a factor, and for each function other than waves that is a
+    /// factor of several terms. `(a + b)^2*sin(c)^2` is searched as `f^2*sin(c)^2`.
     fn whole_factors(&mut self, summands: &[(f64, ExprId)]) -> Option<Seen> {
         let mut n_terms: IdMap<usize> = IdMap::default();
         for &(_, expr) in summands {

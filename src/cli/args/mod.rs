@@ -2,20 +2,30 @@
 
 pub(super) mod command;
 pub(super) mod compile;
+mod evaluation;
+mod help;
 mod idle;
 mod import;
+mod plan;
+mod recordings;
+mod study;
 mod train;
 mod value;
 
 pub(crate) use command::*;
 pub(crate) use compile::*;
+pub(crate) use evaluation::*;
 pub(crate) use import::*;
+pub(crate) use plan::*;
+pub(crate) use recordings::*;
+pub(crate) use study::*;
 pub(crate) use train::*;
-pub(crate) use value::ReadingArguments;
 
 use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use help::{OUTPUT, RECORDINGS, help_flag, version_flag};
+use recordings::clock_help;
 use value::{RobotParser, choice, count, finite, overwrite, real, wrench_frame};
 
 use crate::codegen::{Precision, SineCosine, Units};

@@ -1,4 +1,4 @@
-//! Arguments of `romc train` and `romc study`.
+//! Arguments of `romc train`.
 
 use std::str::FromStr;
 
@@ -8,7 +8,6 @@ use super::*;
 use crate::limits::table;
 use crate::recording::preprocess::SavitzkyGolay;
 use crate::recording::{Accelerations, PhaseRule, Recording, SmoothedRows};
-use crate::study::Shard;
 use crate::train::{
     BodyEquations, BodyRows, Coordinates, Integrator, Method, MirrorImages, RecipePart, Split,
 };
@@ -56,19 +55,19 @@ impl From<Finite> for f64 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum PhaseSet {
-    /// contact (any foot down) and flight
+    /// contact (any foot down), flight
     #[value(alias = "contact-flight")]
     #[serde(alias = "contact-flight")]
     Jump,
-    /// contact (a front foot down), rear (only rear feet down) and flight
+    /// contact (a front foot down), rear (only rear feet), flight
     #[value(alias = "contact-rear-flight")]
     #[serde(alias = "contact-rear-flight")]
     JumpRear,
-    /// fr_rl and fl_rr (a diagonal pair, or one foot of it), all (any other contact) and flight
+    /// fr_rl and fl_rr (diagonal pairs), all (other), flight
     Trot,
-    /// fr_up, fl_up, rr_up and rl_up (one foot in the air) and all (any other contact)
+    /// fr_up, fl_up, rr_up, rl_up (one foot up), all (other)
     Crawl,
-    /// As jump
+    /// The same as jump
     Pronk,
 }
 
@@ -107,270 +106,238 @@ impl PhaseSet {
     }
 }
 
+const MODEL: &str = "Model";
+const METHOD: &str = "Learning";
+const JOINT: &str = "Joint method";
+const SIGNALS: &str = "Signals";
+const SCALES: &str = "Scales and mask";
+
+const USAGE: &str = "romc train [OPTIONS] --latent-dim <D> --output <MODEL.json> <RECORDING>...
+       romc train [OPTIONS] --from <MODEL.json> --output <MODEL.json> <RECORDING>...";
+
+const EXAMPLE: &str =
+    "The example takes about 3 seconds. The joint method takes seconds to minutes per seed.
+
+Example:
+  romc train examples/recordings/go1/train_*.csv.gz \\
+      --validation examples/recordings/go1/validation_*.csv.gz \\
+      --latent-dim 4 --output my-model.json";
+
+const SHORT: &str = "This is a selection: `romc train --help` lists all options.\n\n";
+
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  romc train examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz \\\n      --latent-dim 4 --method closed-form --output my-model.json"
-)]
+#[command(override_usage = USAGE)]
+#[command(after_help = format!("{SHORT}{EXAMPLE}"), after_long_help = EXAMPLE)]
+#[command(mut_arg("clock", |clock| clock.help(clock_help("repaired; recorded with --paper"))))]
 pub(crate) struct TrainArguments {
     /// Recordings to learn from
     #[arg(required = true, value_name = "RECORDING")]
     pub recordings: Vec<PathBuf>,
-    /// Recordings that choose between candidate models
-    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    /// Recordings that choose among candidates [default: those of training]
+    #[arg(long, help_heading = RECORDINGS, value_name = "RECORDING", num_args = 1..)]
     pub validation: Vec<PathBuf>,
-    /// Recordings that training does not see; metrics of the finished model on them are reported
-    #[arg(long, value_name = "RECORDING", num_args = 1..)]
+    /// Recordings for final metrics only [default: none]
+    #[arg(long, help_heading = RECORDINGS, value_name = "RECORDING", num_args = 1..)]
     pub test: Vec<PathBuf>,
-    /// Divide the jumps by these shares for training, validation and test, such as 14,3,3
-    #[arg(long, value_name = "SHARES", conflicts_with_all = ["validation", "test"])]
+    /// Shares of training, validation and test that divide the motions, such as 14,3,3 [default: none]
+    #[arg(long, help_heading = RECORDINGS, value_name = "SHARES")]
+    #[arg(conflicts_with_all = ["validation", "test"])]
     pub split: Option<Split>,
-    /// Refine this model on recordings of hardware, or of another robot (--robot): encoder and decoder stay, coefficients
-    /// of its equations change where left-out parts are predicted better
-    #[arg(long, value_name = "MODEL.json")]
-    pub from: Option<PathBuf>,
-    /// The model file to write
-    #[arg(long, value_name = "MODEL.json")]
-    pub output: PathBuf,
-    /// Settings by their names below, as `latent-dim = 4`; flags given here override them
-    #[arg(long, value_name = "FILE.toml")]
-    pub config: Option<PathBuf>,
-    #[command(flatten)]
-    pub settings: TrainSettings,
-    /// Name of the model; the output file's stem unless given
-    #[arg(long)]
-    pub name: Option<String>,
-    /// Replace an existing output file
-    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
-    pub force: Overwrite,
     #[command(flatten)]
     pub reading: ReadingArguments,
+    #[command(flatten)]
+    pub settings: TrainSettings,
+    /// Settings by their names, as `latent-dim = 4`; options on the command line replace them [default: none]
+    #[arg(long, help_heading = METHOD, value_name = "FILE.toml")]
+    pub config: Option<PathBuf>,
+    /// Refine the coefficients of this model on recordings of hardware or of another robot; encoder and decoder stay
+    /// [default: none]
+    #[arg(long, help_heading = METHOD, value_name = "MODEL.json")]
+    pub from: Option<PathBuf>,
+    /// The model file to write
+    #[arg(long, help_heading = OUTPUT, value_name = "MODEL.json")]
+    pub output: PathBuf,
+    /// Name of the model [default: the file name of --output]
+    #[arg(long, help_heading = OUTPUT)]
+    pub name: Option<String>,
+    /// Replace an existing output file
+    #[arg(long, help_heading = OUTPUT, action = ArgAction::SetTrue, value_parser = overwrite())]
+    pub force: Overwrite,
 }
 
-/// Settings of `romc train`; what is not given keeps the default of the method.
+/// Settings of `romc train`; a setting that is not given keeps the default of the method.
 #[derive(Debug, Default, Clone, PartialEq, Args, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub(crate) struct TrainSettings {
-    /// Number of latent coordinates d
-    #[arg(long, value_name = "D", required_unless_present_any = ["config", "from"], value_parser = count(&table::LATENT_DIM))]
+    /// Number of latent coordinates d [required, or in --config]
+    #[arg(long, help_heading = MODEL, value_name = "D", value_parser = count(&table::LATENT_DIM))]
+    #[arg(required_unless_present_any = ["config", "from"])]
+    #[arg(display_order = 0)]
     pub latent_dim: Option<usize>,
-    /// How to learn (closed-form unless given)
-    #[arg(long, value_enum)]
+    /// Method [default: closed-form; joint with --paper or an option under Joint method]
+    #[arg(long, help_heading = METHOD, value_enum)]
     pub method: Option<Method>,
-    /// Robot that made the recordings: go1 (unless given), go2, a1, or a .toml or .urdf file
-    #[arg(long, value_name = "ROBOT", value_parser = RobotParser, hide_possible_values = true)]
+    /// Robot of the recordings: go1, go2, a1, or a .toml or .urdf file [default: go1; with --from that of the model]
+    #[arg(long, help_heading = RECORDINGS, value_name = "ROBOT")]
+    #[arg(value_parser = RobotParser, hide_possible_values = true)]
     pub robot: Option<String>,
-    /// Train exactly as published: motor torques, forces in the body's axes, one scale, no mask, no lift loss, Xi from
-    /// ones (joint method)
-    #[arg(long)]
+    /// Train as in the paper by the joint method: motor torques, forces in body axes, one scale, no mask, no lift loss, Xi
+    /// from ones
+    #[arg(long, help_heading = METHOD)]
     pub paper: bool,
-    /// Seed of all random choices
-    #[arg(long)]
+    /// Seed of all random choices [default: 1]
+    #[arg(long, help_heading = METHOD, value_name = "N")]
     pub seed: Option<u64>,
-    /// Seeds to try, counting up from the seed; the best is kept (1 unless given, joint method 3)
-    #[arg(long, value_parser = count(&table::SEEDS))]
+    /// Number of seeds, counted from --seed; the best model is kept [default: 1; 3 with the joint method without --paper]
+    #[arg(long, help_heading = METHOD, value_name = "N", value_parser = count(&table::SEEDS))]
     pub seeds: Option<usize>,
-    /// Epochs of a step, refinement not counted (joint method)
-    #[arg(long, value_parser = count(&table::EPOCHS))]
+    /// Epochs of each training step, without those of its refinement [default: 501]
+    #[arg(long, help_heading = JOINT, value_name = "N", value_parser = count(&table::EPOCHS))]
     pub epochs: Option<usize>,
-    /// Widths of the encoder's hidden layers, such as 32,16; a linear layer to z follows (joint method)
-    #[arg(long, value_name = "WIDTHS")]
+    /// Widths of the encoder's hidden layers, such as 32,16, or `linear` [default: linear]
+    #[arg(long, help_heading = JOINT, value_name = "WIDTHS")]
     pub encoder_layers: Option<Widths>,
-    /// Widths of the decoder's hidden layers, or `linear` (those of the encoder backwards unless given)
-    #[arg(long, value_name = "WIDTHS")]
+    /// Widths of the decoder's hidden layers, or `linear` [default: those of the encoder in reverse order]
+    #[arg(long, help_heading = JOINT, value_name = "WIDTHS")]
+    #[arg(hide_short_help = true)]
     pub decoder_layers: Option<Widths>,
-    /// Activation of the hidden layers (elu unless given)
-    #[arg(long, value_enum)]
+    /// Activation of the hidden layers: elu, tanh, sigmoid, relu, gelu, gelu-tanh, silu or softplus [default: elu]
+    #[arg(long, help_heading = JOINT, value_name = "NAME", value_enum)]
+    #[arg(hide_short_help = true)]
+    #[arg(hide_possible_values = true)]
     pub activation: Option<Activation>,
-    /// Weight of the input energy that the latent input does not represent
-    #[arg(long, value_name = "WEIGHT", value_parser = finite(&table::LIFT_WEIGHT))]
+    /// Weight of the input energy that the latent input cannot represent [default: 0.001; 0 with --paper]
+    #[arg(long, help_heading = METHOD, value_name = "WEIGHT", value_parser = finite(&table::LIFT_WEIGHT))]
+    #[arg(hide_short_help = true)]
     pub lift_weight: Option<Finite>,
-    /// Weight of body x, y, z in the reconstruction error
-    #[arg(long, value_name = "WEIGHT", value_parser = finite(&table::BODY_WEIGHT))]
+    /// Weight of body x, y and z in the reconstruction error [default: 300; 1 with --paper]
+    #[arg(long, help_heading = METHOD, value_name = "WEIGHT", value_parser = finite(&table::BODY_WEIGHT))]
+    #[arg(hide_short_help = true)]
     pub body_weight: Option<Finite>,
-    /// Weight of the loss over a window of predictions, 0 for none (joint method)
-    #[arg(long, value_name = "WEIGHT", value_parser = finite(&table::BPTT_WEIGHT))]
+    /// Weight of the loss over a window of predictions [default: 0]
+    #[arg(long, help_heading = JOINT, value_name = "WEIGHT", value_parser = finite(&table::BPTT_WEIGHT))]
+    #[arg(hide_short_help = true)]
     pub bptt_weight: Option<Finite>,
-    /// Steps of that window (5 unless given)
-    #[arg(long, value_name = "STEPS", value_parser = count(&table::BPTT_WINDOW))]
+    /// Steps of that window [default: 5]
+    #[arg(long, help_heading = JOINT, value_name = "N", value_parser = count(&table::BPTT_WINDOW))]
+    #[arg(hide_short_help = true)]
     pub bptt_window: Option<usize>,
-    /// Samples per step of that window (5 unless given: 10 ms at 500 Hz)
-    #[arg(long, value_name = "SAMPLES", value_parser = count(&table::BPTT_STRIDE))]
+    /// Samples per step of that window [default: 5; 10 ms at 500 Hz]
+    #[arg(long, help_heading = JOINT, value_name = "N", value_parser = count(&table::BPTT_STRIDE))]
+    #[arg(hide_short_help = true)]
     pub bptt_stride: Option<usize>,
-    /// Weight of a prediction relative to the previous one (0.9 unless given)
-    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::BPTT_DECAY))]
+    /// Weight of a prediction relative to the previous one [default: 0.9]
+    #[arg(long, help_heading = JOINT, value_name = "FACTOR", value_parser = finite(&table::BPTT_DECAY))]
+    #[arg(hide_short_help = true)]
     pub bptt_decay: Option<Finite>,
-    /// How predictions are integrated (rk2 unless given)
-    #[arg(long, value_enum)]
+    /// Integrator: euler, rk2 (midpoint rule) or rk4 [default: rk2]
+    #[arg(long, help_heading = JOINT, value_name = "NAME", value_enum, hide_short_help = true)]
+    #[arg(hide_possible_values = true)]
     pub bptt_integrator: Option<Integrator>,
-    /// Accepted increase of the validation error for fewer terms, as a share of the least error
-    #[arg(long, value_name = "SHARE", value_parser = finite(&table::SLACK))]
+    /// Relative increase of the validation error that is accepted for fewer terms [default: 0.1; 0.04 with rows of the
+    /// legs, from d = 7]
+    #[arg(long, help_heading = METHOD, value_name = "SHARE", value_parser = finite(&table::SLACK))]
+    #[arg(hide_short_help = true)]
     pub slack: Option<Finite>,
-    /// Steps by which rollouts of the training jumps refine the chosen coefficients; 0 leaves those of the regression
-    /// (10 unless given, 0 with --paper)
-    #[arg(long, value_name = "STEPS", value_parser = count(&table::REFINEMENTS))]
+    /// Refinements of coefficients by rollouts [default: 10; 0 with --paper]
+    #[arg(long, help_heading = METHOD, value_name = "N", value_parser = count(&table::REFINEMENTS))]
+    #[arg(hide_short_help = true)]
     pub refinements: Option<usize>,
-    /// Bound on the rate at which deviations grow, in every phase and through their sequence, 1/s (3 unless given, none
-    /// with --paper)
-    #[arg(long, value_name = "RATE", value_parser = finite(&table::GROWTH))]
+    /// Largest growth rate of deviations in a phase and over all phases, in 1/s [default: 3; none with --paper]
+    #[arg(long, help_heading = METHOD, value_name = "RATE", value_parser = finite(&table::GROWTH))]
+    #[arg(hide_short_help = true)]
     pub growth: Option<Finite>,
     /// Highest degree of the polynomial candidate terms [default: 1]
-    #[arg(long, value_name = "P", value_parser = |text: &str| table::DEGREE.parse::<u32>(text))]
+    #[arg(long, help_heading = MODEL, value_name = "P")]
+    #[arg(value_parser = |text: &str| table::DEGREE.parse::<u32>(text))]
     pub degree: Option<u32>,
-    /// Add sines and cosines of z and dz to the candidate terms
-    #[arg(long)]
+    /// Add sines and cosines of z and dz, as --paper does
+    #[arg(long, help_heading = MODEL)]
     pub trigonometric: bool,
-    /// Custom candidate terms, separated by semicolons: "1; z1; dz1; u1; z1*dz2"
-    #[arg(long, value_name = "TERMS", conflicts_with_all = ["degree", "trigonometric"])]
+    /// Candidate terms, separated by semicolons, such as "1; z1; dz1; u1; z1*dz2" [default: 1, z, dz and u]
+    #[arg(long, help_heading = MODEL, value_name = "TERMS")]
+    #[arg(conflicts_with_all = ["degree", "trigonometric"])]
     pub terms: Option<String>,
-    /// Friction and inertia of the joints, taken from the torques: a file with a table `actuators`, `identify` for what
-    /// the training recordings tell (as `romc identify` does), or `none` (identify unless given, none with --paper)
-    #[arg(long, value_name = "FILE.toml")]
+    /// Joint friction and rotor inertia to subtract from the torques: a file of `romc identify`, `identify` to estimate
+    /// them, or `none` [default: identify; none with --paper; with --from those of the model]
+    #[arg(long, help_heading = RECORDINGS, value_name = "FILE.toml")]
     pub actuators: Option<String>,
-    /// Axes of force and moment in the inputs: `world`, or `body` as published. `ground` is `world` of feet that only push,
-    /// without the rotors' inertia as a loss in flight [default: ground, with --paper body]
-    #[arg(long, value_name = "FRAME", value_parser = wrench_frame)]
+    /// Axes of force and moment in the inputs: ground, world, or body as in the paper. `ground` is `world` for feet that
+    /// push and never pull [default: ground; body with --paper]
+    #[arg(long, help_heading = MODEL, value_name = "FRAME", value_parser = wrench_frame)]
+    #[arg(hide_short_help = true)]
     pub wrench_frame: Option<WrenchFrame>,
-    /// Phases of the model, by the name of a motion [default: jump]
-    #[arg(long, value_enum)]
+    /// Phases by the name of a motion [default: jump]
+    #[arg(long, help_heading = MODEL, value_name = "MOTION", value_enum)]
+    #[arg(display_order = 2)]
     pub phases: Option<PhaseSet>,
-    /// Phases of the model, one by one: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001; can be
-    /// repeated, the first match wins
-    #[arg(long, value_name = "NAME=FEET", conflicts_with = "phases")]
+    /// Phases one by one: any, none, always, or foot patterns (fr fl rr rl) such as rear=0011,0001. Can be repeated; the
+    /// first match counts [default: those of --phases]
+    #[arg(long, help_heading = MODEL, value_name = "NAME=FEET", conflicts_with = "phases")]
+    #[arg(display_order = 3)]
     pub phase: Option<Vec<PhasePattern>>,
-    /// Leave out physically implausible samples (`romc inspect` lists them)
-    #[arg(long)]
+    /// Leave out implausible samples, which `romc inspect` lists
+    #[arg(long, help_heading = RECORDINGS)]
     pub leave_out_implausible: bool,
-    /// Where accelerations come from (recorded unless given)
-    #[arg(long, value_enum)]
+    /// Source of accelerations [default: recorded]
+    #[arg(long, help_heading = SIGNALS, value_name = "SOURCE", value_enum, hide_short_help = true)]
     pub accelerations: Option<Accelerations>,
-    /// Savitzky-Golay filter over each jump: samples of the window and degree, such as 11,2
-    #[arg(long, value_name = "WINDOW,ORDER")]
+    /// Savitzky-Golay filter: window in samples and degree, such as 11,2 [default: none; 30 ms and degree 3 for all rows
+    /// of recordings with rebuilt times]
+    #[arg(long, help_heading = SIGNALS, value_name = "WINDOW,ORDER", hide_short_help = true)]
     pub smooth: Option<SavitzkyGolay>,
-    /// Signals that the filter is applied to (accelerations unless given)
-    #[arg(long, value_enum)]
+    /// Signals that --smooth filters [default: accelerations]
+    #[arg(long, help_heading = SIGNALS, value_name = "ROWS", value_enum, hide_short_help = true)]
     pub smooth_rows: Option<SmoothedRows>,
-    /// Window of the mean over accelerations within each phase (11 unless given, 1 with --paper)
-    #[arg(long, value_name = "SAMPLES", value_parser = count(&table::MOVING_AVERAGE))]
+    /// Window of the mean over accelerations within each phase [default: 11; 1 with --paper]
+    #[arg(long, help_heading = SIGNALS, value_name = "N", value_parser = count(&table::MOVING_AVERAGE))]
+    #[arg(hide_short_help = true)]
     pub moving_average: Option<usize>,
-    /// Coordinates with a smaller standard deviation (rad or m) are masked unless actuated; 0 for no mask
-    #[arg(long, value_name = "STD", value_parser = finite(&table::MASK_STD))]
+    /// Mask coordinates with a smaller standard deviation, in rad or m, except actuated ones [default: 0.015; 0 with
+    /// --paper]
+    #[arg(long, help_heading = SCALES, value_name = "STD", value_parser = finite(&table::MASK_STD))]
+    #[arg(hide_short_help = true)]
     pub mask_std: Option<Finite>,
-    /// Coordinates with a larger share of the input's energy count as actuated
-    #[arg(long, value_name = "SHARE", value_parser = finite(&table::MASK_INPUT_SHARE))]
+    /// Share of the input energy above which a coordinate counts as actuated [default: 0.005]
+    #[arg(long, help_heading = SCALES, value_name = "SHARE", value_parser = finite(&table::MASK_INPUT_SHARE))]
+    #[arg(hide_short_help = true)]
     pub mask_input_share: Option<Finite>,
-    /// Rows of a linear encoder: named (the centre of mass, then joints and pitch, left and right alike, from 7 on
-    /// also rotation and feet; the dynamics obey Newton's second law and the invariances) or free [default: named;
-    /// free with --paper or hidden layers]
-    #[arg(long, value_name = "KIND")]
+    /// Rows of a linear encoder [default: named; free with --paper or hidden layers]
+    #[arg(long, help_heading = MODEL, value_name = "KIND", value_enum)]
+    #[arg(display_order = 1)]
     pub coordinates: Option<Coordinates>,
-    /// Body coordinates whose momentum is a coordinate of its own, by flights or else by forces: a list with x and z of x,
-    /// y, z, roll, pitch and yaw, or all. With y, roll or yaw left and right may differ [default: x,z; from 5 coordinates
-    /// on x,z,pitch; with --phases trot or crawl from 6 on all]
-    #[arg(long, value_name = "LIST")]
+    /// Body coordinates with a latent coordinate of their own, a list with x and z, or all [default: x,z; x,z,pitch from d
+    /// = 5; all with --phases trot or crawl from d = 6]
+    #[arg(long, help_heading = MODEL, value_name = "LIST", hide_short_help = true)]
     pub body: Option<BodyRows>,
-    /// Whether equations of these coordinates are one for all phases [default: per-phase, with --phases trot or crawl
-    /// all-phases]
-    #[arg(long, value_enum)]
+    /// Equations of these coordinates, shared by the phases or not [default: per-phase; all-phases with --phases trot or
+    /// crawl from d = 6]
+    #[arg(long, help_heading = MODEL, value_name = "KIND", value_enum, hide_short_help = true)]
     pub body_equations: Option<BodyEquations>,
-    /// Whether mirror images of the training recordings count as recordings, legs exchanged [default: added with y, roll
-    /// or yaw in --body, otherwise none]
-    #[arg(long, value_enum)]
+    /// Mirror images of the training recordings [default: added with y, roll or yaw in --body; otherwise none]
+    #[arg(long, help_heading = METHOD, value_name = "IMAGES", value_enum, hide_short_help = true)]
     pub mirror_images: Option<MirrorImages>,
-    /// Parts of the recipe for named coordinates to leave out; docs/learning.md has the effect of each
-    #[arg(
-        long,
-        value_enum,
-        value_name = "PART",
-        value_delimiter = ',',
-        hide_short_help = true
-    )]
+    /// Parts of the recipe for named coordinates to leave out; docs/evaluation/training-choices.md states the effect of each [default: none]
+    #[arg(long, help_heading = METHOD, value_enum, value_name = "PART", value_delimiter = ',')]
+    #[arg(hide_short_help = true)]
     pub leave_out: Option<Vec<RecipePart>>,
-    /// Keep the latent basis as trained, without varimax rotation
-    #[arg(long)]
+    /// Keep the latent basis of the training, without varimax rotation
+    #[arg(long, help_heading = MODEL, hide_short_help = true)]
     pub no_rotation: bool,
-    /// Scaled units of the state in one rad or m (0.1 unless given)
-    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::STATE_SCALING))]
+    /// Scaled units of the state per rad or m [default: 0.1]
+    #[arg(long, help_heading = SCALES, value_name = "FACTOR", value_parser = finite(&table::STATE_SCALING))]
+    #[arg(hide_short_help = true)]
     pub state_scaling: Option<Finite>,
-    /// Scaled units of joint torques in one N m (0.1 unless given)
-    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::TORQUE_SCALING))]
+    /// Scaled units of joint torques per N m [default: 0.1]
+    #[arg(long, help_heading = SCALES, value_name = "FACTOR", value_parser = finite(&table::TORQUE_SCALING))]
+    #[arg(hide_short_help = true)]
     pub torque_scaling: Option<Finite>,
-    /// Scaled units of forces on the body in one N (0.005 unless given, 0.1 with --paper)
-    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::FORCE_SCALING))]
+    /// Scaled units of forces on the body per N [default: 0.005; 0.1 with --paper]
+    #[arg(long, help_heading = SCALES, value_name = "FACTOR", value_parser = finite(&table::FORCE_SCALING))]
+    #[arg(hide_short_help = true)]
     pub force_scaling: Option<Finite>,
-    /// Scaled units of moments on the body in one N m (0.02 unless given, 0.05 in the body's axes, 0.1 with --paper)
-    #[arg(long, value_name = "FACTOR", value_parser = finite(&table::MOMENT_SCALING))]
+    /// Scaled units of moments on the body per N m [default: 0.02; 0.05 with --wrench-frame body; 0.1 with --paper]
+    #[arg(long, help_heading = SCALES, value_name = "FACTOR", value_parser = finite(&table::MOMENT_SCALING))]
+    #[arg(hide_short_help = true)]
     pub moment_scaling: Option<Finite>,
-}
-
-#[derive(Debug, Args)]
-#[command(
-    after_help = "Example:\n  romc study examples/recordings/go1/train_*.csv.gz \\\n      --validation examples/recordings/go1/validation_*.csv.gz --latent-dims 1..18 --seeds 5\n\nA stopped study goes on when the same command is given again. On a cluster, `--shard 3/8` computes a part,\n`romc study --merge part1 part2 --out-dir whole` joins parts."
-)]
-pub(crate) struct StudyArguments {
-    /// Recordings to learn from
-    #[arg(value_name = "RECORDING", required_unless_present = "merge")]
-    pub recordings: Vec<PathBuf>,
-    /// Recordings that choose between candidate models and give the metrics
-    #[arg(long, value_name = "RECORDING", num_args = 1..)]
-    pub validation: Vec<PathBuf>,
-    /// Latent dimensions: `4`, `1..18` (both ends counted) or `2,4,6`
-    #[arg(long, value_name = "DIMS", default_value = "1..18", value_parser = dimensions)]
-    pub latent_dims: Dimensions,
-    /// Seeds per dimension
-    #[arg(long, default_value_t = 5, value_parser = count(&table::SEEDS))]
-    pub seeds: usize,
-    /// How to learn (closed-form unless given)
-    #[arg(long, value_enum)]
-    pub method: Option<Method>,
-    /// Train as published (joint method)
-    #[arg(long)]
-    pub paper: bool,
-    /// Robot of the recordings: go1, go2, a1, or a .toml or .urdf file (go1 unless given)
-    #[arg(long, value_name = "ROBOT", value_parser = RobotParser, hide_possible_values = true)]
-    pub robot: Option<String>,
-    /// Settings of `romc train`, except `latent-dim`, `seed` and `seeds`
-    #[arg(long, value_name = "FILE.toml")]
-    pub config: Option<PathBuf>,
-    /// Weight of the complexity in the combined loss 2 E_dec + 2 lambda log |Xi|
-    #[arg(long, default_value_t = crate::evaluate::LAMBDA, value_parser = real(&table::LAMBDA))]
-    pub lambda: f64,
-    /// Compute only this part of the study, such as 3/8
-    #[arg(long, value_name = "PART", value_parser = Shard::parse, conflicts_with = "merge")]
-    pub shard: Option<Shard>,
-    /// Join the finished parts in these folders instead of training
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["recordings", "validation", "config", "latent_dims", "seeds", "method", "paper", "robot"])]
-    pub merge: Vec<PathBuf>,
-    /// Folder of the study
-    #[arg(long, value_name = "DIR", default_value = "out/study")]
-    pub out_dir: PathBuf,
-    /// Replace tables and figures of these names that romc did not make
-    #[arg(long, action = ArgAction::SetTrue, value_parser = overwrite())]
-    pub force: Overwrite,
-    #[command(flatten)]
-    pub reading: ReadingArguments,
-}
-
-/// Latent dimensions of a study, ascending.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Dimensions(pub Vec<usize>);
-
-fn dimensions(text: &str) -> Result<Dimensions, String> {
-    let expected =
-        || format!("found `{text}`, expected 4, 1..18 or 2,4,6, each from 1 to {STATE_DIM}");
-    let number = |text: &str| match text.trim().parse::<usize>() {
-        Ok(d) if (1..=STATE_DIM).contains(&d) => Ok(d),
-        _ => Err(expected()),
-    };
-    let mut found = match text.split_once("..") {
-        Some((first, last)) => (number(first)?..=number(last)?).collect(),
-        None => text.split(',').map(number).collect::<Result<Vec<_>, _>>()?,
-    };
-    found.sort_unstable();
-    match found.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(&[twice, _]) => Err(format!(
-            "found {twice} twice in `{text}`, expected each once"
-        )),
-        _ if found.is_empty() => Err(expected()),
-        _ => Ok(Dimensions(found)),
-    }
 }

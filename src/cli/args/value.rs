@@ -1,15 +1,12 @@
-//! Parsers of numbers by their ranges, and of names; how recordings are read.
+//! Parsers of numbers by their ranges, and of names.
 
-use clap::ValueEnum as _;
 use clap::builder::{
     BoolValueParser, PossibleValue, PossibleValuesParser, StringValueParser, TypedValueParser,
 };
 
 use super::train::Finite;
 use super::*;
-use crate::cli::shared::quoted;
 use crate::limits::Range;
-use crate::recording::Clocks;
 
 pub(super) fn count(range: &'static Range) -> impl Fn(&str) -> Result<usize, String> + Clone {
     |text| range.parse(text)
@@ -63,27 +60,4 @@ impl TypedValueParser for RobotParser {
 pub(crate) fn wrench_frame(text: &str) -> Result<WrenchFrame, String> {
     text.parse()
         .map_err(|()| format!("found `{text}`, expected `ground`, `world` or `body`"))
-}
-
-#[derive(Debug, Clone, Default, Args)]
-pub(crate) struct ReadingArguments {
-    /// What the columns of the recordings are: names, units, signs, order, clocks of another program's log (`romc
-    /// inspect --guess LOG` writes a first one)
-    #[arg(long, value_name = "MAP.toml")]
-    pub columns: Option<PathBuf>,
-    /// Whether clocks and angular rates that disagree with the motion are mended (unless given they are, but not by
-    /// `inspect`, `convert` and `plan`; by `identify` always)
-    #[arg(long, value_enum, hide_possible_values = false)]
-    pub clock: Option<Clocks>,
-}
-
-impl ReadingArguments {
-    /// The flags as typed, with a blank before each.
-    pub(crate) fn as_flags(&self) -> String {
-        let columns = self.columns.iter();
-        let columns = columns.map(|path| format!(" --columns {}", quoted(path)));
-        let clock = self.clock.and_then(|clock| clock.to_possible_value());
-        let clock = clock.map(|clock| format!(" --clock {}", clock.get_name()));
-        columns.chain(clock).collect()
-    }
 }

@@ -1,6 +1,6 @@
 //! The spellings of a language as a table of patterns; arrays and functions before they are spelled; lists and comments
-//! broken into lines. `$name` and its like in a pattern stand for what is filled in; `$model`, `$upper`, `$real` and
-//! `$f` (identifier of the model, the same in upper case, type of numbers, suffix of literals) are known everywhere.
+//! broken into lines. `$name` and similar words in a pattern are placeholders. `$model`, `$upper`, `$real` and `$f`
+//! (identifier of the model, the same in upper case, type of numbers, suffix of literals) are defined everywhere.
 
 use super::*;
 
@@ -19,12 +19,12 @@ pub(crate) struct Spelling {
     pub declaration: &'static str,
     pub assignment: &'static str,
     pub addition: Option<&'static str>, // `+=`, where the language has it
-    /// Head of a loop of `$name` from 0 to below `$n`, or to `$last`; and what closes its body.
+    /// Head of a loop of `$name` from 0 to below `$n`, or to `$last`; and the end of its body.
     pub loop_head: &'static str,
     pub loop_end: Option<&'static str>,
     /// Whether a `Lanes` statement is a loop. Rust's compiler unrolls it before it looks for vectors.
     pub loops_over_lanes: bool,
-    /// What ends a line that goes on in the next.
+    /// Marker at the end of a line that continues in the next.
     pub continuation: &'static str,
     /// Sum, difference, product and quotient, with the spaces around them.
     pub operators: [&'static str; 4],
@@ -49,10 +49,11 @@ pub(crate) struct Spelling {
     /// The kernel's core on the argument `$a` of a lane: defines `$sine` and `$cosine`, and notes an argument beyond
     /// its limit. Blocks of lanes are for compilers: scripts run many points as columns.
     pub sin_cos_lane: &'static [&'static str],
-    /// What stands for a result of the core that is not used, if it may be left out.
+    /// Placeholder for a result of the core that is not used, if it may be left out.
     pub unused_lane: Option<&'static str>,
     pub prefix: &'static str,
-    /// Beginning of the names of tables; a table; what opens its rows, follows each eighth entry and closes them.
+    /// Beginning of the names of tables; a table; the text that opens its rows, follows each eighth entry and closes
+    /// them.
     pub table_base: &'static str,
     pub table: &'static str,
     pub rows: [&'static str; 3],
@@ -312,7 +313,7 @@ impl Function {
         self.of(&[Role::InOut])
     }
 
-    /// What is returned and no argument, so that the body has to begin with it.
+    /// Parameters that are returned and are no arguments, so that the body has to begin with them.
     pub(crate) fn created(&self) -> Vec<&Parameter> {
         self.of(&[Role::Output])
     }

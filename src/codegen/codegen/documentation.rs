@@ -41,8 +41,8 @@ pub(super) fn of_inputs(model: &ReducedModel) -> Result<[Vec<String>; 3], LowerE
              the motors.",
         ),
         None => (
-            "the torques as they are: the model knows no losses of the joints, dx is not used",
-            "tau = net: the model knows no losses of the joints, dx and ddx are not used.",
+            "the motor torques unchanged: the model has no losses of the joints, dx is not used",
+            "tau = net: the model has no losses of the joints, dx and ddx are not used.",
         ),
     };
     let is_ground = model.wrench_frame() == WrenchFrame::Ground && model.actuators().is_some();
@@ -112,8 +112,8 @@ fn of_torques(model: &ReducedModel, losses: &str, in_flight: &str) -> Vec<String
     torque.into()
 }
 
-/// Of each map: its equation with an affine and with a nonlinear encoder or decoder, and its arrays, in which the point
-/// of the Jacobian, units and names of the elements stand in braces.
+/// For each map: its equation with an affine and with a nonlinear encoder or decoder, and its arrays. The point of the
+/// Jacobian, units and names of the elements are placeholders in braces.
 const MAPS: [[&str; 3]; 6] = [
     [
         "Latent coordinates: z = W_e (s_x x) + b_e.",
@@ -121,7 +121,7 @@ const MAPS: [[&str; 3]; 6] = [
         "x: {n}. z: latent coordinates {z}.{of_x}",
     ],
     [
-        "Latent velocities: dz = W_e (s_x dx); velocities take no bias.",
+        "Latent velocities: dz = W_e (s_x dx), without the bias.",
         "Latent velocities: dz = J (s_x dx) with J, the encoder's Jacobian at s_x x.",
         "{at_x}dx: velocities of the {n}. dz: latent velocities {dz}.",
     ],
@@ -131,7 +131,7 @@ const MAPS: [[&str; 3]; 6] = [
         "z: latent coordinates {z}. x: {n}.{of_x}",
     ],
     [
-        "Robot velocities: dx = (W_d dz) / s_x; velocities take no bias.",
+        "Robot velocities: dx = (W_d dz) / s_x, without the bias.",
         "Robot velocities: dx = (J dz) / s_x with J, the decoder's Jacobian at z.",
         "{at_z}dz: latent velocities {dz}. dx: velocities of the {n}.",
     ],
@@ -183,8 +183,8 @@ pub(super) fn of_maps(
     let maps = [model.encoder_map(), model.decoder_map()];
     let [encoder, decoder] = maps.map(|map| map.is_ok_and(|map| map.as_affine().is_none()));
     let at = |is_nonlinear, text: &str| if is_nonlinear { text } else { "" }.to_owned();
-    let at_x = "x: robot coordinates at which the Jacobian is taken, SI units. ";
-    let at_z = "z: latent coordinates at which the Jacobian is taken (scaled). ";
+    let at_x = "x: robot coordinates at which the Jacobian is evaluated, SI units. ";
+    let at_z = "z: latent coordinates at which the Jacobian is evaluated (scaled). ";
     let text_words = [
         ("{at_x}", at(encoder, at_x)),
         ("{at_z}", at(decoder, at_z)),

@@ -25,14 +25,14 @@ pub(crate) struct Namer {
 }
 
 impl Namer {
-    /// A scope in which names of functions are taken, and the `reserved` words of the target, separated by blanks.
+    /// A scope in which names of functions and the `reserved` words of the target, separated by blanks, are in use.
     pub(crate) fn new(reserved: &str) -> Self {
         let used = reserved.split_whitespace().chain(FUNCTIONS);
         let used = used.map(|name| (name.to_owned(), 1)).collect();
         Self { used }
     }
 
-    /// The wanted name, with underscores for other characters, and with the first free number if it is taken.
+    /// The wanted name, with underscores for other characters, and with the first free number if it is already in use.
     pub(crate) fn mint(&mut self, wanted: &str) -> Ident {
         let mut base: String = wanted
             .chars()

@@ -1,4 +1,4 @@
-//! What is generated for a model: programs, with names, roles and documentation.
+//! The generated functions of a model: programs, with names, roles and documentation.
 
 use super::documentation::{equations, of_coordinates, of_inputs, of_maps};
 use super::*;

@@ -1,4 +1,4 @@
-//! What a user chooses of generated code: its numbers, sines and units; and why there is none.
+//! User options of generated code: its numbers, sines and units; and reasons why it cannot be generated.
 
 use super::*;
 
@@ -22,7 +22,7 @@ impl Precision {
         }
     }
 
-    /// A finite number with the fewest digits that read back to the nearest number of this precision, always with a
+    /// A finite number with the fewest digits that read back to the nearest number of this precision. It always has a
     /// point or an exponent, so that it is no integer in any target.
     pub fn digits(self, value: f64) -> String {
         assert!(value.is_finite(), "numbers of programs are finite");
@@ -83,10 +83,10 @@ fn beyond_single(program: &Program) -> Option<f64> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum SineCosine {
     // Within about one unit of the last place, without branches, so that loops over it vectorise.
-    /// A function inside the file that compilers vectorise, the same bits everywhere.
+    /// A function in the file; equal bits on every platform
     #[default]
     Inline,
-    /// The platform's mathematics library.
+    /// The mathematics library of the platform
     Library,
 }
 
@@ -108,7 +108,7 @@ impl Units {
         }
     }
 
-    /// The model whose maps take these units.
+    /// The model with its maps in these units.
     pub(super) fn convert(self, model: &ReducedModel) -> Result<ReducedModel, LowerError> {
         // A model without robot coordinates has no maps either.
         if self == Self::Si || model.scaling().is_err() {
@@ -126,7 +126,7 @@ pub enum CodegenError {
     Lower(#[from] LowerError),
     /// A constant is beyond the largest single-precision number.
     #[error(
-        "`{function}` has the constant {value:e}, beyond what single precision holds (3.4e38); use `--precision f64`"
+        "`{function}` has the constant {value:e}, beyond the largest single-precision number (3.4e38); use `--precision f64`"
     )]
     BeyondSingle {
         /// The function, without the model's name.

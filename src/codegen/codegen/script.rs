@@ -1,8 +1,9 @@
 //! Scripts: `NAME.py` on NumPy, `NAME_casadi.py` with functions of CasADi, `NAME.m` for MATLAB and Octave, a function
 //! that returns a struct of function handles; and the spellings of all languages.
 //!
-//! Arrays of scripts are matrices with a column per point (a vector for one), and operations are element by element: a
-//! program's statements serve one state and many. What is written into parameters elsewhere is returned here.
+//! Arrays of scripts are matrices with a column per point (a vector for one point), and operations are element by
+//! element: a program's statements serve one state and many. Values that other languages write into parameters are
+//! returned here.
 
 use super::dialect::Spelling;
 use super::*;

@@ -122,8 +122,8 @@ fn vectors(entry: &FunctionSpec, has_batch: bool, precision: Precision) -> Funct
     }
 }
 
-/// Largest accepted difference of each output in single precision: a share of one plus its largest value, or a multiple
-/// of the interpreter's own error there, which is larger where terms cancel. Zero in double precision.
+/// Largest accepted difference of each output in single precision. It is a share of one plus its largest value, or a
+/// multiple of the interpreter's own error there, which is larger where terms cancel. Zero in double precision.
 fn tolerances(
     entry: &FunctionSpec,
     precision: Precision,
@@ -272,8 +272,8 @@ fn free_elements(entry: &FunctionSpec) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// Element `k` of an input from a number between -1 and 1: that number, except that the function of the feet's forces
-/// gets knees that are bent and feet on the ground or in the air.
+/// Element `k` of an input from a number between -1 and 1: that number itself. For the function of the feet's forces,
+/// knees are bent and feet are on the ground or in the air.
 fn element(entry: &FunctionSpec, slot: &str, k: usize, random: f64) -> f64 {
     let has_feet = entry.parameters.iter().any(|p| p.name == "feet");
     match (slot, k % LEG_JOINT_DIM) {

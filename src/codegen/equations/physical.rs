@@ -1,13 +1,16 @@
 //! Equations in metres, radians and newtons.
 //!
-//! A latent coordinate is `z_i = W_e,i (s_x x) + b_e,i`. Where one unit rules its row, that is where the weights in SI
-//! units `w_ij = W_e,ij s_x,j` of that unit have more than half of the row's sum of squares, it becomes a length or an
-//! angle `Z_i = z_i / sigma_i` with `sigma_i = +- sum_j |w_ij|` over the coordinates of the ruling unit: a weighted
-//! mean of these, the weights adding up to one, the largest positive. Its input becomes a force or a moment, `U_i = u_i
-//! / upsilon_i` with `1 / upsilon_i = +- sum_j |W_e,ij| / s_u,j` over the inputs of the unit that does work along it,
-//! so that the shares of `u = W_e^T u_lat / s_u` in that unit add up to one. Rows that no unit rules keep pure numbers:
-//! `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike. Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z,
-//! sigma dZ, upsilon U)`, numeric factors taken out of every term and into its coefficient.
+//! A latent coordinate is `z_i = W_e,i (s_x x) + b_e,i`. A unit rules its row if the weights in SI units
+//! `w_ij = W_e,ij s_x,j` of that unit have more than half of the row's sum of squares. Then the coordinate becomes a
+//! length or an angle `Z_i = z_i / sigma_i` with `sigma_i = +- sum_j |w_ij|` over the coordinates of the ruling unit.
+//! It is a weighted mean of these: the weights add up to one, the largest is positive.
+//!
+//! Its input becomes a force or a moment, `U_i = u_i / upsilon_i` with `1 / upsilon_i = +- sum_j |W_e,ij| / s_u,j` over
+//! the inputs of the unit that does work along it. The shares of `u = W_e^T u_lat / s_u` in that unit then add up to
+//! one. Rows that no unit rules keep pure numbers: `sigma_i = sqrt(sum_j w_ij^2)`, and inputs alike.
+//!
+//! Substituted, `dd Z_i = 1/sigma_i sum_k xi_ki theta_k(sigma Z, sigma dZ, upsilon U)`, with numeric factors moved from
+//! every term into its coefficient.
 
 use std::ops::{Div, Mul};
 

@@ -1,5 +1,5 @@
 //! The accelerations of all phases as sums of coefficients times expressions, and their shortest form, equal as real
-//! functions: the algebra finds it ([`Shortener`]); a new term stands where the first that it replaces stood.
+//! functions. The algebra finds it ([`Shortener`]). A new term stands in the place of the first term that it replaces.
 
 use std::collections::HashMap;
 
@@ -33,9 +33,9 @@ pub struct Equations<'a> {
     pub terms: Vec<CandidateTerm>,
     /// In the model's order.
     pub phases: Vec<PhaseEquations>,
-    /// What exact simplification did, in the order of phases and equations.
+    /// The steps of exact simplification, in the order of phases and equations.
     pub steps: Vec<ExactStep>,
-    /// The units of equations in physical units, and what these were made from.
+    /// The units of equations in physical units, and the original equations.
     pub(super) physical: Option<(LatentUnits, Box<Equations<'static>>)>,
 }
 
@@ -88,8 +88,8 @@ impl<'a> Equations<'a> {
         Ok(Cow::Owned(builder.phases(phases.collect()).build()?))
     }
 
-    /// The same with all parts of terms that have no variable computed in double precision: `exp(100)` may be beyond
-    /// what generated code computes with, its product with a coefficient not.
+    /// The same with all parts of terms that have no variable computed in double precision. `exp(100)` may be beyond
+    /// the range of generated code, although its product with a coefficient is not.
     #[must_use]
     pub fn with_constants_folded(mut self) -> Self {
         let exprs: Vec<ExprId> = self.terms.iter().map(|term| term.expr).collect();
@@ -173,7 +173,7 @@ impl PhaseEquations {
     }
 }
 
-/// Terms of one equation that a shorter form took the place of.
+/// Terms of one equation that a shorter form replaced.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExactStep {
     pub phase: String,
@@ -181,7 +181,7 @@ pub struct ExactStep {
     pub output: usize,
     /// Coefficients and terms as learned.
     pub before: Vec<(f64, String)>,
-    /// What they are together; nothing if they cancel.
+    /// Their sum in shorter form; empty if they cancel.
     pub after: Vec<(f64, String)>,
 }
 
@@ -235,7 +235,7 @@ impl Serialize for ExactStep {
 }
 
 impl Equations<'_> {
-    /// The equations in their shortest form; what is shortest already keeps its bits.
+    /// The equations in their shortest form; equations that are already shortest keep their bits.
     #[must_use]
     pub(crate) fn simplified(mut self) -> Self {
         let mut pool = std::mem::take(&mut self.pool);

@@ -14,7 +14,7 @@ pub struct IrError {
     value: f64,
 }
 
-/// What makes two scalar statements the same computation.
+/// Key under which two scalar statements are the same computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Key {
     Constant(u64),
@@ -155,7 +155,7 @@ impl ProgramBuilder {
             .collect()
     }
 
-    /// Declares an output array that takes the given values.
+    /// Declares an output array with the given values.
     pub(crate) fn output(&mut self, name: &str, values: &[ValueId]) {
         let slot = self.program.outputs.len();
         let is_other = |known: &Slot| known.name != name;

@@ -1,15 +1,16 @@
-//! Runs programs: the reference for generated code, and what simulation and control run.
+//! Runs programs: the reference for generated code, and the evaluator of simulation and control.
 //!
 //! Sine and cosine are computed together, without branches. The argument is reduced by the nearest multiple of pi/2,
-//! held as three parts (Cody and Waite); two minimax polynomials give sine and cosine of the remainder, and the low two
+//! held as three parts (Cody and Waite). Two minimax polynomials give sine and cosine of the remainder, and the low two
 //! bits of the multiple exchange and negate them. The polynomials minimise the relative error over +-pi/4 and were
-//! found by a Remez exchange with coefficients rounded one after the other; their error is 2^-57.9 (sine) and 2^-63.9
+//! found by a Remez exchange with coefficients rounded one after the other. Their error is 2^-57.9 (sine) and 2^-63.9
 //! (cosine), in single precision 2^-27.9 and 2^-33. Beyond `LIMIT`, at infinities and NaN: the standard library.
 //!
-//! C and Rust emit these very operations in this order, from these constants. The parts of pi/2 (40, 40 and 53 bits; in
-//! single precision 17, 17 and 24) are cut off rather than rounded: the first two times a multiple up to 2^13, 2^7 are
-//! exact, and a positive tail keeps the sign of zero. Adding `ROUND`, 1.5 times 2^52 or 2^23, rounds to an integer,
-//! which the low bits then hold. `SIN` is (r - sin r) / r^3 in powers of r^2, `COS` is (cos r - 1 + r^2/2) / r^4.
+//! C and Rust emit the same operations in this order, with these constants. The parts of pi/2 (40, 40 and 53 bits; in
+//! single precision 17, 17 and 24) are truncated, not rounded. The first two times a multiple up to 2^13, 2^7 are
+//! therefore exact, and a positive tail keeps the sign of zero. Adding `ROUND`, 1.5 times 2^52 or 2^23, rounds to an
+//! integer, which the low bits then hold. `SIN` is (r - sin r) / r^3 in powers of r^2, `COS` is (cos r - 1 + r^2/2) /
+//! r^4.
 
 use super::operation::{Binary, Real, Unary, alternating};
 use super::program::{LANES, Program, Slot, Statement, Table, ValueId, Vector};
@@ -224,7 +225,7 @@ macro_rules! kernel {
         $float:ident, limit: $limit:expr, round: $round:expr, to_sign: $to_sign:expr, pi_2: $pi_2:expr,
         n: $n:expr, sin: $sin:expr, cos: $cos:expr, polynomial: $polynomial:expr, tail: $tail:expr,
     ) => {
-        /// Largest magnitude that the reduction takes, in rad.
+        /// Largest magnitude that the reduction supports, in rad.
         pub const LIMIT: $float = $limit;
         const TWO_OVER_PI: $float = std::$float::consts::FRAC_2_PI;
         const ROUND: $float = $round;

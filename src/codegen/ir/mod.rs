@@ -1,4 +1,4 @@
-//! Programs: what is computed, in which order.
+//! Programs: computations and their order.
 //!
 //! A [`Program`] enters from `lower` (through `ProgramBuilder`); C, Rust and the interpreter run its statements in
 //! the same order with the same association, so that results agree bit for bit. Read `program` first, then `interpret`.

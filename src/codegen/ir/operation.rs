@@ -21,7 +21,7 @@ pub enum Unary {
     Log,
 }
 
-/// What most languages call the functions, in the order of [`Unary`].
+/// Usual names of the functions in programming languages, in the order of [`Unary`].
 pub(crate) const FUNCTIONS: [&str; 8] = ["neg", "sqrt", "abs", "sign", "tan", "tanh", "exp", "log"];
 
 impl Unary {
@@ -39,7 +39,7 @@ impl Unary {
         Self::ALL.into_iter().find(|op| op.name() == name)
     }
 
-    /// Whether a mathematics library computes it, which takes many times longer than a product.
+    /// Whether a mathematics library computes it, which is many times slower than a product.
     pub(crate) fn is_by_library(self) -> bool {
         self >= Self::Tan
     }

@@ -83,7 +83,7 @@ pub enum Statement {
     /// Tables whose columns are scaled, `y_ri = base_ri + sum_g T_g,ri w_g,i`, added in the order of the groups.
     /// Defines `rows x cols` values, row-major.
     Scaled {
-        /// What the sums begin with, row-major; nothing if absent.
+        /// Start values of the sums, row-major; zero if absent.
         base: Option<Vec<ValueId>>,
         /// Positions of at least one table, all of one shape, each with a weight per column or added as it is.
         groups: Vec<(usize, Option<Vec<ValueId>>)>,
@@ -91,7 +91,7 @@ pub enum Statement {
     /// A sum per lane, `y_l = v_0l + sum_t v_tl w_t`, the odd terms to the start and the even ones
     /// apart. Code may leave out products with the constant zero, which changes sums of infinite weights alone.
     Lanes {
-        /// What the sums begin with.
+        /// Start values of the sums.
         start: Option<Vector>,
         /// At least one vector with its weight.
         terms: Vec<(Vector, ValueId)>,
@@ -145,7 +145,7 @@ pub struct Program {
     pub(super) first: Vec<u32>, // value of each statement, and the number of values at the end
     pub(crate) tables: Vec<Table>,
     pub callees: Vec<Program>,
-    /// What is stored where: each output element once, ordered by slot and index.
+    /// Values of the output elements, each once, ordered by slot and index.
     pub(crate) results: Vec<ResultEntry>,
 }
 
@@ -156,7 +156,7 @@ impl Program {
 
     /// Whether such a statement computes something that an output depends on.
     pub(crate) fn has(&self, is_wanted: impl Fn(&Statement) -> bool) -> bool {
-        // Most programs have none, which is found sooner than what is live.
+        // Most programs have none; this test is faster than finding the live statements.
         self.statements.iter().any(&is_wanted) && {
             let mut statements = self.statements.iter().zip(self.live());
             statements.any(|(statement, live)| live && is_wanted(statement))

@@ -1,6 +1,6 @@
 //! Linear combinations of expressions with floating-point coefficients. Generated code keeps the order in which sums
-//! are added here: terms that are known early in up to four partial sums side by side, terms that wait for a sine or an
-//! exponential last, so that they delay as little as possible.
+//! are added here. Terms that are known early come first, in up to four parallel partial sums. Terms that wait for a
+//! sine or an exponential come last, so that they delay as little as possible.
 
 use super::*;
 use crate::symbolic::Number;
@@ -13,8 +13,8 @@ pub(super) struct Combination {
 }
 
 impl Combination {
-    /// Collects `sum_i coefficient_i expr_i`; sums are taken apart, equal expressions merged in order of first
-    /// appearance, and what cancels exactly is left out.
+    /// Collects `sum_i coefficient_i expr_i`. Sums are decomposed, equal expressions are merged in order of first
+    /// appearance, and terms that cancel exactly are left out.
     pub(crate) fn collect(
         pool: &ExprPool,
         summands: impl IntoIterator<Item = (f64, ExprId)>,

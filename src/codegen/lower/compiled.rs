@@ -1,4 +1,4 @@
-//! A model's programs, ready to run: what integration and control evaluate.
+//! A model's programs, ready to run, for integration and control.
 
 use super::*;
 use crate::lower;

@@ -1,6 +1,7 @@
 //! Dense models by tables of coefficients: the accelerations are a matrix-vector product over the distinct candidate
-//! terms. The columns of their Jacobian are constants for variables that occur only linearly; in the others,
-//! derivatives of sines and cosines of variables are tables whose columns are scaled, the rest a matrix-vector product.
+//! terms. The columns of their Jacobian are constants for variables that occur only linearly. In the others,
+//! derivatives of sines and cosines of variables are tables whose columns are scaled; the rest is a matrix-vector
+//! product.
 
 use super::*;
 
@@ -54,7 +55,7 @@ fn angle_of(pool: &ExprPool, expr: ExprId) -> Option<(Function, SymbolId)> {
     }
 }
 
-/// The Jacobian of equations, divided into what has a form of its own.
+/// The Jacobian of equations, divided into parts with a form of their own.
 pub(super) struct DenseJacobian {
     curved: Vec<SymbolId>,
     linear: Vec<SymbolId>, // variables that occur only linearly
@@ -195,11 +196,11 @@ pub enum Form {
     Tables,
 }
 
-/// Least number of coefficients for which loops are worth their overhead.
+/// Least number of coefficients for which loops are faster in spite of their overhead.
 const FEWEST_COEFFICIENTS: usize = 120;
 
-/// Least share of a table that is not zero: a vectorised loop works on four numbers at once, so that even a half-empty
-/// table is faster than straight-line code, which also has to be fetched and decoded.
+/// Least share of a table that is not zero. A vectorised loop works on four numbers at once, and straight-line code
+/// also has to be fetched and decoded. Therefore even a half-empty table is faster than straight-line code.
 const LEAST_FILL: f64 = 0.45;
 
 impl Form {

@@ -8,7 +8,7 @@ use super::*;
 /// Why a program could not be made from a model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LowerError {
-    /// The model lacks what the program needs, or has no such phase.
+    /// The model lacks a part that the program needs, or has no such phase.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// A coefficient is too large once folded with the numbers of its term.
@@ -17,7 +17,7 @@ pub enum LowerError {
         phase: String,
         /// Row of the equations, from 1.
         output: usize,
-        /// What the coefficient became.
+        /// The resulting coefficient.
         value: f64,
     },
     /// The program breaks one of its promises.
@@ -199,7 +199,8 @@ fn values(lowering: &mut ExpressionLowering, sums: &[Nested]) -> Vec<ValueId> {
 }
 
 /// The program of one fourth-order Runge-Kutta step of `d/dt (z, dz) = (dz, ddz)` over `h` seconds with constant
-/// `u_lat`, in four calls of the accelerations: inputs `z`, `dz`, `u_lat`, `h`; outputs `z`, `dz` after it.
+/// `u_lat`, in four calls of the accelerations. Inputs are `z`, `dz`, `u_lat`, `h`; outputs are `z`, `dz` after the
+/// step.
 pub fn rk4_step(system: &Equations<'_>, phase: usize, form: Form) -> Result<Program> {
     let accelerations = dynamics(system, phase, form)?;
     let d = system.latent_dim();

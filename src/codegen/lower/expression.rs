@@ -1,4 +1,4 @@
-//! Expressions to values: what is shared, how powers and functions are computed.
+//! From expressions to values: shared parts, and the computation of powers and functions.
 
 use super::*;
 

@@ -8,7 +8,7 @@
 use super::number::Number;
 use super::*;
 
-/// A map between robot coordinates (SI units) and latent ones; velocities take no bias.
+/// A map between robot coordinates (SI units) and latent ones; the bias is not added to velocities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Map {
     /// `z = W_e (s_x x) + b_e`
@@ -119,7 +119,7 @@ pub(super) fn lower(map: Map, model: &ReducedModel) -> Result<Program> {
     };
     let mut builder = ProgramBuilder::new(name);
     let point = builder.input(at, factors.len());
-    // What the Jacobian at the point is multiplied with.
+    // The vector that the Jacobian at the point multiplies.
     let given = match map {
         Map::Encode | Map::Decode => Vec::new(),
         Map::EncodeVelocity | Map::DecodeVelocity | Map::ProjectInput => {
@@ -172,7 +172,7 @@ type Layer<'b> = Vec<Number<'b>>;
 struct Network<'b> {
     sheet: &'b Sheet<'b>,
     map: &'b StateMap,
-    /// What the map's inputs are multiplied by, as part of the first layer.
+    /// Factors of the map's inputs, as part of the first layer.
     factors: DVector<f64>,
 }
 

@@ -1,8 +1,8 @@
 //! Sums of products in nested form: `a x y + b x z^2` becomes `x (a y + b z^2)`, Horner's rule for several variables.
 //!
-//! Taking a common factor out of products that only one sum uses saves a multiplication each and costs one for the
-//! group. A product of many sums is computed once for all and stays. What a factor was taken out of is often needed
-//! again, as the derivative of the sum by that factor.
+//! Moving a common factor out of products that only one sum uses saves a multiplication each and costs one for the
+//! group. A product of many sums is computed once for all and stays. The remaining sum is often needed again, as the
+//! derivative of the sum by that factor.
 
 use super::*;
 use crate::symbolic::Number;
@@ -17,9 +17,9 @@ pub(super) struct Nested {
 
 pub(super) struct Group {
     pub factor: ExprId,
-    /// What it multiplies and does not contain it: the derivative of these terms by the factor.
+    /// Its cofactor without the factor: the derivative of these terms by the factor.
     pub single: Combination,
-    /// What it multiplies and contains it again.
+    /// Its cofactor with the factor again.
     pub repeated: Combination,
 }
 
@@ -34,7 +34,7 @@ impl Nested {
         self.groups.iter().position(is_part)
     }
 
-    /// All expressions that are multiplied by a coefficient or taken out.
+    /// All expressions that are multiplied by a coefficient or are factors of a group.
     pub(crate) fn expressions(&self) -> impl Iterator<Item = ExprId> + '_ {
         let sums = self.groups.iter().flat_map(|g| [&g.single, &g.repeated]);
         let factors = self.groups.iter().map(|group| group.factor);
@@ -58,7 +58,7 @@ struct Quotient {
 }
 
 impl Demand {
-    /// Counts the products of all sums, and those that remain when a factor is taken out.
+    /// Counts the products of all sums, and those that remain when a factor is moved out.
     pub(crate) fn new<'a>(
         pool: &mut ExprPool,
         sums: impl Iterator<Item = &'a Combination>,
@@ -97,7 +97,7 @@ impl Demand {
         quotients
     }
 
-    /// Takes factors out of a sum: first the one whose group saves most, while one saves more than it costs.
+    /// Moves factors out of a sum: first the one whose group saves most, as long as one saves more than it costs.
     pub(crate) fn nest(&self, pool: &mut ExprPool, sum: &Combination) -> Nested {
         let items = sum.items.iter();
         let mut items: Vec<((f64, ExprId), Vec<Quotient>)> = items
@@ -146,7 +146,7 @@ impl Demand {
     }
 }
 
-/// Base and exponent of a factor that can be taken out, once or as often as its exponent says.
+/// Base and exponent of a factor that can be moved out, up to as many times as its exponent.
 fn base_of(pool: &ExprPool, factor: ExprId) -> Option<(ExprId, i64)> {
     match pool.node(factor) {
         Node::Power(base, exponent) => {
@@ -166,7 +166,7 @@ fn n_factors(pool: &ExprPool, expr: ExprId) -> usize {
     counts.fold(0, usize::saturating_add)
 }
 
-/// What remains of a product without each distinct factor; nothing unless all exponents are positive integers.
+/// The quotients of a product by each distinct factor; empty unless all exponents are positive integers.
 fn quotients(pool: &mut ExprPool, expr: ExprId) -> Vec<Quotient> {
     let factors = pool.factors_of(expr).to_vec();
     let bases: Option<Vec<(ExprId, i64)>> = factors.iter().map(|&f| base_of(pool, f)).collect();

@@ -1,15 +1,16 @@
 //! Large cubic polynomials with their Jacobian: sums of vectors, in which each lane belongs to an equation.
 //!
-//! A product of up to three factors is a path to its coefficients, and the sum of a path is these plus each next factor
-//! times the sum of the longer path: `s_ij = a_ij + sum_k x_k a_ijk`, `s_i = a_i + sum_j x_j s_ij`. That of the empty path
-//! is the value, and `s_k + sum_i x_i s_ik + sum_ij x_i x_j a_ijk` its derivative: two products per coefficient.
+//! A product of up to three factors is a path to its coefficients. The sum of a path is these plus each next factor
+//! times the sum of the longer path: `s_ij = a_ij + sum_k x_k a_ijk`, `s_i = a_i + sum_j x_j s_ij`. The sum of the
+//! empty path is the value, and `s_k + sum_i x_i s_ik + sum_ij x_i x_j a_ijk` its derivative: two products per
+//! coefficient.
 
 use super::*;
 
-/// Fewest coefficients of products of three factors for which vectors are worth their zeros.
+/// Fewest coefficients of products of three factors for which vectors are faster in spite of their zeros.
 const FEWEST_CUBIC: usize = 120;
 
-/// A coefficient per lane, by the positions of factors, each as often as its exponent says.
+/// A coefficient per lane, by the positions of factors, each repeated by its exponent.
 type Paths = BTreeMap<Vec<usize>, [f64; LANES]>;
 
 pub(super) struct Polynomials {

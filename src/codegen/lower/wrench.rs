@@ -9,26 +9,27 @@ use crate::robot::{
 };
 
 /// `u = [net; F; M]` with the torques at the links `net` and the force and moment of the feet on the ground, by the
-/// model's rule (equations 4 to 7, 22, 23): inputs `x` and `dx` (18 robot coordinates and their velocities), `tau`
-/// (motor torques, 12, N m), `feet` (4, order of [`Leg::ALL`]: 1 on the ground, 0 in the air); output `u` (18, N m and
-/// N). `None` for a model that is not over the 18 coordinates of a known robot.
+/// model's rule (equations 4 to 7, 22, 23). Inputs are `x` and `dx` (18 robot coordinates and their velocities), `tau`
+/// (motor torques, 12, N m) and `feet` (4, order of [`Leg::ALL`]: 1 on the ground, 0 in the air). Output is `u` (18, N
+/// m and N). `None` for a model that is not over the 18 coordinates of a known robot.
 ///
-/// `net` is `tau` less viscous and dry friction, without the inertia of motors and legs: accelerations are not measured. A
-/// foot's force and moment are multiplied with its element of `feet`; at 0 they are zero in every posture.
+/// `net` is `tau` minus viscous and dry friction, without the inertia of motors and legs, because accelerations are not
+/// measured. A foot's force and moment are multiplied with its element of `feet`; at 0 they are zero in every posture.
 pub fn generalised_input(model: &ReducedModel) -> Result<Option<Program>> {
     rule_of(model).map(|rule| input_of(&rule)).transpose()
 }
 
-/// Torques of the motors behind torques at the links, `tau = net + b dq + c tanh(dq / v) + I ddq`: inputs `dx` and
-/// `ddx` (velocities and accelerations of the 18 robot coordinates, of which the joints count), `net` (12, N m); output
-/// `tau` (12, N m). `None` as for [`generalised_input`], of which it is the inverse at the joints for `ddx = 0`.
+/// Torques of the motors behind torques at the links, `tau = net + b dq + c tanh(dq / v) + I ddq`. Inputs are `dx` and
+/// `ddx` (velocities and accelerations of the 18 robot coordinates, of which only the joints are used) and `net` (12, N
+/// m); output is `tau` (12, N m). `None` as for [`generalised_input`], of which it is the inverse at the joints for
+/// `ddx = 0`.
 pub fn actuator_torque(model: &ReducedModel) -> Result<Option<Program>> {
     rule_of(model).map(|rule| torque_of(&rule)).transpose()
 }
 
-/// Torques that carry and move the links of the legs on the ground ([`InputRule::leg_torques`]): inputs `x`, `dx`, `ddx`
-/// (18 robot coordinates, their velocities and accelerations) and `feet` (4, as of [`generalised_input`]); output `own`
-/// (12, N m). `None` as for [`generalised_input`], and for a model whose rule does not subtract them.
+/// Torques that carry and move the links of the legs on the ground ([`InputRule::leg_torques`]). Inputs are `x`, `dx`,
+/// `ddx` (18 robot coordinates, their velocities and accelerations) and `feet` (4, as of [`generalised_input`]); output
+/// is `own` (12, N m). `None` as for [`generalised_input`], and for a model whose rule does not subtract them.
 pub fn leg_torque(model: &ReducedModel) -> Result<Option<Program>> {
     let rule = rule_of(model).filter(|rule| rule.legs().is_some());
     rule.map(|rule| leg_torque_of(&rule)).transpose()
@@ -198,7 +199,7 @@ fn in_world<'b>(
 }
 
 /// Force and moment of one leg's torques in axes parallel to the body's, at sines and cosines of its angles, of which
-/// the third is that of the calf; the arm of the moment is from a point relative to the hip's origin.
+/// the third is that of the calf. The arm of the moment is from a point relative to the hip's origin.
 fn leg_wrench<'b>(
     leg: &LegShape,
     arm_from: [f64; 3],

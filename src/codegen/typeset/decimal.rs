@@ -26,6 +26,11 @@ pub struct Decimal {
     pub(crate) exponent: Option<i32>,
 }
 
+impl Rounding {
+    /// Of equations in physical units where no other is chosen; the default is that of the paper's equations (25), (26).
+    pub const PHYSICAL: Self = Self::Significant(3);
+}
+
 const MOST_DIGITS: usize = 40;
 pub(super) const LEAST_DECIMALS: usize = 2; // fewest after the point of `Rounding::Adaptive`
 const MOST_DECIMALS: usize = 6; // beyond, it turns to powers of ten

@@ -13,6 +13,7 @@ pub mod mathml;
 mod robot;
 mod symbols;
 mod table;
+mod text;
 pub(crate) mod tree;
 pub mod words;
 
@@ -22,7 +23,8 @@ pub use equations::{Equation, EquationSystem, Typeset};
 pub(crate) use robot::RobotTypeset;
 pub(crate) use symbols::Emitted;
 pub use symbols::{Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError};
-pub use table::{Cell, Table, rounded, rounded_up, significant};
+pub use table::{COLUMNS, Cell, Table, rounded, rounded_up, significant, wrapped};
+pub use text::{TextOptions, equations_text, model_text};
 pub(crate) use tree::{EQUALS, Glyph, Math, Signed, Symbol, break_lines, symbol_width, width};
 
 use std::fmt;
@@ -37,5 +39,5 @@ use words::{Page, Spelling, code_point, rendered};
 
 use crate::equations::{Equations, Unit};
 use crate::files::{EmittedFile, is_invisible};
-use crate::model::{AffineMap, FeetRule, LatentVariable, MAX_LATENT_DIM};
+use crate::model::{AffineMap, FeetRule, LatentVariable, MAX_LATENT_DIM, ReducedModel};
 use crate::symbolic::{ExprId, ExprPool, Function, Node, Number, SymbolId};

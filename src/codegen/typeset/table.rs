@@ -36,15 +36,24 @@ pub fn rounded_up(value: f64, digits: usize) -> f64 {
     rounded(nearest + 10f64.powi(place), digits)
 }
 
-/// Text of one cell; a float has four significant digits, a value that is absent is `-`.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Cell(String);
+/// One cell. A number has as many decimals as the other numbers of its column; a value that is absent is `-`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    Text(String),
+    Number(f64),
+}
+
+impl Default for Cell {
+    fn default() -> Self {
+        Self::Text(String::new())
+    }
+}
 
 macro_rules! cells {
     ($($shown:ty),*) => {$(
         impl From<$shown> for Cell {
             fn from(shown: $shown) -> Self {
-                Self(shown.to_string())
+                Self::Text(shown.to_string())
             }
         }
     )*};
@@ -53,7 +62,7 @@ cells!(String, &str, &String, usize);
 
 impl From<f64> for Cell {
     fn from(value: f64) -> Self {
-        Self(significant(value))
+        Self::Number(value)
     }
 }
 
@@ -63,12 +72,27 @@ impl<T: Into<Cell>> From<Option<T>> for Cell {
     }
 }
 
+const MOST_IN_COLUMN: i32 = 6; // digits of a number whose column has decimals in common
+
+/// Decimals with which the largest of these numbers has three significant digits and the smallest two; `None` where
+/// that needs too many digits, so that each number has its own.
+fn common_decimals(numbers: impl Iterator<Item = f64>) -> Option<usize> {
+    let sizes = numbers.filter(|value| value.is_finite() && *value != 0.0);
+    let places = sizes.map(|value| value.abs().log10().floor() as i32);
+    let (least, most) = places.fold((i32::MAX, i32::MIN), |(least, most), place| {
+        (least.min(place), most.max(place))
+    });
+    let decimals = (2 - most).max(1 - least.min(1)).max(0);
+    let is_short = least <= most && most.max(0) + 1 + decimals <= MOST_IN_COLUMN;
+    is_short.then_some(decimals as usize)
+}
+
 /// A table with named columns; the first column names the rows. `Display` aligns it for a terminal.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
     pub caption: String,
     columns: Vec<(String, String)>,
-    pub rows: Vec<Vec<String>>,
+    pub rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
@@ -93,8 +117,7 @@ impl Table {
 
     /// Adds a row; missing cells stay empty.
     pub fn row<T: Into<Cell>>(&mut self, cells: impl IntoIterator<Item = T>) -> &mut Self {
-        let cells = cells.into_iter().map(|cell| cell.into().0);
-        self.rows.push(cells.collect());
+        self.rows.push(cells.into_iter().map(Into::into).collect());
         self
     }
 
@@ -116,7 +139,7 @@ impl Table {
         }
         self.columns.push((name.to_owned(), unit.to_owned()));
         for (row, cell) in self.rows.iter_mut().zip(cells) {
-            row.push(cell.0);
+            row.push(cell);
         }
     }
 
@@ -131,8 +154,9 @@ impl Table {
     /// The same cells with a row for each column but the first, whose cells become the titles.
     pub fn transposed(&self) -> Self {
         let header = self.header();
+        let rows = self.shown();
         let mut columns = (0..header.len()).map(|column| {
-            let lines = std::iter::once(&header).chain(&self.rows);
+            let lines = std::iter::once(&header).chain(&rows);
             lines.map(move |line| line.get(column).cloned().unwrap_or_default())
         });
         let titles = columns.next().into_iter().flatten();
@@ -151,6 +175,28 @@ impl Table {
         self.columns.iter().map(title).collect()
     }
 
+    /// The text of each cell.
+    pub(super) fn shown(&self) -> Vec<Vec<String>> {
+        let decimals = (0..self.columns.len()).map(|column| {
+            let cells = self.rows.iter().filter_map(|row| row.get(column));
+            common_decimals(cells.filter_map(|cell| match cell {
+                Cell::Number(value) => Some(*value),
+                Cell::Text(_) => None,
+            }))
+        });
+        let decimals: Vec<Option<usize>> = decimals.collect();
+        let text = |(column, cell): (usize, &Cell)| match (cell, decimals.get(column)) {
+            (Cell::Text(text), _) => text.clone(),
+            (Cell::Number(value), Some(Some(decimals))) if value.is_finite() && *value != 0.0 => {
+                format!("{value:.decimals$}")
+            }
+            (Cell::Number(value), _) => significant(*value),
+        };
+        let rows = self.rows.iter();
+        rows.map(|row| row.iter().enumerate().map(text).collect())
+            .collect()
+    }
+
     /// A Markdown table; characters that would become markup are escaped.
     pub fn markdown(&self) -> String {
         let line = |row: &[String]| {
@@ -158,7 +204,7 @@ impl Table {
             format!("| {} |\n", cells.join(" | "))
         };
         let rule = "---|".repeat(self.columns.len());
-        let rows: String = self.rows.iter().map(|row| line(row)).collect();
+        let rows: String = self.shown().iter().map(|row| line(row)).collect();
         format!("{}|{rule}\n{rows}", line(&self.header()))
     }
 
@@ -170,15 +216,20 @@ impl Table {
 
     /// Comma-separated values: names of the columns, then the rows; cells with commas, quotes or line ends are quoted.
     pub fn csv(&self) -> String {
-        let quoted = |cell: &String| match cell.contains([',', '"', '\n']) {
+        let quoted = |cell: &str| match cell.contains([',', '"', '\n']) {
             true => format!("\"{}\"", cell.replace('"', "\"\"")),
-            false => cell.clone(),
+            false => cell.to_owned(),
         };
-        let names = self.columns.iter().map(|(name, _)| name.clone()).collect();
-        std::iter::once(&names)
-            .chain(&self.rows)
-            .map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n")
-            .collect()
+        let line = |cells: Vec<String>| cells.join(",") + "\n";
+        let names = self.columns.iter().map(|(name, _)| quoted(name));
+        let rows = self.rows.iter().map(|row| {
+            let cells = row.iter().map(|cell| match cell {
+                Cell::Text(text) => quoted(text),
+                Cell::Number(value) => significant(*value),
+            });
+            line(cells.collect())
+        });
+        std::iter::once(line(names.collect())).chain(rows).collect()
     }
 }
 
@@ -217,30 +268,120 @@ fn escaped(cell: &str) -> String {
     cell.chars().map(escape).collect()
 }
 
+/// Longest line on a terminal, in characters.
+pub const COLUMNS: usize = 100;
+/// Widths to which titles are wrapped, one after the other, until a table fits.
+const TITLE_WIDTHS: [usize; 4] = [20, 14, 10, 7];
+
 impl fmt::Display for Table {
-    /// Columns aligned under their titles: the first to the left, the rest to the right.
+    /// Columns aligned under their titles: the first to the left, the rest to the right. Where a line would be too
+    /// long, titles are wrapped, then columns follow in a second block that repeats the first column.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let header = self.header();
-        let width = |column: usize| {
-            let cells = std::iter::once(&header).chain(&self.rows);
-            let widths = cells.filter_map(|row| Some(row.get(column)?.chars().count()));
-            widths.max().unwrap_or(0)
+        let (header, rows) = (self.header(), self.shown());
+        let length = |text: &str| text.chars().count();
+        let of_cells = |column: usize| {
+            let cells = rows.iter().filter_map(|row| row.get(column));
+            cells.map(|cell| length(cell)).max().unwrap_or(0)
         };
-        let widths: Vec<usize> = (0..header.len()).map(width).collect();
-        let line = |f: &mut fmt::Formatter<'_>, row: &[String]| {
-            let mut text = String::new();
-            for (column, width) in widths.iter().enumerate() {
-                let cell = row.get(column).map_or("", String::as_str);
-                match column {
-                    0 => text.push_str(&format!("  {cell:<width$}")),
-                    _ => text.push_str(&format!("  {cell:>width$}")),
-                }
+        let titles_of = |width: usize| -> Vec<Vec<String>> {
+            let titles = header.iter().enumerate();
+            titles
+                .map(|(column, title)| wrapped(title, width.max(of_cells(column))))
+                .collect()
+        };
+        let widths_of = |titles: &[Vec<String>]| -> Vec<usize> {
+            let widths = titles.iter().enumerate().map(|(column, lines)| {
+                let title = lines.iter().map(|line| length(line)).max();
+                title.unwrap_or(0).max(of_cells(column))
+            });
+            widths.collect()
+        };
+        let fits =
+            |widths: &[usize]| widths.iter().map(|width| 2 + width).sum::<usize>() <= COLUMNS;
+        let mut titles = titles_of(usize::MAX);
+        for width in TITLE_WIDTHS {
+            if fits(&widths_of(&titles)) {
+                break;
             }
-            writeln!(f, "{}", text.trim_end())
-        };
-        line(f, &header)?;
-        let rule: Vec<String> = widths.iter().map(|&width| "-".repeat(width)).collect();
-        line(f, &rule)?;
-        self.rows.iter().try_for_each(|row| line(f, row))
+            titles = titles_of(width);
+        }
+        let widths = widths_of(&titles);
+        let blocks = blocks(&widths);
+        for (place, block) in blocks.iter().enumerate() {
+            if place > 0 {
+                writeln!(f)?;
+            }
+            let height = (block.iter().map(|&column| titles[column].len())).max();
+            for line in (0..height.unwrap_or(0)).rev() {
+                // Titles stand on the rule below.
+                let part = |&column: &usize| {
+                    let lines: &Vec<String> = &titles[column];
+                    let line = lines.len().checked_sub(line + 1);
+                    line.map_or("", |line| &lines[line][..])
+                };
+                write_line(f, block, &widths, block.iter().map(part))?;
+            }
+            let rule: Vec<String> = block.iter().map(|&at| "-".repeat(widths[at])).collect();
+            write_line(f, block, &widths, rule.iter().map(String::as_str))?;
+            for row in &rows {
+                let cell = |&column: &usize| row.get(column).map_or("", String::as_str);
+                write_line(f, block, &widths, block.iter().map(cell))?;
+            }
+        }
+        Ok(())
     }
+}
+
+fn write_line<'a>(
+    f: &mut fmt::Formatter<'_>,
+    block: &[usize],
+    widths: &[usize],
+    cells: impl Iterator<Item = &'a str>,
+) -> fmt::Result {
+    let mut text = String::new();
+    for (&column, cell) in block.iter().zip(cells) {
+        let width = widths[column];
+        text += &match column {
+            0 => format!("  {cell:<width$}"),
+            _ => format!("  {cell:>width$}"),
+        };
+    }
+    writeln!(f, "{}", text.trim_end())
+}
+
+/// Text on lines of at most `width` characters, or those of its longest word.
+pub fn wrapped(title: &str, width: usize) -> Vec<String> {
+    let words = title.split(' ');
+    let longest = words.clone().map(|word| word.chars().count()).max();
+    let width = width.max(longest.unwrap_or(0));
+    let mut lines: Vec<String> = Vec::new();
+    for word in words {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                *line += " ";
+                *line += word;
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// Columns of blocks that fit on a line, each with the first.
+fn blocks(widths: &[usize]) -> Vec<Vec<usize>> {
+    let mut blocks: Vec<Vec<usize>> = Vec::new();
+    let mut used = 0;
+    for column in 1..widths.len() {
+        let needed = 2 + widths[column];
+        if blocks.is_empty() || used + needed > COLUMNS {
+            blocks.push(vec![0]);
+            used = 2 + widths[0];
+        }
+        used += needed;
+        blocks.last_mut().expect("begun above").push(column);
+    }
+    if blocks.is_empty() && !widths.is_empty() {
+        blocks.push(vec![0]);
+    }
+    blocks
 }

@@ -10,7 +10,7 @@ pub enum Lift {
     Consistent = 1,
 }
 
-/// About what trajectory the dynamics are linearised, numbered as [`Lift`].
+/// Trajectory about which the dynamics are linearised, numbered as [`Lift`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Linearisation {
     /// The reference: each stage is linearised once and reused while the horizon passes over it.
@@ -19,7 +19,7 @@ pub enum Linearisation {
     LastPlan = 1,
 }
 
-/// What stands for the dynamics of the reference itself.
+/// Source of the dynamics along the reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Drift {
     /// The reference's own finite differences if it has an input, its own or an estimate, otherwise the model.
@@ -30,10 +30,10 @@ pub enum Drift {
     Model,
 }
 
-/// What stands for the input of a reference that comes without one.
+/// Input of a reference that comes without one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MissingInput {
-    /// What the model finds behind the reference's accelerations, see `estimate`.
+    /// Estimated from the reference's accelerations and the model, see `estimate`.
     Estimate,
     /// The mean training input of each phase: the optimisation has to find the rest.
     Mean,
@@ -48,13 +48,14 @@ pub enum RowSelection {
     All,
 }
 
-/// What solves the quadratic program of a step, numbered as [`Lift`].
+/// Solver of the quadratic program of a step, numbered as [`Lift`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Solver {
     /// clarabel, for all rows and cones.
     Clarabel = 0,
-    /// The structured [`solver`](crate::solver), for at most [`MAX_STRUCTURED_DIM`](super::structured::MAX_STRUCTURED_DIM) latent
-    /// coordinates and with friction pyramids inside the cones.
+    /// The structured [`solver`](crate::solver). It supports at most
+    /// [`MAX_STRUCTURED_DIM`](super::structured::MAX_STRUCTURED_DIM) latent coordinates and replaces friction cones by
+    /// the pyramids inside them.
     Riccati = 1,
 }
 
@@ -63,11 +64,12 @@ pub enum Solver {
 pub enum Legs {
     /// Decoded from the latent state: for models that represent the legs.
     Decoded = 0,
-    /// Those of the reference: joint targets, the losses along them, and the torques that the consistent lift stays near.
+    /// Those of the reference: joint targets, the joint losses along them, and the torques that the consistent lift
+    /// prefers.
     Reference = 1,
 }
 
-/// What follows when the time of the reference is over, numbered as [`Lift`].
+/// Behaviour after the end of the reference, numbered as [`Lift`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum AfterEnd {
     /// The last sample is held.

@@ -1,6 +1,6 @@
-//! The result of a control step, and that of one without a trusted plan: first the last good plan, shifted, for as many
-//! stages as the settings allow; then a hold, in which the posture stays, the torque fades, the joints are damped. C is
-//! made of [`Memory`].
+//! The result of a control step, also of a step without a trusted plan. Such a step uses the last good plan, shifted,
+//! for as many stages as the settings allow. After that the posture is held, the torques fade and the joints are
+//! damped. [`Memory`] is translated to C.
 
 use super::control_model::{clamped_joint, clamped_torque};
 use super::controller::Controller;
@@ -62,7 +62,7 @@ statuses! {
     MeasurementJump = 14, "measurement_jump",
         "measurement jump: a measurement far from the prediction; fallback";
     LiftFailed = 15, "lift_failed", "lift failed: no torques for the latent input; fallback";
-    Ended = 16, "ended", "ended: the reference is over, as settings say torques fade";
+    Ended = 16, "ended", "ended: the reference is over; torques fade as the settings define";
     Damped = 17, "damped", "damped: joints are damped, as requested or before a start";
     Tilt = 20, "tilt", "tilt: roll or pitch far from the reference's, or near upside down; damping until reset";
     JointBeyond = 21, "joint_beyond", "joint beyond: a joint beyond its limits; damping until reset";
@@ -97,8 +97,8 @@ impl Status {
         (Self::Solved.code()..Self::Inaccurate.code()).contains(&self.code())
     }
 
-    /// Whether nothing was planned, or for unknown contacts, which are usual between two phases of a walk. Jumps of measurements
-    /// have a patience of their own.
+    /// Whether the step has no plan, or with decoded legs a plan for unknown contacts. A walk with the reference's legs
+    /// often has unknown contacts between two phases. Refused jumps of measurements are counted separately.
     fn is_poor(self, legs: Legs) -> bool {
         let is_lost = self == Self::ContactUnknown && legs == Legs::Decoded;
         let is_poor = !self.has_plan() || is_lost;
@@ -145,12 +145,12 @@ impl Source {
     }
 }
 
-/// What a robot's low-level interface takes, and how it came about.
+/// A command for the low-level interface of a robot, with its status and source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Command {
-    /// Feed-forward torques, N m, within the robot's limits whatever happened.
+    /// Feed-forward torques, N m, always within the robot's limits.
     pub torque_nm: [f64; JOINT_DIM],
-    /// Joint losses of the plan, N m: `torque_nm` less them reaches the links; zero in a hold or without actuators.
+    /// Joint losses of the plan, N m: the links receive `torque_nm` minus these. Zero in a hold or without actuators.
     pub losses_nm: [f64; JOINT_DIM],
     /// Desired joint positions, rad, within the robot's limits: the decoded reference at 0.9 of the stage. The plan
     /// begins at the measurement, so its own posture would leave a joint PD nothing to correct.
@@ -173,8 +173,8 @@ pub struct Command {
     pub solve_us: f64,
     /// Largest violation of a joint limit in the plan, in half ranges of the joint.
     pub slack: f64,
-    /// `|F_lift − G τ| / |F_lift|`: how far the force that the latent input was lifted to is from the force that the
-    /// commanded torques produce after the losses; none in flight or without a lifted force.
+    /// `|F_lift − G τ| / |F_lift|`: the relative difference between two body forces. `F_lift` is the lifted latent
+    /// input, `G τ` the force of the commanded torques after losses. None in flight or without a lifted force.
     pub inconsistency: Option<f64>,
 }
 
@@ -225,7 +225,8 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// Takes the joint velocities of a measurement, if no number of it is undefined or absurd; whether none is.
+    /// Stores the joint velocities of a measurement if all its numbers are finite and plausible; returns whether they
+    /// are.
     pub(super) fn accepts(&mut self, time_s: f64, x: &[Real], dx: &[Real]) -> bool {
         let mut is_accepted = time_s.is_finite();
         for i in 0..18 {
@@ -285,7 +286,8 @@ impl Memory {
         if is_known { passed_s } else { step_s }
     }
 
-    /// Writes what holds the posture, without one the middle of the ranges: fading torques that damp the joints.
+    /// Writes a hold: the last posture, or the middle of the joint ranges if there is none, and fading torques with
+    /// damping.
     pub(super) fn hold(
         &mut self,
         fallback: &FallbackSettings,

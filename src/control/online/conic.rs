@@ -202,7 +202,8 @@ pub(super) struct Start {
 pub(super) trait StageSolver: Debug + Send {
     fn forget(&mut self) {}
 
-    /// Computes ahead what does not depend on the start, for stages moved by `shift` and those that are new.
+    /// Computes in advance everything that does not depend on the start, for stages moved by `shift` and for new
+    /// stages.
     fn prepare(&mut self, _stages: &[StageQp], _shift: usize, _is_new: &[bool]) {}
 
     /// Solves the prepared program; how it ended, and iterations.

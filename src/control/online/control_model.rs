@@ -1,4 +1,4 @@
-//! The numbers of one model on one robot: all that the controller needs besides the latent dynamics.
+//! The parameters of one model on one robot that the controller needs in addition to the latent dynamics.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::robot::{ContactFlags, InputRule, JOINT_DIM, Robot, STATE_DIM, joint_l
 /// Maps, limits and input statistics of a model on its robot, scale factors multiplied in: SI units on its side.
 #[derive(Debug, Clone)]
 pub struct ControlModel {
-    /// The robot, what its joints take of the motors' torques, and the axes of force and moment.
+    /// The robot, the losses of its joints, and the axes of force and moment.
     pub input_rule: InputRule,
     /// `W_e s_x`, `latent_dim × 18`.
     pub encoder: DMatrix<f64>,
@@ -35,7 +35,7 @@ pub struct ControlModel {
     pub nonlinear: Option<Arc<dyn NonlinearMaps>>,
 }
 
-/// What the training inputs of one phase looked like.
+/// Statistics of the training inputs of one phase.
 #[derive(Debug, Clone)]
 pub struct ControlPhase {
     /// Name of the phase.
@@ -46,7 +46,7 @@ pub struct ControlPhase {
     pub latent_mean: DVector<f64>,
     /// Lower Cholesky factor of the latent input's covariance, `latent_dim` square.
     pub latent_root: DMatrix<f64>,
-    /// What the latent state says of the latent input, if the model knows.
+    /// Distribution of the latent input given the latent state, if the model has one.
     pub given_state: Option<InputGivenState>,
     /// Mean torques, N m.
     pub torque_mean: SVector<f64, JOINT_DIM>,
@@ -103,7 +103,8 @@ impl ControlModel {
         })
     }
 
-    /// Takes the statistics of the training inputs projected at `x`, if maps depend on it with full rank there.
+    /// Replaces the phases' statistics by those of the training inputs projected at `x`, if the maps depend on `x` and
+    /// have full rank there.
     pub(super) fn take_statistics_at(&mut self, x: &[f64]) {
         if let Some(phases) = self.nonlinear.as_ref().and_then(|maps| maps.phases(x)) {
             self.phases = phases;
@@ -189,10 +190,13 @@ impl ControlModel {
         std::array::from_fn(|foot| bits >> foot & 1 == 1)
     }
 
-    /// The part of the motors' torques that does not enter the input, N m, over a time `step_s` of a phase from latent state
-    /// `start` to `end` (both `(z, dz)`), by the rule of the inputs: losses of the joints at the mean decoded velocities,
-    /// with their difference as acceleration, at most the torque limit; and the torques that carry and move the links
-    /// of legs with their `feet` on the ground, in the middle. Zero without actuators.
+    /// The part of the motors' torques that does not enter the input, N m, over a time `step_s` of a phase. `start` and
+    /// `end` are latent states `(z, dz)`. The part has two summands, by the rule of the inputs:
+    /// - the losses of the joints, at most the torque limit, at the mean decoded velocities and with their difference
+    ///   as acceleration;
+    /// - the torques that carry and move the links of legs with their `feet` on the ground, at the middle state.
+    ///
+    /// Zero without actuators.
     pub fn planned_losses(
         &self,
         (phase, feet): (usize, ContactFlags),
@@ -258,7 +262,7 @@ impl ControlModel {
         std::array::from_fn(|input| row_product(&self.lift, input, u_lat))
     }
 
-    /// The torques within the robot's limits that are nearest to these; zero for what is not a number.
+    /// The nearest torques within the robot's limits; zero for NaN.
     pub fn clamp_torque(&self, torque_nm: [f64; JOINT_DIM]) -> [f64; JOINT_DIM] {
         let limits = self.robot().torque_limit_nm();
         std::array::from_fn(|joint| clamped_torque(torque_nm[joint], limits[joint]))
@@ -271,7 +275,7 @@ impl ControlModel {
     }
 }
 
-/// The torque within a limit that is nearest to this one; zero for what is not a number.
+/// The nearest torque within a limit; zero for NaN.
 pub(super) fn clamped_torque(torque: Real, limit: Real) -> Real {
     if torque >= -limit {
         if torque > limit { limit } else { torque }
@@ -282,12 +286,12 @@ pub(super) fn clamped_torque(torque: Real, limit: Real) -> Real {
     }
 }
 
-/// The position within the limits that is nearest to this one; the lower limit for what is not a number.
+/// The nearest position within the limits; the lower limit for NaN.
 pub(super) fn clamped_joint(position: Real, lower: Real, upper: Real) -> Real {
     smaller(greater(position, lower), upper)
 }
 
-/// Loss of a joint over a time, N m, at the mean of its velocities at both ends with their difference as acceleration; at
+/// Loss of a joint, N m, over a time between two velocities: at their mean, with their difference as acceleration. At
 /// most the limit.
 fn planned_loss(of: &[Real; 3], before: Real, after: Real, step_s: Real, limit: Real) -> Real {
     let dq = 0.5 * (before + after);

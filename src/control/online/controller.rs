@@ -1,4 +1,4 @@
-//! The controller: from a measurement to a command, whatever happens.
+//! The controller: from a measurement to a command, in every case.
 
 use std::time::Instant;
 
@@ -23,14 +23,16 @@ use super::trajectory::Trajectory;
 use super::walk::Walk;
 use crate::robot::{ContactFlags, JOINT_DIM, LEG_JOINT_DIM, Leg, Robot, STATE_DIM};
 
-/// Violation of a joint limit, in half ranges, from which a plan counts as softened: beyond what the rows that were
-/// left out may hide.
+/// Violation of a joint limit, in half ranges, above which a plan counts as softened. It is larger than the violation
+/// that omitted rows may hide.
 pub(super) const SOFTENED_FROM: Real = 1.05 * ROW_MARGIN;
 
-/// Latent model-predictive controller of one model on its robot, built once: [`Controller::set_reference`] gives it a
-/// trajectory, [`Controller::step_into`] turns each measurement into a [`Command`]. A step allocates nothing of its own
-/// and never fails: without a trusted plan the last good one is shifted and used for a few stages, then the posture is
-/// held with fading torques and damped joints until measurements make sense again. The status says why.
+/// Latent model-predictive controller of one model on its robot. It is built once: [`Controller::set_reference`] gives
+/// it a trajectory, [`Controller::step_into`] turns each measurement into a [`Command`].
+///
+/// A step allocates nothing of its own and never fails. Without a trusted plan it uses the last good one, shifted, for
+/// a few stages. After that it holds the posture with fading torques and damped joints until measurements are valid
+/// again. The status gives the reason.
 #[derive(Debug)]
 pub struct Controller {
     pub(super) plant: ControlModel,
@@ -49,10 +51,10 @@ pub struct Controller {
     /// Latent state of the posture that is commanded.
     pub(super) posture: Vec<f64>,
     pub(super) memory: Memory,
-    /// Latent state of the last measurement, also of one that was refused as a jump, and latent input of the last command.
+    /// Latent state of the last measurement, also of a refused jump, and latent input of the last command.
     pub(super) measured: Vec<f64>,
     pub(super) last_input: Vec<f64>,
-    /// What the plan's inputs are lifted for; none without a plan.
+    /// Stance for which the plan's inputs are lifted; none without a plan.
     pub(super) stance: Option<StanceState>,
     pub(super) effectiveness: Effectiveness,
     pub(super) supervisor: Supervisor,
@@ -119,7 +121,7 @@ impl Controller {
         self.local.as_ref().unwrap_or(&self.plant)
     }
 
-    /// Takes the maps at a state (18, SI units), as each measurement does; without full row rank the last ones stay.
+    /// Evaluates the maps at a state (18, SI units), as for each measurement; without full row rank the last ones stay.
     pub fn stand_at(&mut self, x: &[f64]) {
         if !self.plant.is_nonlinear() {
             return;
@@ -139,7 +141,7 @@ impl Controller {
         &self.settings
     }
 
-    /// The conic solver with the program of the last step, if that is what solves it.
+    /// The conic solver with the program of the last step, if the settings select it.
     pub fn solver(&self) -> Option<&QpSolver> {
         self.engine.conic()
     }
@@ -154,7 +156,8 @@ impl Controller {
         self.reference.as_ref()
     }
 
-    /// Takes a new trajectory and sets up the solver for the rows near it; a plan for an earlier one is forgotten.
+    /// Sets a new trajectory and prepares the solver for the constraint rows near it; a plan for an earlier one is
+    /// discarded.
     pub fn set_reference(&mut self, samples: ReferenceSamples<'_>) -> Result<(), ControlError> {
         let mut reference = Reference::new(&self.plant, samples, &self.settings)?;
         if self.plant.is_nonlinear() {
@@ -250,9 +253,10 @@ impl Controller {
         self.effectiveness = Effectiveness::full(self.plant.latent_dim());
     }
 
-    /// Prepares the step at `time_s`, with the contacts that the reference has at that time: stages and, with the Riccati
-    /// solver, gains. The command is the same to the bit either way, to rounding after a refused measurement or an early change
-    /// of feet. For times when nothing waits for a command; does nothing without a reference, or about the last plan.
+    /// Prepares the step at `time_s`, with the reference's contacts at that time: the stages and, with the Riccati
+    /// solver, the gains. The command is bit-identical with and without this call. After a refused measurement or an
+    /// early change of feet it is equal up to rounding. Call it when no command is due. Without a reference, or when
+    /// linearised about the last plan, it does nothing.
     pub fn prepare(&mut self, time_s: f64) {
         let Some(reference) = &self.reference else {
             return;

@@ -1,17 +1,16 @@
-//! How much of the commanded input arrives.
+//! Estimate of the share of the commanded input that acts on the robot.
 //!
-//! With weak motors or a payload velocities change by `γ B u` where the plan has `B u`, with `B` the change by the input
-//! over the time that has passed. The joint PD of the motors adds torques, whose latent input `p` follows from the
-//! measurements at both ends of that time. With `e = dz − dz_plan` and `φ = B (u + p)`, each velocity in standard
-//! deviations of the reference, a step on the ground says
-//!
+//! With weak motors or a payload, velocities change by `γ B u` instead of the planned `B u`. `B` is the change by the
+//! input over the time that has passed. The joint PD of the motors adds torques, whose latent input `p` follows from
+//! the measurements at both ends of that time. With `e = dz − dz_plan` and `φ = B (u + p)`, each velocity divided by
+//! its standard deviation over the reference, a step on the ground gives the value
 //! ```text
 //! γ = γ̂ (1 + φᵀ (e − B p) / φᵀ φ),
 //! ```
 //!
-//! and the estimate `γ̂` is the weighted mean of what steps said and of a one from before the motion. The weight of a
-//! step is `φᵀ φ` in units of the first step's, at most [`LARGEST_WEIGHT`], so that the thrust, where models err most,
-//! does not outweigh what came before; it fades by `exp(−age/T)`. Inputs are divided by `γ̂` before they are lifted.
+//! The estimate `γ̂` is the weighted mean of the values of all steps and of a prior value of one. The weight of a step
+//! is `φᵀ φ` relative to the first step's, at most [`LARGEST_WEIGHT`], so that the thrust, where models err most, does
+//! not dominate. Weights decay by `exp(−age/T)`. Inputs are divided by `γ̂` before they are lifted.
 
 use super::control_model::ControlModel;
 use super::controller::Measurement;
@@ -52,9 +51,9 @@ impl Share {
         }
     }
 
-    /// Updates the estimate from a measurement at `passed` stages into the plan, up to 1.1. `states` are those at the
-    /// beginning and end of the first stage, `input` is its input; `at_command` and `drives` are the latent inputs that
-    /// the drives had at the command and have now.
+    /// Updates the estimate from a measurement at `passed` stages into the plan, up to 1.1. `states` are the states at
+    /// the beginning and end of the first stage, `input` is its input. `at_command` and `drives` are the latent inputs
+    /// of the joint PD at the command and now.
     fn update(
         &mut self,
         passed: f64,
@@ -99,7 +98,7 @@ impl Share {
         let weight = kept * self.weight + own;
         let weighted = kept * self.weighted + own * self.estimate * (1.0 + agreement / size);
         let mean = (PRIOR_WEIGHT + weighted) / (PRIOR_WEIGHT + weight);
-        // The quotient of a large and a tiny number may be infinite: such a step says nothing.
+        // The quotient of a large and a tiny number may be infinite: such a step is ignored.
         if mean.is_finite() {
             self.unit = unit;
             self.weight = weight;
@@ -116,7 +115,7 @@ fn write_drives(gains: &[Real; 2], held: &[Real], x: &[Real], dx: &[Real], torqu
     }
 }
 
-/// The estimate with what the motors hold.
+/// The estimate with the posture and velocities that the motors' PD holds.
 #[derive(Debug, Clone)]
 pub(super) struct Effectiveness {
     pub(super) share: Share,
@@ -150,7 +149,7 @@ impl Effectiveness {
         }
     }
 
-    /// Keeps what was commanded at a measurement: posture and joint velocities.
+    /// Stores the posture and joint velocities commanded at a measurement.
     pub(super) fn keep(
         &mut self,
         plant: &ControlModel,
@@ -165,7 +164,7 @@ impl Effectiveness {
         }
     }
 
-    /// Takes a measurement with its latent state; `deviation` are the reference's standard deviations of it.
+    /// Updates the estimate from a measurement and its latent state; `deviation` is the reference's standard deviation.
     pub(super) fn update(
         &mut self,
         (plant, plan): (&ControlModel, &Plan),
@@ -193,7 +192,7 @@ impl Effectiveness {
         );
     }
 
-    /// The latent input of the motors' PD at a measurement; false if there is none to tell.
+    /// Computes the latent input of the motors' PD at a measurement; false if it is undefined.
     fn take_drives(
         &mut self,
         plant: &ControlModel,

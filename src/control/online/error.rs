@@ -49,7 +49,9 @@ pub enum ControlError {
         "reference sample {sample}: no phase of the model has the feet {feet:?} (fr fl rr rl) in contact"
     )]
     ReferencePhase { sample: usize, feet: ContactFlags },
-    #[error("the Riccati solver takes up to {largest} latent coordinates, the model has {found}")]
+    #[error(
+        "the Riccati solver supports up to {largest} latent coordinates, the model has {found}"
+    )]
     StructuredDim { found: usize, largest: usize },
     #[error("the conic solver refused the problem: {reason}")]
     Solver { reason: String },

@@ -1,7 +1,7 @@
 //! The input of a reference that comes without one, estimated from its accelerations.
 //!
-//! In each phase the model reads `ddz = f(z, dz, u) + r`. Around an expected input `m`, with `B = ∂f/∂u` there, the
-//! reference's own acceleration leaves
+//! In each phase the model is `ddz = f(z, dz, u) + r`. Around an expected input `m`, with `B = ∂f/∂u` there, the
+//! residual of the reference's own acceleration is
 //!
 //! ```text
 //! y = ddz − f(z, dz, m) = B (u − m) + r,   u − m ~ (0, S),   r ~ (0, R)
@@ -13,9 +13,10 @@
 //! û = m + S Bᵀ (B S Bᵀ + R)⁻¹ y.
 //! ```
 //!
-//! [`InputGivenState`] has `m = M [1; z; dz]`, `S` and `R` of the training. A phase without it has mean and covariance of
-//! its training inputs, and `R` is what `B S Bᵀ` leaves of the covariance of `y` over the reference, as input and residual
-//! of a least-squares model are uncorrelated. Latents whose acceleration the model hardly explains then hardly count.
+//! [`InputGivenState`] has `m = M [1; z; dz]`, `S` and `R` of the training. In a phase without it, `m` and `S` are mean
+//! and covariance of the training inputs. `R` is then the covariance of `y` over the reference minus `B S Bᵀ`, because
+//! input and residual of a least-squares model are uncorrelated. Latent coordinates whose acceleration the model hardly
+//! explains then hardly count.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -86,7 +87,7 @@ pub(super) fn estimate_input(
     input
 }
 
-/// `S` and `R` of a phase; none if there are too few samples to tell.
+/// `S` and `R` of a phase; none if there are too few samples.
 fn covariances(
     phase: &ControlPhase,
     evidence: &[Evidence],
@@ -94,7 +95,7 @@ fn covariances(
     if let Some(given) = &phase.given_state {
         return Some((given.covariance.clone(), given.acceleration_error.clone()));
     }
-    // A covariance of fewer samples than this says nothing about the residual.
+    // A covariance of fewer samples than this does not determine the residual.
     if evidence.len() < 4 * phase.latent_mean.len() {
         return None;
     }

@@ -14,7 +14,7 @@ use super::trajectory::{Contact, Trajectory, is_same_time, stages_between};
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
     pub model: StageModel,
-    /// `F̄ + A (x_r − x̄) + B (u_r − ū) + e − x_r⁺`: what is left of the dynamics at the reference.
+    /// `F̄ + A (x_r − x̄) + B (u_r − ū) + e − x_r⁺`: the residual of the dynamics at the reference.
     defect: Vec<f64>,
     /// Reference state at the beginning and at the end, `2 latent_dim`.
     state: Vec<f64>,
@@ -30,7 +30,7 @@ pub(super) struct Stage {
 #[derive(Debug, Clone)]
 pub(super) struct Horizon {
     pub stages: Vec<Stage>,
-    /// The same as the solvers take them.
+    /// The same in the form of the solvers.
     pub programs: Vec<StageQp>,
     phases: Vec<usize>,
     /// Stages by which the last preparation moved on, and those that it made.

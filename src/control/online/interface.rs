@@ -28,7 +28,7 @@ codes! {
     TIME_ORDER = -5, "time order: the reference's time does not increase";
     UNKNOWN_FEET = -6, "unknown feet: no phase of the model has these feet in contact";
     BAD_SETTING = -7, "bad setting: a setting is out of its range";
-    SOLVER_REFUSED = -8, "solver refused: the conic solver does not take the problem";
+    SOLVER_REFUSED = -8, "solver refused: the conic solver rejects the problem";
     INTERNAL = -9, "internal: the controller broke down; set a reference to use it again";
 }
 
@@ -111,7 +111,7 @@ pub struct RawCommand<const D: usize> {
 }
 
 impl<const D: usize> RawCommand<D> {
-    /// No torque, at the middle of the joints' ranges: what is commanded when nothing is known.
+    /// No torque, at the middle of the joints' ranges: the command without any measurement or plan.
     pub fn at_rest(robot: &Robot, status: i32) -> Self {
         Self {
             torque: [0.0; JOINT_DIM],
@@ -135,7 +135,7 @@ pub struct Handle<const D: usize> {
     controller: Controller,
     command: Command,
     last: RawCommand<D>,
-    /// A panic was caught: what the controller holds may contradict itself.
+    /// A panic was caught: the controller's state may be inconsistent.
     is_broken: bool,
 }
 
@@ -160,8 +160,9 @@ impl<const D: usize> Handle<D> {
         made.ok()
     }
 
-    /// Takes [`ReferenceSamples`] to follow, of feet four values each, zero in the air; of `u` the inner `None` is a bad
-    /// pointer. 0, or a code with a message for [`last_error`]; a refused trajectory leaves the old one.
+    /// Sets [`ReferenceSamples`] as the trajectory to follow. `feet` has four values per sample, zero in the air. For
+    /// `u` the inner `None` is an invalid pointer. Returns 0, or a code with a message for [`last_error`]; after an
+    /// error the old trajectory stays.
     pub fn set_reference(
         &mut self,
         time_s: Option<&[f64]>,

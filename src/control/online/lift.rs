@@ -1,27 +1,28 @@
-//! Torques that can carry a latent input: the lift that obeys the ground. `u = W_eᵀ u_lat` returns torques *and* a body
-//! force, and nothing ties the two together. The consistent lift looks for the torques alone and lets the legs make the
-//! force:
+//! The consistent lift: torques whose ground reaction forces produce a latent input. `u = W_eᵀ u_lat` returns torques
+//! *and* a body force without a relation between the two. The consistent lift computes torques alone; the legs produce
+//! the force:
 //!
 //! ```text
 //! minimise   ‖ M τ − u_lat ‖² + w (τ − m)ᵀ S⁻¹ (τ − m),   M = pinv(W_eᵀ) s_u [ I ; G(q, c) ]
 //! subject to |τ + ℓ| ≤ τ_max,   ‖(R F_k)_{x,y}‖ ≤ μ (R F_k)_z,   F_k = −J_k⁻ᵀ τ_k for each foot k in contact
 //! ```
 //!
-//! `τ` are the torques at the links and `τ + ℓ` the command, with the losses `ℓ`, never beyond the limits. `G(q, c)` maps
-//! torques to force and moment of the feet in contact, in the frame of the model's inputs; `m` and `S` are mean and
-//! covariance of the training torques in the phase, or `m` the torques of the reference; `R` turns the body frame upright.
+//! `τ` are the torques at the links and `τ + ℓ` the command, with the losses `ℓ`, never beyond the limits. `G(q, c)`
+//! maps torques to force and moment of the feet in contact, in the frame of the model's inputs. `m` and `S` are mean
+//! and covariance of the training torques in the phase, or `m` the torques of the reference. `R` turns the body frame
+//! upright.
 //!
-//! Torques are written by the standard deviations of the training's, `τ = m + C y` with `C Cᵀ = S`, and with `A = M C /
-//! √w` and `r = (u_lat − M m) / √w` the program becomes
+//! Torques are scaled by the standard deviations of the training torques, `τ = m + C y` with `C Cᵀ = S`. With
+//! `A = M C / √w` and `r = (u_lat − M m) / √w` the program becomes
 //!
 //! ```text
 //! minimise ½ ‖A y − r‖² + ½ ‖y‖²   subject to the rows,
 //! y₀ = Aᵀ (I + A Aᵀ)⁻¹ r,   I + Aᵀ A = L Lᵀ,   y = y₀ + L⁻ᵀ v:   minimise ½ ‖v‖²
 //! ```
 //!
-//! `y₀` takes a system of as many unknowns as latent coordinates and is the solution if it keeps all rows; otherwise `½
-//! ‖v‖²` under the rows is a program of one stage, for clarabel with the cones or for the structured solver with the
-//! pyramids inside them.
+//! `y₀` requires a linear system with as many unknowns as latent coordinates. It is the solution if it satisfies all
+//! rows. Otherwise `½ ‖v‖²` under the rows is a program of one stage, solved by clarabel with the cones or by the
+//! structured solver with the pyramids inside them.
 
 use nalgebra::{Cholesky, Matrix3};
 
@@ -114,7 +115,7 @@ pub struct ConsistentLift {
 }
 
 impl ConsistentLift {
-    /// Prepares the lift, for the solver that the settings name.
+    /// Prepares the lift for the solver of the settings.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Result<Self, ControlError> {
         let d = plant.latent_dim();
         let shape = StageShape {
@@ -154,7 +155,7 @@ impl ConsistentLift {
         Ok(lift)
     }
 
-    /// Takes the projection of another plant: that at the measured state, where it depends on it.
+    /// Uses the projection of another plant: the one at the measured state, if maps depend on the state.
     pub(super) fn take_projection(&mut self, plant: &ControlModel) {
         let rows = plant.projection.row_iter();
         for (own, row) in self.projection.chunks_exact_mut(STATE_DIM).zip(rows) {
@@ -162,7 +163,7 @@ impl ConsistentLift {
         }
     }
 
-    /// Torques at the links, N m, for a latent input on a stance; with the losses within the motors' limits.
+    /// Torques at the links, N m, for a latent input on a stance; with the losses they are within the motors' limits.
     pub fn lift(
         &mut self,
         plant: &ControlModel,
@@ -382,7 +383,7 @@ fn free_optimum(
     true
 }
 
-/// Legs in the air keep the torques of the reference, or none at the links where those are not known, within the limits.
+/// Legs in the air get the torques of the reference, or zero at the links if it has none, clamped to the limits.
 fn keep_swing(
     is_down: &[bool],
     is_known: bool,

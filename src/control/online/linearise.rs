@@ -48,8 +48,8 @@ pub trait LatentDynamics: Debug + Send {
     /// Column of an entry: `z` in the first `latent_dim`, then `dz`, then `u`.
     fn column(&self, phase: usize, entry: usize) -> usize;
 
-    /// Writes `F(x, u)` and `(A B)`, row by row, for a stage of `step_s`. The memory has room for two states, two matrices
-    /// of the size of `(A B)` and the entries of a Jacobian.
+    /// Writes `F(x, u)` and `(A B)`, row by row, for a stage of `step_s`. The memory holds two states, two matrices of
+    /// the size of `(A B)` and the entries of a Jacobian.
     fn step(
         &mut self,
         phase: usize,

@@ -1,9 +1,9 @@
 //! A state machine around the controller: stand up, be ready, jump, land, recover, walk, damp.
 //!
-//! In: every measurement, in the robot's own world and on its own clock, and requests. Out: a command of the same kind as
-//! the controller's. The joints move on a smooth curve to the reference's first posture, with the torques that carry the
-//! weight. A jump begins where the robot then stands. The supervisor watches in every mode, and its fault leads to
-//! [`Mode::Damp`] until a reset. Read [`Machine::step_into`] first, `routine` for the transitions.
+//! In: every measurement, in the robot's own world and on its own clock, and requests. Out: a command of the same kind
+//! as the controller's. The joints move on a smooth curve to the reference's first posture, with the torques that carry
+//! the weight. A jump begins at the place where the robot then stands. The supervisor monitors every mode, and its
+//! fault leads to [`Mode::Damp`] until a reset. Read [`Machine::step_into`] first, `routine` for the transitions.
 
 use super::command::{Command, Source, Status};
 use super::controller::{Controller, Measurement};
@@ -53,7 +53,7 @@ impl Machine {
         &self.controller
     }
 
-    /// The controller, for its reference.
+    /// The controller, for example to set its reference.
     pub fn controller_mut(&mut self) -> &mut Controller {
         &mut self.controller
     }
@@ -83,8 +83,8 @@ impl Machine {
         true
     }
 
-    /// Jumps with the next measurement: from [`Mode::Ready`] at the start of the reference, or from [`Mode::Damp`] where
-    /// something else made the robot stand there. False in other modes, after a fault, and without a reference.
+    /// Jumps with the next measurement: from [`Mode::Ready`] at the start of the reference, or from [`Mode::Damp`] if
+    /// another program made the robot stand there. False in other modes, after a fault, and without a reference.
     pub fn jump(&mut self) -> bool {
         let is_sound = self.controller.supervisor.fault == Fault::None;
         let mode = self.routine.mode;
@@ -98,11 +98,11 @@ impl Machine {
         self.routine.is_asked
     }
 
-    /// Takes the strides of a model as its reference. The controller needs settings for walks.
+    /// Sets the strides of a model as the reference. The controller needs settings for walks.
     ///
     /// # Errors
-    /// Those of the strides as a reference, a horizon that is too long for a walk, feet that select no phase, a robot that jumps
-    /// or walks.
+    /// Errors of the strides as a reference, a horizon that is too long for a walk, feet that select no phase, or a
+    /// robot that jumps or walks.
     pub fn set_walk(&mut self, strides: Strides) -> Result<(), ControlError> {
         if let Mode::Jump | Mode::Land | Mode::Walk = self.routine.mode {
             return Err(ControlError::Setting {
@@ -116,10 +116,11 @@ impl Machine {
         Ok(())
     }
 
-    /// Walks at a velocity along the heading, to the left (m/s) and of yaw (rad/s), kept within what the strides reach and
-    /// reached in [`Timing::range_s`] at most: from [`Mode::Ready`] at the stand of the walk, or from [`Mode::Damp`] where
-    /// something else made the robot stand there. In [`Mode::Walk`] it is the new command. False in other modes, after a
-    /// fault, without strides, and for numbers that are not finite.
+    /// Walks at a velocity along the heading, to the left (m/s) and of yaw (rad/s). The velocity is clamped to the
+    /// range of the strides and reached in [`Timing::range_s`] at most. A walk starts from [`Mode::Ready`] at the stand
+    /// of the walk, or from [`Mode::Damp`] if another program made the robot stand there. In [`Mode::Walk`] the
+    /// velocity replaces the last one. False in other modes, after a fault, without strides, and for numbers that are
+    /// not finite.
     pub fn walk(&mut self, velocity: [f64; 3]) -> bool {
         let is_sound = self.controller.supervisor.fault == Fault::None;
         let may = self.follows_walk() && velocity.iter().all(|number| number.is_finite());
@@ -141,8 +142,8 @@ impl Machine {
         true
     }
 
-    /// Slows down, stands, and moves the joints back to the stand: [`Mode::Recover`], then [`Mode::Ready`]. False in other
-    /// modes than [`Mode::Walk`]; a walk that was requested and has not begun is not begun.
+    /// Slows down, stands, and moves the joints back to the stand: [`Mode::Recover`], then [`Mode::Ready`]. Also
+    /// cancels a walk that was requested and has not begun. False in other modes than [`Mode::Walk`].
     pub fn stop(&mut self) -> bool {
         if self.routine.is_asked && self.routine.asks_walk {
             self.routine.is_asked = false;
@@ -311,7 +312,7 @@ impl Machine {
         Status::Standing
     }
 
-    /// Writes the posture of the stand and, for a good measurement, the torques that carry the weight.
+    /// Writes the posture of the stand and, for a valid measurement, the torques that carry the weight.
     fn write_stand(&mut self, measurement: &Measurement<'_>, command: &mut Command) {
         let controller = &mut self.controller;
         let (robot, limits) = (controller.plant.robot(), controller.plant.joint_limits());

@@ -1,11 +1,12 @@
 //! The controller proper: from maps, dynamics and a reference to commands.
 //!
 //! In: a [`ControlModel`] (plain numbers), [`LatentDynamics`], a reference, measurements. Out: commands. Nothing here
-//! knows of models, programs or recordings: besides nalgebra and clarabel these files import [`robot`](crate::robot)
-//! and [`solver`](crate::solver) alone, because `romc compile --emit controller` emits this very folder. C is made of
-//! functions on plain slices (`trajectory`, and parts of other files) by `src/translate`. Read `problem` first.
+//! depends on models, programs or recordings: these files import only nalgebra, clarabel, [`robot`](crate::robot) and
+//! [`solver`](crate::solver), because `romc compile --emit controller` emits this folder unchanged. `src/translate`
+//! generates the C code from its functions on plain slices (`trajectory`, and parts of other files). Read `problem`
+//! first.
 
-// Loops over indices are what C is made of.
+// Loops over indices are translated to C.
 #![allow(
     clippy::assign_op_pattern,
     clippy::manual_clamp,

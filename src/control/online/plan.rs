@@ -2,8 +2,9 @@
 
 use super::dense::{Real, greater};
 
-/// How far ahead of the middle of the time that it is held for a posture is commanded, in stages. A joint PD that holds the
-/// posture of the end of a stage is ahead of the motion and adds to the thrust; that of the middle takes from it.
+/// Lead of the commanded posture, in stages, relative to the middle of the time for which it is held. A joint PD that
+/// holds the posture of the end of a stage leads the motion and adds to the thrust; with that of the middle it reduces
+/// the thrust.
 const POSTURE_LEAD: f64 = 0.4;
 
 /// Times of the stages of a plan.
@@ -26,14 +27,15 @@ impl PlanTime {
         if self.is_made { passed } else { -1.0 }
     }
 
-    /// Whether a time is in a stage or beyond the last. Up to half a stage before the first, as where a clock jitters, it
-    /// belongs to the first.
+    /// Whether a time is in a stage or beyond the last. Times up to half a stage before the first count as the first,
+    /// because clocks jitter.
     pub(super) fn reaches(&self, time_s: f64) -> bool {
         self.passed(time_s) > -0.5
     }
 
-    /// The stage that a time belongs to, or `otherwise` for a time that is not in the stages before that one or has no plan:
-    /// the last stage stands for all that is later, the number of stages means none.
+    /// The stage at a time, among the stages before `otherwise`; `otherwise` for a time outside these stages or without
+    /// a plan. Pass the last stage to use it for all later times, or the number of stages to detect that there is no
+    /// stage.
     pub(super) fn stage_at(&self, time_s: f64, otherwise: usize) -> usize {
         // A time that is a stage's beginning but for rounding belongs to that stage.
         let passed = self.passed(time_s) + 1e-6;

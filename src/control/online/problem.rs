@@ -1,7 +1,7 @@
 //! The optimal control problem and the rows of its constraints.
 //!
-//! At a control step at time `t` with measured latent state `x₀ = (z, dz)` the controller solves, over `N` stages of
-//! length `h` with reference `(x_r, u_r)`,
+//! At a control step at time `t` with measured latent state `x₀ = (z, dz)` the controller solves the following problem,
+//! over `N` stages of length `h` with reference `(x_r, u_r)`:
 //!
 //! ```text
 //! minimise   Σ_{k=1..N}   w_k/2 Σ_i [ (z_k,i − z_r,i)² + w_v (dz_k,i − dz_r,i)² ] / σ_i²
@@ -14,29 +14,31 @@
 //!            q_min − s_k q_half ≤ D z_k + d ≤ q_max + s_k q_half,   s_k ≥ 0   decoded joints, k ≥ 1
 //! ```
 //!
-//! - `σ_i` is the standard deviation of latent `i` over the reference, `w_v` the weight of velocities, `w_k = 1` but
-//!   `w_N` the terminal weight.
-//! - `S_p` is the covariance of the training inputs in the stage's phase, projected into latent coordinates. Where the
-//!   training inputs hardly moved, the model knows least about an input's effect; a scalar weight would ignore that.
-//! - `F̄, A, B` are the Runge-Kutta step of the stage's phase and its derivatives (`linearise.rs`) at
-//!   `(x̄, ū)`: the reference or the last plan. `e_k` is zero if the model is the drift; otherwise `e_k = x_r,k+1 −
-//!   F(x_r,k, u_r,k)`, so that the reference is itself a trajectory and the model answers for deviations only.
-//! - Without a recorded input `u_r` is estimated from the reference's accelerations (`estimate`) or, if asked for, the
-//!   phase's mean training input.
-//! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`; `R` turns a force in the body's axes upright by the
-//!   reference's roll and pitch, not one in the world's. `ℓ_k` are the joints' losses along the reference, zero without
-//!   actuators. With the consistent lift torques are chosen afterwards within their limits: the rows of `T` are left
-//!   out.
-//! - `ρ` is an exact penalty: above the sum of the multipliers of a stage's joint rows it changes nothing where the
-//!   limits can be kept. One `s_k` serves all joints of a stage. Joint limits are the rows that contradict the
-//!   measurement, hence they alone are soft, from stage 1 on: `u = 0` satisfies all others but those of a torque rate.
+//! - `σ_i` is the standard deviation of latent `i` over the reference, `w_v` the weight of velocities. `w_k` is 1,
+//!   except the terminal weight `w_N`.
+//! - `S_p` is the covariance of the training inputs in the stage's phase, projected into latent coordinates. In
+//!   directions in which the training inputs hardly varied, the model is least certain about an input's effect. A
+//!   scalar weight would ignore that.
+//! - `F̄, A, B` are the Runge-Kutta step of the stage's phase and its derivatives (`linearise.rs`) at `(x̄, ū)`: the
+//!   reference or the last plan. `e_k` is zero if the model is the drift. Otherwise `e_k = x_r,k+1 − F(x_r,k, u_r,k)`,
+//!   so that the reference is itself a trajectory and the model predicts deviations only.
+//! - Without a recorded input `u_r` is estimated from the reference's accelerations (`estimate`) or is the phase's mean
+//!   training input, as the settings choose.
+//! - `T` and `F` are the torque and force rows of `W_eᵀ / s_u`. `R` turns a force in the body's axes upright by the
+//!   reference's roll and pitch; for a force in world axes it is the identity. `ℓ_k` are the joints' losses along the
+//!   reference, zero without actuators. With the consistent lift the rows of `T` are omitted, because it chooses
+//!   torques within their limits afterwards.
+//! - `ρ` is an exact penalty: above the sum of the multipliers of a stage's joint rows it changes nothing if the limits
+//!   can be satisfied. One `s_k` serves all joints of a stage. Only joint limits can contradict the measurement, so
+//!   only they are soft, from stage 1 on. `u = 0` satisfies all other rows except those of a torque rate.
 //!
-//! All is written in deviations over their scale, `x_k = x_r,k + σ x̂_k` and `u_k = u_r,k + C_p û_k` with `C_p C_pᵀ =
-//! S_p`, and each row over its limit: the cost is a constant diagonal, the solver needs no scaling of its own.
+//! All variables are deviations divided by their scale, `x_k = x_r,k + σ x̂_k` and `u_k = u_r,k + C_p û_k` with
+//! `C_p C_pᵀ = S_p`, and each row is divided by its limit. The cost is therefore a constant diagonal, and the solver
+//! needs no scaling of its own.
 //!
-//! A row is superfluous if no point that satisfies the other rows violates it by more than a margin, which a linear
-//! program decides: maximise `row · v` subject to the others, with the row itself relaxed so that the maximum exists. The
-//! margin matters: left and right legs have nearly equal rows, each of which alone excludes a thin part of the
+//! A row is redundant if no point that satisfies the other rows violates it by more than a margin. A linear program
+//! decides this: maximise `row · v` subject to the others, with the row itself relaxed so that the maximum exists. The
+//! margin matters because left and right legs have nearly equal rows. Each of them alone excludes a thin part of the
 //! region that the other allows.
 
 use nalgebra::DVector;
@@ -51,15 +53,15 @@ use super::trajectory::Trajectory;
 use crate::robot::{GRAVITY_M_S2, JOINT_DIM, WrenchFrame};
 use crate::solver::Outcome;
 
-/// Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all multipliers near one and
-/// needs two iterations more if it has to bring them to 100.
+/// Price of a slack in the program; the whole cost is scaled to it. clarabel starts with all multipliers near one. It
+/// needs two iterations more to increase them to 100.
 const SLACK_PRICE: Real = 10.0;
 
 /// Distance from the mean training input, in standard deviations, within which limits matter.
 const INPUT_REACH: f64 = 10.0;
 
-/// By how much the rows that are kept may let one that is left out be exceeded, relative to its limit or half range:
-/// plans may be that far off, commands are clamped and are not.
+/// Largest violation of an omitted row that the kept rows may permit, relative to its limit or half range. Plans may
+/// violate limits by this much; commands are clamped and do not.
 pub(super) const ROW_MARGIN: Real = 0.02;
 
 /// A kind of rows; rows, place in a stage and size are stated here alone, for both solvers and the controller in C.
@@ -83,10 +85,10 @@ enum RowPlace {
     Cone,
 }
 
-/// Returns the limit by which unit rows are divided; for cones the friction coefficient; 0 if the settings do not ask for
-/// the kind.
+/// Returns the limit by which unit rows are divided, for cones the friction coefficient. Zero if the settings do not
+/// request this kind.
 fn row_size(kind: RowKind, settings: &Settings) -> Real {
-    // The consistent lift keeps the torque limits by itself.
+    // The consistent lift enforces the torque limits by itself.
     if kind == RowKind::TorqueLimit && settings.lift != Lift::Consistent as i32 {
         return 1.0;
     }
@@ -187,7 +189,7 @@ pub struct Row {
     pub row: Vec<f64>,
     /// Right-hand side; the coefficient of a cone.
     pub bound: f64,
-    /// What a loss of 1 N m in the joint takes from the right-hand side.
+    /// Decrease of the right-hand side per 1 N m of loss in the joint.
     pub per_loss: f64,
 }
 
@@ -228,9 +230,9 @@ pub(super) fn turn_force(
 impl StageRows {
     /// The rows for a model on its robot.
     ///
-    /// Unless all are asked for, two kinds are left out: rows that the others imply to within 2 % of the limit, and
-    /// torque rows that no input within `INPUT_REACH` standard deviations of the training inputs reaches in any phase.
-    /// Plans may pass these limits, by 2 %, an input unlike any in training or large losses; clamped commands do not.
+    /// By default two kinds are omitted: rows that the others imply to within 2 % of the limit, and torque rows that no
+    /// input within `INPUT_REACH` standard deviations of the training inputs reaches in any phase. Plans may exceed
+    /// these limits by 2 %, with an input unlike any in training, or with large losses. Clamped commands do not.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Self {
         Self::of_settings(plant, settings, row_selection(plant, settings))
     }
@@ -350,9 +352,9 @@ fn write_upright(attitude: &[Real], rotation: &mut [[Real; 3]; 3]) {
     *rotation = rows;
 }
 
-/// The rows without those that follow from the others to within `margin`, in the same order: tried from the last to the
-/// first, so of two equal rows the first stays. Dropped rows that those left no longer imply come back at the end; a
-/// row also stays whenever its linear program is not solved beyond doubt.
+/// The rows without those that follow from the others to within `margin`, in the same order. Rows are tested from the
+/// last to the first, so the first of two equal rows stays. Dropped rows that the remaining ones no longer imply are
+/// restored at the end. A row also stays if its linear program is not solved reliably.
 pub fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
     let mut is_kept = vec![true; rows.len()];
     for index in (0..rows.len()).rev() {
@@ -370,7 +372,7 @@ pub fn needed_rows(rows: Vec<Row>, margin: f64) -> Vec<Row> {
         .collect()
 }
 
-/// Whether the rows kept besides `index` imply it to within `margin`.
+/// Whether the rows kept, other than `index`, imply it to within `margin`.
 fn is_implied(rows: &[Row], is_kept: &[bool], index: usize, margin: f64) -> bool {
     let sizes = rows[index].row.iter().map(|entry| entry.abs());
     let relaxation = sizes.fold(0.0, f64::max).max(1.0) + margin;

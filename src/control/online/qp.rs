@@ -85,7 +85,7 @@ pub enum SolverProfile {
     Tuned,
     /// For a problem that is solved once: the solver's scaling and refinement, to the given tolerance.
     Scaled,
-    /// The solver's own defaults: what a user gets who sets nothing. Data updates may be refused.
+    /// The solver's own defaults, without any settings of romc. Data updates may be refused.
     AsShipped,
 }
 

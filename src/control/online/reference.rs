@@ -98,7 +98,7 @@ impl Reference {
         Ok(reference)
     }
 
-    /// Takes the samples of a walk, of which the last ones are new.
+    /// Uses the samples of a walk, of which the last ones are new.
     pub(super) fn take_window(&mut self, plant: &ControlModel, walk: &Walk, new: usize) {
         let (d, count, walker) = (self.latent_dim, self.time_s.len(), &walk.walker);
         self.is_walk = true;
@@ -106,7 +106,7 @@ impl Reference {
         self.x.copy_from_slice(&walker.x);
         self.dx.copy_from_slice(&walker.dx);
         self.state.copy_within(2 * d * new.min(count).., 0);
-        // The velocity of the last one of the others has changed, too.
+        // The velocity of the last of the other samples has changed as well.
         for sample in count.saturating_sub(new + 1)..count {
             let (x, dx) = (row(&walker.x, sample), row(&walker.dx, sample));
             let (z, rate) = self.state[2 * d * sample..][..2 * d].split_at_mut(d);
@@ -126,8 +126,8 @@ impl Reference {
         }
     }
 
-    /// Standard deviation of each of `(z, dz)` over the trajectory, never below a hundredth of the largest position's
-    /// or velocity's; for one that stands still, the scale of a small motion of the joints.
+    /// Standard deviation of each of `(z, dz)` over the trajectory, at least a hundredth of the largest one of
+    /// positions or velocities. For a trajectory that stands still, the scale of a small motion of the joints.
     pub(crate) fn deviation(&self) -> &[f64] {
         &self.deviation
     }
@@ -155,8 +155,8 @@ impl Reference {
         self.feet[self.locate(time_s).sample]
     }
 
-    /// Of measured feet on the ground those that are there in the trajectory now or soon. One that should swing but still drags
-    /// is not to carry.
+    /// The measured feet on the ground that are also on the ground in the trajectory, now or soon. A foot that should
+    /// swing but still drags must not carry weight.
     pub(super) fn carrying(&self, time_s: f64, measured: ContactFlags) -> ContactFlags {
         let [now, soon] = [time_s, time_s + EARLY_S].map(|time_s| self.feet_at(time_s));
         std::array::from_fn(|foot| measured[foot] && (now[foot] || soon[foot]))

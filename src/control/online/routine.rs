@@ -1,7 +1,7 @@
-//! Memory and transitions of the state machine in plain numbers: C is made of it.
+//! Memory and transitions of the state machine in plain numbers, translated to C.
 //!
-//! In: times, states, contacts. Out: the next [`Mode`], the posture of a stand, a state in the frame of the reference. Read
-//! [`Routine`] first, `machine` for its use.
+//! In: times, states, contacts. Out: the next [`Mode`], the posture of a stand, a state in the frame of the reference.
+//! Read [`Routine`] first, `machine` for its use.
 
 use super::dense::{Real, smaller};
 use super::supervisor::{Bounds, NEAR};
@@ -254,8 +254,8 @@ impl Routine {
     }
 }
 
-/// Writes the torques with which a leg, at a state of the robot, presses on the ground with a vertical force, N m: the
-/// force times minus the gradient of the foot's height.
+/// Writes the torques, N m, with which a leg at a state of the robot presses on the ground with a vertical force. They
+/// are the force times minus the gradient of the foot's height.
 pub(super) fn write_support(
     leg: &LegShape,
     hip: &[Real],

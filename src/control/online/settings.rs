@@ -1,5 +1,5 @@
-//! Settings of the controller: the one table of names, defaults, ranges and descriptions, from which the structures in
-//! Rust and C, their checks, the headers, the Python binding and the parameters of ROS are made.
+//! Settings of the controller: one table of names, defaults, ranges and descriptions. The structures in Rust and C,
+//! their checks, the headers, the Python binding and the parameters of ROS are generated from it.
 
 pub use super::choices::{
     AfterEnd, Drift, Legs, Lift, Linearisation, MissingInput, RowSelection, Solver,
@@ -9,7 +9,7 @@ use super::qp::QpSettings;
 use super::supervisor::Bounds;
 use crate::robot::{Leg, Robot};
 
-/// What the controller does while it has no plan to trust.
+/// Behaviour of the controller without a trusted plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FallbackSettings {
     /// How many stages of the last good plan may be used after a failure.
@@ -20,7 +20,7 @@ pub struct FallbackSettings {
     pub damping_nm_s: Real,
     /// Deviation from the prediction, in standard deviations of the reference, that is not believed at first.
     pub jump_deviations: Real,
-    /// How many steps in a row a measurement is disbelieved before it is taken for true.
+    /// Number of consecutive steps in which a measurement is refused as a jump before it is accepted.
     pub jump_patience: usize,
 }
 
@@ -79,13 +79,13 @@ pub enum Accepts {
     NotNegative,
     /// A positive number, or none, which is zero in C.
     Optional,
-    /// As [`Self::Optional`], of rows that link stages: the switch that compiles them in the C, and what that compiles.
+    /// As [`Self::Optional`], for rows that link stages: the switch that compiles them in C, and their description.
     LinkRows(&'static str, &'static str),
     /// A number from 0 to 1.
     Share,
-    /// A positive number, or infinity, which is off.
+    /// A positive number; infinity disables the bound.
     Bound,
-    /// A whole number, or zero, which is off.
+    /// A whole number; zero disables the check.
     Count,
 }
 
@@ -132,7 +132,7 @@ pub struct Setting {
     pub name: &'static str,
     /// Field of [`MpcSettings`].
     pub field: &'static str,
-    /// `i32`, `f64`, or `Real` for what has the precision of the generated C.
+    /// `i32`, `f64`, or `Real` for a number with the precision of the generated C.
     pub kind: &'static str,
     /// Accepted range.
     pub accepts: Accepts,
@@ -148,8 +148,8 @@ impl Setting {
     /// Description as a parameter of the ros2_control plugin; none if it is not one.
     pub fn of_ros(&self) -> Option<String> {
         let off = match self.accepts {
-            Accepts::Bound => "; .inf is off",
-            Accepts::Count => "; 0 is off",
+            Accepts::Bound => "; .inf disables it",
+            Accepts::Count => "; 0 disables it",
             _ => "",
         };
         let own = (self.field == "bounds")
@@ -225,9 +225,9 @@ fields_in_c! {
         velocity_mismatch contact_mismatch_steps poor_steps fade_s damping_nm_s_rad damping_torque_nm;
 }
 
-/// Makes the structures of Rust and C and [`SETTINGS`] of a table. Rows of `c` are fields of [`MpcSettings`], each with
-/// what C has for it: name, type, range and description, which `in_c` replaces in the generated C and `in_ros` for a
-/// parameter of ROS. Rows of `rust` are for Rust alone.
+/// Generates the structures of Rust and C and [`SETTINGS`] from a table. Rows of `c` are fields of [`MpcSettings`],
+/// each with its name, type, range and description in C. `in_c` replaces the description in the generated C, `in_ros`
+/// for a parameter of ROS. Rows of `rust` exist in Rust only.
 macro_rules! settings {
     (
         c {$(
@@ -341,7 +341,7 @@ settings! {
     c {
         horizon: usize = 20 => horizon: i32, Accepts::Whole(1, MAX_HORIZON, "1 to 500 stages"), "stages, 1 to 500",
             in_c "stages, 1 to UPPER_MAX_HORIZON";
-        /// Beside it tolerance and accepted residual of the conic solver, the residual also of the structured one.
+        /// Also tolerance and accepted residual of the conic solver; the structured solver uses the same residual.
         qp: QpSettings = QpSettings::default() =>
             max_iterations: i32, Accepts::Whole(0, i32::MAX as usize, "a positive number"),
             "interior-point iterations, the deadline of a step";
@@ -355,13 +355,13 @@ settings! {
             "UPPER_CLARABEL (default) or _RICCATI", in_c "";
         /// The input is held over it.
         step_s: f64 = 0.01 => step_s: f64, Accepts::Positive, "duration of a stage, s";
-        /// (`w_u`), measured by the inverse covariance of the training inputs. Along a recording it hardly matters; in
-        /// closed loop (`examples/mujoco/closed_loop.py`) a weight of one follows errors of the model into a fall, a
-        /// weight of hundreds is the reference input without feedback.
+        /// (`w_u`), measured by the inverse covariance of the training inputs. Along a recording it has little effect.
+        /// In closed loop (`examples/mujoco/closed_loop.py`) the robot falls with a weight of one, because the
+        /// controller follows errors of the model. A weight of hundreds applies the reference input without feedback.
         input_weight: f64 = 10.0 => input_weight: Real, Accepts::Positive,
             "weight of deviations from the reference's input";
         /// (`w_v`). In closed loop small weights let a jump that is under-powered, by a payload or weak motors, end
-        /// short; see `docs/control.md`.
+        /// short; see `docs/reference/controller-settings.md`.
         velocity_weight: f64 = 0.1 => velocity_weight: Real, Accepts::Positive,
             "weight of velocities against positions";
         terminal_weight: f64 = 1.0 => terminal_weight: Real, Accepts::Positive,
@@ -379,7 +379,7 @@ settings! {
         lift_prior_weight: f64 = 1e-3 => lift_prior_weight: Real, Accepts::Positive,
             "weight of the training torques, consistent lift",
             in_c "weight of the training's torques in the consistent lift";
-        /// What the consistent lift makes of the same latent input is not limited.
+        /// The torques of the consistent lift are not limited by it.
         torque_rate_nm_s: Option<f64> = None => torque_rate_nm_s: Real,
             Accepts::LinkRows("TORQUE_RATES", "limits on torque rates"),
             "largest change of a torque, N m/s, plain lift; 0 leaves it free",
@@ -401,7 +401,7 @@ settings! {
             in_ros "share of the feed-forward torques that acts in flight, 0 to 1; 0 leaves the legs to the PD";
         /// Of a walk the deviation over the reference grows with the path.
         place_scale_m: Option<f64> = None => place_scale_m: Real, Accepts::Optional,
-            "scale of deviations in x and y, m; 0 takes their standard deviation over the reference";
+            "scale of deviations in x and y, m; 0 for their standard deviation over the reference";
         heading_scale_rad: Option<f64> = None => heading_scale_rad: Real, Accepts::Optional,
             "the same in yaw, rad";
         legs: Legs = Legs::Decoded => legs: i32, Accepts::Whole(0, 1, "0 (decoded) or 1 (reference)"),
@@ -409,7 +409,8 @@ settings! {
             in_c "joint targets, losses and prior torques: UPPER_LEGS_DECODED or _OF_REFERENCE";
         after_end: AfterEnd = AfterEnd::Hold => after_end: i32, Accepts::Whole(0, 2, "0 (hold), 1 (damp) or 2 (stop)"),
             "after the reference: UPPER_HOLD (default), _DAMP or _STOP", in_c "after the reference: UPPER_HOLD, _DAMP or _STOP";
-        /// Chosen so that no right recording, plan or simulated jump of the repository comes near; see `docs/control.md`.
+        /// Chosen so that no valid recording, plan or simulated jump of the repository comes near; see
+        /// `docs/reference/controller-settings.md`.
         bounds: Bounds = Bounds::USUAL =>
             tilt_rad: Real, Accepts::Bound, "most angle between the verticals of body and reference, rad"
             | joint_margin_rad: Real, Accepts::Bound, "how far joints may be outside their limits, rad"
@@ -418,7 +419,7 @@ settings! {
             "most distance of the body from the reference, m; half of it at the start and from its prediction"
             | posture_rad: Real, Accepts::Bound,
             "most distance of a joint from the reference, rad; half of it at the start and from its prediction"
-            | clock_gap_s: f64, Accepts::Bound, "most time between steps, s; infinite: clocks may stand and go back, too"
+            | clock_gap_s: f64, Accepts::Bound, "most time between steps, s; infinite: clocks may also stand and go back"
             | frozen_steps: i32, Accepts::Count, "steps in which a clock may stand or a moving measurement stay the same"
             | velocity_mismatch: Real, Accepts::Bound, "most velocity of the body that its positions do not show, m/s"
             | contact_mismatch_steps: i32, Accepts::Count, "steps with contacts that heights of feet or the fall contradict"
@@ -428,13 +429,13 @@ settings! {
             | damping_torque_nm: Real, Accepts::Positive, "most torque of it, N m";
     }
     rust {
-        /// What stands for the reference's own dynamics.
+        /// Dynamics along the reference itself.
         drift: Drift = Drift::Automatic;
-        /// What stands for the reference's input if it has none.
+        /// Input of a reference that has none.
         missing_input: MissingInput = MissingInput::Estimate;
-        /// Which rows of the constraints are kept.
+        /// Selection of the constraint rows.
         rows: RowSelection = RowSelection::Needed;
-        /// What happens without a plan.
+        /// Behaviour without a plan.
         fallback: FallbackSettings = FallbackSettings::default();
     }
 }

@@ -1,11 +1,12 @@
 //! One stage of the optimal control problem, in deviations from the reference divided by their scale.
 //!
 //! ```text
-//! x̂⁺ = A x̂ + B v + c,   G v <= g,   E p̂⁺ − t <= e,   t >= 0,   L v − L⁻ v⁻ <= l + o⁻ − o,   k − K v ∈ second-order cones
+//! x̂⁺ = A x̂ + B v + c,   G v <= g,   E p̂⁺ − t <= e,   t >= 0,   L v − L⁻ v⁻ <= l + o⁻ − o,
+//! k − K v ∈ second-order cones
 //! ```
 //!
-//! `p̂⁺` are the positions among the states `x̂⁺`, `L⁻ v⁻` and `o⁻` belong to the stage before. Both solvers take
-//! stages as they are: [`conic`](super::conic) makes clarabel's sparse matrices of them,
+//! `p̂⁺` are the positions among the states `x̂⁺`, `L⁻ v⁻` and `o⁻` belong to the stage before. Both solvers use stages
+//! of this form: [`conic`](super::conic) makes clarabel's sparse matrices of them,
 //! [`structured`](super::structured) solves them one after the other.
 
 use super::dense::{MOST_LATENT, Real};
@@ -116,8 +117,7 @@ pub(super) struct StageQp {
     pub cones: Rows,
 }
 
-/// What a stage is scaled by: its input by `C_p`, lower triangular, about the reference's input; states by their
-/// deviations.
+/// Scales of a stage: its input by `C_p`, lower triangular, about the reference's input; states by their deviations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StageScale<'a> {
     /// Column by column.
@@ -305,8 +305,8 @@ pub(super) fn unscale(
     }
 }
 
-/// Makes a defect that of a reference which is itself a trajectory: none about it, else less what `nominal`, the model's
-/// step from the reference, leaves of its end.
+/// Computes the defect for a reference that is itself a trajectory. It is zero when linearised about the reference.
+/// Otherwise the defect of `nominal`, the model's step from the reference, is subtracted.
 pub(super) fn trust_reference(
     is_about_plan: bool,
     nominal: &[Real],
@@ -320,8 +320,8 @@ pub(super) fn trust_reference(
     }
 }
 
-/// What a step `next` with derivatives `(A B)` at `(x, u)` leaves of the dynamics at a reference `(state, input)` that
-/// goes to `end`: `next + A (state − x) + B (input − u) − end`.
+/// Residual of the dynamics at a reference `(state, input)` that goes to `end`, by a step `next` with derivatives `(A
+/// B)` at `(x, u)`: `next + A (state − x) + B (input − u) − end`.
 pub(super) fn write_defect(
     next: &[Real],
     by: &[Real],

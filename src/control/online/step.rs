@@ -17,7 +17,7 @@ use crate::solver::Outcome;
 const SMALL_FORCE_N: f64 = 1.0;
 
 impl Controller {
-    /// Screens a measurement and, if it can be believed, keeps it.
+    /// Checks a measurement and stores it if it is accepted.
     pub(super) fn take(&mut self, measurement: &Measurement<'_>) -> Result<(), Status> {
         if measurement.x.len() != STATE_DIM || measurement.dx.len() != STATE_DIM {
             return Err(Status::WrongDimension);
@@ -224,7 +224,7 @@ fn joints_of(state: &[f64; STATE_DIM]) -> [f64; JOINT_DIM] {
     std::array::from_fn(|joint| state[joint])
 }
 
-/// Whether the supervisor lets a measurement pass, beside the state that the robot should have.
+/// Whether the supervisor accepts a measurement, given the state of the reference.
 pub(super) fn watched(
     supervisor: &mut Supervisor,
     plant: &ControlModel,

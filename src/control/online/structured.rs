@@ -69,7 +69,7 @@ pub(super) fn structured(
 #[derive(Debug)]
 pub(super) struct Structured<const NX: usize, const NU: usize, const WIDE: bool, const LINKED: bool>
 {
-    /// States and inputs that the stages have; what is beyond them stays zero.
+    /// States and inputs of the stages; entries beyond them stay zero.
     states: usize,
     inputs: usize,
     stages: Vec<Stage<f64, NX, NU>>,
@@ -259,7 +259,7 @@ pub fn prepare<const WIDE: bool, const NX: usize, const NU: usize, const LINKED:
     #[cfg(target_arch = "x86_64")]
     if WIDE {
         assert!(has_avx2());
-        // SAFETY: the processor has what this is compiled for.
+        // SAFETY: the processor supports the compiled instructions.
         return unsafe { program.prepare_avx2() };
     }
     program.prepare()
@@ -275,7 +275,7 @@ pub fn solve<const WIDE: bool, const NX: usize, const NU: usize, const LINKED: b
     #[cfg(target_arch = "x86_64")]
     if WIDE {
         assert!(has_avx2());
-        // SAFETY: the processor has what this is compiled for.
+        // SAFETY: the processor supports the compiled instructions.
         return unsafe { program.solve_avx2(x0, is_warm, settings) };
     }
     program.solve(x0, is_warm, settings)

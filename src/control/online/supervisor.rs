@@ -1,10 +1,10 @@
-//! What a robot that is under control does not measure, and the command that follows when it does. C is made of this
-//! file.
+//! Supervisor: faults of measurements of a robot under control, and the damping that follows. This file is translated
+//! to C.
 //!
-//! In: every measurement with the reference's state at its time. Out: a [`Fault`], which stays until a reset, and torques
-//! that fade into joint damping. A measurement beyond a bound is refused, as a glitch may be; beyond it for
-//! [`PATIENCE_S`], or in the first measurement, it is a fault. Clocks, frozen measurements, contacts and steps without a
-//! good plan are counted. Read [`Supervisor::watch`] first.
+//! In: every measurement with the reference's state at its time. Out: a [`Fault`], which stays until a reset, and
+//! torques that fade into joint damping. A measurement beyond a bound is refused, because it may be a glitch. After
+//! [`PATIENCE_S`] of such measurements, or in the first measurement, it is a fault. The clock, repeated measurements,
+//! contacts and steps without a good plan are also checked. Read [`Supervisor::watch`] first.
 
 use super::control_model::{clamped_joint, clamped_torque};
 use super::dense::{Real, greater, smaller};
@@ -16,12 +16,12 @@ const PATIENCE_S: f64 = 0.019;
 const HALF_TURN: Real = 3.1;
 /// Cosine of the angle between the body's and the vertical downwards above which a robot is near upside down.
 const UPSIDE_DOWN: Real = 0.5;
-/// The first measurement must be within this share of the distances from the reference. Every later one must be within it of a
-/// prediction: the last good measurement moved by its velocity, or by the mean of both velocities.
+/// The first measurement must be within this share of the distances from the reference. Every later one must be within
+/// it of a prediction: the last good measurement moved by its velocity, or by the mean of both velocities.
 pub(super) const NEAR: Real = 0.5;
 /// How far a clock may go back, s: measurements may be exchanged.
 const CLOCK_JITTER_S: f64 = 0.005;
-/// How many steps are not too long between two measurements, whatever the bound says.
+/// A gap of up to this many steps between two measurements is always accepted.
 const LONGEST_STEPS: f64 = 1.5;
 /// Time over which velocities are compared with positions, s.
 const MEMORY_S: Real = 0.05;
@@ -35,8 +35,8 @@ const FALL_SHARE: Real = 0.5;
 /// How far a reference moves, rad or m, while a measurement that stays the same is not believed.
 const REFERENCE_MOVES: Real = 0.01;
 
-/// What measurements may be, and the damping that follows if they are not; infinite bounds and counts of zero are off.
-/// `docs/control.md`, "The supervisor", says what each is compared with.
+/// Bounds of measurements, and the damping that follows a violation; infinite bounds and counts of zero disable a
+/// check. `docs/explanation/supervisor.md`, "The supervisor", defines the quantity that each bound limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs, reason = "the table of settings describes them")]
 pub struct Bounds {
@@ -70,7 +70,7 @@ impl Bounds {
         poor_steps: 0,
         ..Self::USUAL
     };
-    /// What no right recording, plan or simulated jump of the repository comes near; see `docs/control.md`.
+    /// No valid recording, plan or simulated jump of the repository comes near these bounds; see `docs/explanation/supervisor.md`.
     pub(super) const USUAL: Self = Self {
         tilt_rad: 0.5,
         joint_margin_rad: 0.1,
@@ -88,7 +88,7 @@ impl Bounds {
     };
 }
 
-/// What is wrong. Each has a status.
+/// A kind of fault. Each has a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Fault {
     #[default]
@@ -110,10 +110,10 @@ pub(super) enum Fault {
     PoorSteps,
 }
 
-/// What the supervisor remembers.
+/// State of the supervisor between measurements.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Supervisor {
-    /// What is wrong, until a reset.
+    /// The present fault; it stays until a reset.
     pub fault: Fault,
     /// Time in which torques have faded so far, s.
     faded_s: f64,
@@ -189,7 +189,7 @@ impl Supervisor {
         self.faded_s = 0.0;
     }
 
-    /// Takes the height of a foot that the reference has on the ground, m.
+    /// Raises the floor to the height, m, of a foot that the reference has on the ground.
     pub(super) fn take_floor(&mut self, is_first: bool, height: Real) {
         self.floor_m = if is_first {
             height
@@ -198,8 +198,9 @@ impl Supervisor {
         };
     }
 
-    /// Takes a finite measurement of state and velocity, 18 each, with the reference's state, the heights of the feet, m, those
-    /// on the ground and those that a walk has there (otherwise the measured ones); what is wrong.
+    /// Checks a finite measurement of state and velocity, 18 each, and returns the fault. `nominal` is the reference's
+    /// state, `heights` those of the feet (m), `is_down` the feet on the ground. `walks_on` are the feet that a walk
+    /// has on the ground, for other references the measured ones.
     pub(super) fn watch(
         &mut self,
         bounds: &Bounds,
@@ -398,8 +399,8 @@ impl Supervisor {
         largest / MEMORY_S > bounds.velocity_mismatch
     }
 
-    /// Whether contacts cannot be for too long: a foot on the ground is above the floor, or a body that no foot holds does
-    /// not fall.
+    /// Whether contacts have been impossible for too long: a foot on the ground is above the floor, or a body without a
+    /// foot on the ground does not fall.
     fn contradicts(
         &mut self,
         bounds: &Bounds,
@@ -457,7 +458,7 @@ impl Supervisor {
         is_opposed && bounds.contact_mismatch_steps > 0 && time_s - self.opposed_s > OPPOSED_S
     }
 
-    /// Adds up steps without a good plan, `passed_s` after the last one; what is wrong.
+    /// Adds up the time of steps without a good plan, `passed_s` after the last one; returns the fault.
     pub(super) fn judge(&mut self, bounds: &Bounds, is_poor: bool, passed_s: f64) -> Fault {
         self.poor_s = if is_poor { self.poor_s + passed_s } else { 0.0 };
         let most = bounds.poor_steps as f64;
@@ -469,7 +470,7 @@ impl Supervisor {
     }
 
     /// Writes torques that fade from the last ones into the damping of joint velocities, and a posture that fades into
-    /// the measured one; the share that is left of the joint PD. `passed_s` is the time since the last command.
+    /// the measured one. Returns the remaining share of the joint PD. `passed_s` is the time since the last command.
     pub(super) fn fade(
         &mut self,
         bounds: &Bounds,

@@ -163,8 +163,9 @@ pub(super) trait Trajectory {
         }
     }
 
-    /// Moves an input of the stage from a time on to the part of it for which a command is held, as the trajectory's own
-    /// input moves. Does nothing for commands that are held for whole stages.
+    /// Shifts the input of a stage to the time for which a command is held. The shift is the difference of the
+    /// trajectory's own mean inputs over that time and over the stage. Does nothing for commands that are held for
+    /// whole stages.
     fn move_input(&self, stage_s: f64, step_s: f64, now_s: f64, held_s: f64, input: &mut [Real]) {
         if held_s > WHOLE_STAGE * step_s {
             return;
@@ -217,8 +218,8 @@ pub(super) trait Trajectory {
         }
     }
 
-    /// Takes other scales for latent coordinates along x, y and yaw, if they are given: `place` has for each coordinate how
-    /// far it moves with each of the three (`3 d`), SI.
+    /// Replaces the scales of latent coordinates along x, y and yaw by the given ones that are positive. `place`
+    /// contains for each coordinate the displacement with each of the three (`3 d`), SI.
     fn write_place_scales(
         &self,
         place: &[Real],
@@ -349,7 +350,7 @@ pub(super) trait Trajectory {
     }
 }
 
-/// Writes what is between two states of the robot, or what else changes along a straight line.
+/// Interpolates linearly between two states of the robot, or between other quantities.
 pub(super) fn write_between(
     earlier: &[Real],
     later: &[Real],
@@ -377,8 +378,9 @@ pub(super) fn stages_between(from_s: f64, to_s: f64, step_s: f64, horizon: usize
     if is_within { whole as usize } else { 0 }
 }
 
-/// Scale of `(z, dz)` for a trajectory that stands still: the change of each latent alone that moves some joint by
-/// `STILL_SHARE` of half its range, and that change within `STILL_TIME_S`; `decoder` has `d` columns.
+/// Scale of `(z, dz)` for a trajectory that stands still. For a position it is the change of this latent alone that
+/// moves some joint by `STILL_SHARE` of half its range. For a velocity it is that change within `STILL_TIME_S`;
+/// `decoder` has `d` columns.
 pub(super) fn write_still(
     decoder: &[Real],
     lower: &[Real],

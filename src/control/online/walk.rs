@@ -13,8 +13,8 @@ use crate::robot::{ContactFlags, FOOT_DIM, JOINT_DIM, STATE_DIM};
 pub struct Strides {
     /// The gait of all strides.
     pub gait: Gait,
-    /// 160 numbers for each node: 18 states, 12 torques at the links and 6 zeros, 4 feet at rest, then the change of these with
-    /// the velocity forwards (m/s), to the left (m/s) and of yaw (rad/s).
+    /// 160 numbers per node: 18 states, 12 torques at the links and 6 zeros, 4 feet at rest. Then follow the changes of
+    /// these 40 with the velocity forwards (m/s), to the left (m/s) and of yaw (rad/s).
     pub nodes: Vec<f64>,
 }
 

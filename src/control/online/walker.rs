@@ -1,7 +1,7 @@
-//! A walk at a commanded velocity, sample by sample: strides of the training, blended. C is made of this file.
+//! A walk at a commanded velocity, sample by sample: strides of the training, blended. This file is translated to C.
 //!
-//! In: nodes of a stride over the velocity, a commanded velocity. Out: the samples of the next tenths of a second, in the axes
-//! of the path: x along it, y across, yaw from its heading. Read [`Walker::advance`] first.
+//! In: nodes of a stride over the velocity, a commanded velocity. Out: the samples of the next tenths of a second, in
+//! the axes of the path: x along it, y across, yaw from its heading. Read [`Walker::advance`] first.
 
 use super::dense::{Real, smaller};
 
@@ -38,7 +38,7 @@ pub struct Gait {
     pub stand: [Real; 36],
 }
 
-/// The samples of a walk and what the next one follows from.
+/// The samples of a walk and the state from which the next sample is computed.
 #[derive(Debug, Clone)]
 pub(super) struct Walker {
     /// Velocity that is commanded, and that of the last sample.
@@ -60,7 +60,8 @@ pub(super) struct Walker {
     pub dx: [Real; 18 * WINDOW],
     pub u: [Real; 18 * WINDOW],
     pub feet: [bool; 4 * WINDOW],
-    /// Of each sample the path's place (2) and heading where the walk began, its length along and across (2), its turning.
+    /// For each sample the path's place (2) and heading in the axes of its beginning, its length along and across
+    /// (2), and its turning rate.
     path: [f64; 6 * WINDOW],
 }
 
@@ -112,7 +113,7 @@ impl Walker {
         }
     }
 
-    /// Takes a command, kept within what can be commanded.
+    /// Sets the commanded velocity, clamped to the allowed range.
     pub(super) fn command(&mut self, gait: &Gait, velocity: &[Real]) {
         self.stops = false;
         for i in 0..3 {
@@ -148,7 +149,8 @@ impl Walker {
         time_s <= last_s && last_s < time_s + (horizon_s + AHEAD_S)
     }
 
-    /// Whether a walk stands at a time: it was to stop, or has no sample any more, where no supervisor saw the clock leap.
+    /// Whether a walk stands at a time: it was stopped, or it has no samples left because the clock leapt without a
+    /// supervisor.
     pub(super) fn rests(&self, time_s: f64) -> bool {
         let stands = self.stops && self.amplitude <= 0.0 && time_s >= self.rest_s;
         stands || time_s > self.time_s[WINDOW - 1]
@@ -173,7 +175,8 @@ impl Walker {
         self.time_s[WINDOW - 1] = self.time_s[WINDOW - 2] + SPACING_S;
     }
 
-    /// Velocity, amplitude and share of the stride of one more sample. A velocity changes at most by its range in `range_s`.
+    /// Velocity, amplitude and share of the stride of one more sample. A velocity changes at most by its range in
+    /// `range_s`.
     fn pace(&mut self, gait: &Gait, range_s: f64) {
         let part = (SPACING_S / range_s) as Real;
         let mut is_slow = true;
@@ -241,8 +244,8 @@ impl Walker {
         value
     }
 
-    /// One more sample at the end, in place of the first. Its torques are in `torque`; [`Walker::keep_input`] takes the input
-    /// that they make.
+    /// One more sample at the end, in place of the first. Its torques are in `torque`; pass the input that they produce
+    /// to [`Walker::keep_input`].
     pub(super) fn advance(&mut self, gait: &Gait, nodes: &[Real], range_s: f64) {
         self.shift();
         self.pace(gait, range_s);
@@ -278,7 +281,7 @@ impl Walker {
         }
     }
 
-    /// Takes the generalised input (18) of the last sample's stride.
+    /// Stores the generalised input (18) of the last sample's stride.
     pub(super) fn keep_input(&mut self, gait: &Gait, u: &[Real]) {
         for i in 0..18 {
             let stand = gait.stand[18 + i];

@@ -120,8 +120,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let share = boundary_share(complementarity);
         let mut longest = T::ZERO;
         let mut aim = T::ZERO;
-        // A loop of two turns, so that the passes over the stages are compiled once: the first looks for the step that
-        // does not centre, the second takes the one that does.
+        // A loop of two turns, so that the passes over the stages are compiled once. The first turn computes the
+        // predictor, a step without centring; the second computes the corrector.
         for turn in 0..2 {
             let is_corrected = turn > 0;
             if is_corrected {
@@ -130,7 +130,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
             let reach = self.advance(point.kept, is_corrected);
             longest = share / reach.times.or_larger(share);
             if !is_corrected {
-                // What is left of the products, exactly: a change that does not centre cancels their first order.
+                // The products that remain, exactly: the predictor cancels their first order.
                 let rest = T::ONE - longest;
                 let square = longest * longest;
                 let predicted = Point {
@@ -154,8 +154,8 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         longest
     }
 
-    /// Gains with the weights of the rows, and the constant parts of the inputs' changes for a step that does not
-    /// centre; `left` is the share of the rows' residuals that is left.
+    /// Gains with the weights of the rows, and the constant parts of the inputs' changes for the predictor. `left` is
+    /// the remaining share of the rows' residuals.
     #[inline(always)]
     fn predict(&mut self, left: T) -> bool {
         let shape = self.shape;
@@ -340,7 +340,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         let horizon = self.stages.len();
         let linked = self.is_linked();
         let softness = self.links.softness;
-        // The rows are linear: each step takes its share of all residuals.
+        // The rows are linear: each step reduces all residuals by its share.
         let rest = T::ONE - length;
         let mut sum = T::ZERO;
         let mut largest = T::ZERO;

@@ -10,10 +10,10 @@
 //! ```
 //!
 //! `N` is the difference of two matrices of the weights' size, and near the optimum the weight of an active row grows
-//! without bound: what is left of `N` would be rounding. Rows of a linked program are therefore softened: the equation
-//! of a row is `row · dv + ds − softness dy = −residual`, its weight `y / (s + softness y)` at most `1 / softness`. A
-//! step then leaves `softness dy` of a row, which vanishes with the steps, so that the optimum is that of the rows as
-//! they stand.
+//! without bound, so that only rounding would remain of `N`. Rows of a linked program are therefore softened. The
+//! equation of a row is `row · dv + ds − softness dy = −residual`, its weight `y / (s + softness y)` at most
+//! `1 / softness`. A step then leaves a residual of `softness dy` in a row. It vanishes with the steps, so the optimum
+//! is that of the original rows.
 
 use super::lower::Lower;
 use super::problem::{Program, Stage};
@@ -86,8 +86,8 @@ impl<T: Real, const NX: usize, const NU: usize> Before<T, NX, NU> {
         }
     }
 
-    /// Becomes the cost of the input before a stage that was eliminated, with weights and multipliers of its `count`
-    /// links, their rows of both stages, and the gradient `h` by the stage's own input. Writes the gain.
+    /// Becomes the cost of the input before a stage that was eliminated. It uses weights and multipliers of the stage's
+    /// `count` links, their rows of both stages, and the gradient `h` by the stage's own input. Writes the gain.
     #[inline(always)]
     pub(super) fn write(
         &mut self,
@@ -147,7 +147,7 @@ pub(super) fn pull_before<T: Real, const NU: usize>(
     *by_before = sum;
 }
 
-/// Takes what a stage's input answers off the gradient by the input before: `− K_beforeᵀ h`.
+/// Subtracts the response of a stage's input from the gradient by the input before: `− K_beforeᵀ h`.
 #[inline(always)]
 pub(super) fn take_answer<T: Real, const NU: usize>(
     gain: &[[T; NU]; NU],
@@ -159,7 +159,7 @@ pub(super) fn take_answer<T: Real, const NU: usize>(
     }
 }
 
-/// Takes the answer to the input before a stage off its own: `− K_before v_before`.
+/// Adds the response to the input before a stage to the stage's own input: `− K_before v_before`.
 #[inline(always)]
 pub(super) fn answer_before<T: Real, const NU: usize>(
     gain: &[[T; NU]; NU],

@@ -4,7 +4,7 @@ use super::riccati::{WIDE, add_multiple};
 use super::scalar::Real;
 
 /// Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, and columns 8 to
-/// 11 of the rows from the eighth on; what stands right of the diagonal is not read.
+/// 11 of the rows from the eighth on. Entries right of the diagonal are not read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lower<T, const NU: usize> {
     blocks: [[[T; 4]; NU]; WIDE / 4],
@@ -43,7 +43,7 @@ impl<T: Real, const NU: usize> Lower<T, NU> {
         }
     }
 
-    /// Adds `Σ w row rowᵀ`, and to `sum` `Σ y row`, of `count` rows, of which so many pairs of opposite ones come first.
+    /// Adds `Σ w row rowᵀ`, and to `sum` `Σ y row`, of `count` rows. The first `pairs` pairs of them are opposite rows.
     #[inline(always)]
     pub(super) fn add_rows(
         &mut self,

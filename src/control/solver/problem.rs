@@ -73,8 +73,8 @@ pub struct Shape {
     pub soft: usize,
     /// Rows that link the input to that of the stage before; their coefficients are in [`Links`].
     pub link: usize,
-    /// How many pairs of opposite rows on the input come first, the two sides of a limit: `row, −row`. Each takes the
-    /// products and squares of one row.
+    /// Number of leading pairs of opposite rows on the input, the two sides of a limit: `row, −row`. The products and
+    /// squares of each pair are computed once.
     pub pairs: usize,
 }
 

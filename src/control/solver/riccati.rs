@@ -153,7 +153,7 @@ fn add_products<T: Real, const NX: usize, const NU: usize, const N: usize, const
     out_x: &mut [[T; NX]; M],
     out_v: &mut [[T; WIDE]; M],
 ) {
-    // Two rows at a time: what is read of x and v serves both.
+    // Two rows at a time: each load of x and v serves both.
     for i in (0..M - M % 2).step_by(2) {
         let mut first_x = out_x[i];
         let mut second_x = out_x[i + 1];
@@ -188,7 +188,7 @@ fn factorise<T: Real, const NU: usize>(
         let mut pivot = matrix[j][j];
         let mut scaled = [T::ZERO; NU];
         for k in 0..j {
-            // The inverse of D is what is kept: L_jk D_k is the entry before its division.
+            // The inverse of D is stored: L_jk D_k is the entry before its division.
             scaled[k] = factor[k][j];
             pivot = pivot - factor[j][k] * scaled[k];
         }
@@ -354,9 +354,9 @@ impl<T: Real, const NX: usize, const NU: usize> Stage<T, NX, NU> {
         *end = sum;
     }
 
-    /// Gradient pass: from `p` at the stage's end, with the cost's gradient there added already, to `p` at its
-    /// beginning, and from the gradient `h` by the input to the whole one; the constant part of the input is
-    /// overwritten.
+    /// Gradient pass from the stage's end to its beginning. On input `p` is the gradient at the end, including the
+    /// cost's own, and `h` the gradient by the input. On output `p` is the gradient at the beginning and `h` the whole
+    /// gradient by the input. Overwrites the constant part of the input.
     #[inline(always)]
     pub(super) fn pull(&mut self, p: &mut [T; NX], h: &mut [T; NU]) {
         add_transposed(&self.b, p, h);

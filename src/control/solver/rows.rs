@@ -91,8 +91,8 @@ impl<'a, T: Real> Rows<'a, T> {
         }
     }
 
-    /// Changes of slacks and multipliers of a step that does not centre, from the products of the rows in `target`;
-    /// into `target`, how often they go into what is left of each.
+    /// Changes of slacks and multipliers in the predictor, from the products of the rows in `target`. Writes to
+    /// `target` the reciprocal of the largest step that each row permits.
     #[inline(always)]
     pub(super) fn change(&mut self, left: T) {
         for i in 0..self.count {

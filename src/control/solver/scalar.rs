@@ -3,7 +3,7 @@
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// `f64` or `f32`: what the solver needs of a number, all of it in `core`.
+/// `f64` or `f32`: the operations that the solver requires of a number, all available in `core`.
 pub trait Real:
     Copy
     + Debug

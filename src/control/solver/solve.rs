@@ -38,7 +38,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
 
     /// Solves the program from an initial state, with the gains of [`Program::prepare`] for the present stages.
     ///
-    /// `is_warm` says that inputs and multipliers are a guess at the solution, such as the last one's, shifted by a
+    /// `is_warm` means that inputs and multipliers are a guess at the solution, such as the last solution shifted by a
     /// stage.
     #[inline(always)]
     pub fn solve(&mut self, x0: &[T; NX], is_warm: bool, settings: &Settings<T>) -> Report<T> {
@@ -79,7 +79,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
                 iterations += 1;
                 let length = self.step(&mut point, settings);
                 if length < T::ZERO {
-                    // Where rounding ends the progress the residuals decide what the point is worth.
+                    // Rounding prevents further progress: the residuals decide whether the point is accepted.
                     break;
                 }
                 if (may_restart && length < T::of(SHORT_STEP)) || iterations % PATIENCE == 0 {
@@ -136,7 +136,7 @@ impl<T: Real, const NX: usize, const NU: usize, const LINKED: bool> Program<'_, 
         worst
     }
 
-    /// Takes the point of the gains for the solution: no row is active.
+    /// Uses the point of the gains as the solution: no row is active.
     #[inline(always)]
     fn take_gains(&mut self) {
         let shape = self.shape;

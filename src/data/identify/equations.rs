@@ -1,14 +1,15 @@
-//! The linear equations between motion and torques at every sample of a segment, from directions of trunk and legs in
-//! the world: axes of the recorded body position, z up, attitudes roll, pitch, yaw with `R = Rz Ry Rx`. Velocities of
-//! directions follow from the recorded rates; accelerations are differences of velocities, those of the recording
-//! included, so that all carry the same errors.
+//! The linear equations between motion and torques at every sample of a segment. They use directions of trunk and legs
+//! in the world: axes of the recorded body position, z up, attitudes roll, pitch, yaw with `R = Rz Ry Rx`. Velocities
+//! of directions follow from the recorded rates. Accelerations are differences of velocities, also instead of recorded
+//! ones, so that all have the same errors.
 //!
 //! With `m` the mass, `p` the trunk's origin, `e` directions of trunk and links (second derivatives `e''`) and `s_e`
 //! their first moments, Newton's law for the whole robot is `p'' = -g e_z + 1/m (sum_k F_k - sum_e s_e e'')`. A foot on
-//! the ground pushes with `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`: `Y_k pi` are the torques that move the
-//! leg's own links (first and second moments `pi`, linear), and contact is the torque of a foot of radius `r` that
-//! rolls with resistance `rho`. A leg in the air obeys `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter
-//! linearly; torques are taken a delay later, and a column of their rates tells by how much that delay is wrong.
+//! the ground pushes with `F_k = -J_k^-T (tau_k - losses - Y_k pi + contact)`. `Y_k pi` are the torques that move the
+//! leg's own links (first and second moments `pi`, linear). `contact` is the torque of a foot of radius `r` that rolls
+//! with resistance `rho`. A leg in the air obeys `tau_k = losses + Y_k pi`, joint by joint. All unknowns enter
+//! linearly. Torques are evaluated one delay later; the coefficient of a column of their rates is the error of that
+//! delay.
 
 use super::parameters::{CALF_FRONT, FOOT_RADIUS, ROLLING, THIGH_FRONT, TRUNK_FORWARD, TRUNK_UP};
 use super::*;
@@ -371,7 +372,7 @@ fn leg_frame(
     // A hip link without a length has no direction.
     let [along_hip, along_thigh, along_calf] = [links.hip, links.thigh, links.calf]
         .map(|link| link.try_normalize(0.0).unwrap_or_default());
-    // The body's front, whichever way the axis of a leg turns: the four legs share what is in front of their links.
+    // The body's front, for both directions of a leg's axis: the four legs share the moments in front of their links.
     let to_the_left = links.flexion * links.flexion.y.signum();
     let frame = LegFrame {
         abduction: attitude * links.abduction,

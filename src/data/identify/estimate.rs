@@ -1,5 +1,5 @@
-//! From recordings to an [`Identification`]: equations, fit and delay in turn until they agree; and whether recordings
-//! are of one robot: torques bear its weight, it falls in flight, and its mass is that of the others.
+//! From recordings to an [`Identification`]: equations, fit and delay in turn until they agree. Also checks that
+//! recordings are of one robot: torques bear its weight, it falls in flight, and its mass is that of the others.
 
 use std::collections::BTreeMap;
 

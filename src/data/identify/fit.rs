@@ -112,7 +112,7 @@ fn left(row: &Row, mass_kg: f64) -> f64 {
 }
 
 impl Iteration {
-    /// Solves once, then takes the deviations of the new residuals. `None` if singular even with the priors.
+    /// Solves once, then computes the deviations of the new residuals. `None` if singular even with the priors.
     pub(crate) fn step(&mut self, rows: &[Row], priors: &[Prior], mass_kg: f64) -> Option<()> {
         let normal = self.normal(rows, priors, mass_kg);
         let (estimate, _) = normal.solve_not_negative()?;

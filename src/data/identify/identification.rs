@@ -1,4 +1,4 @@
-//! What a robot is by its recordings, also as a TOML file.
+//! The parameters of a robot identified from recordings, also as a TOML file.
 
 use serde::{Deserialize, Serialize};
 
@@ -168,7 +168,7 @@ impl Identification {
         let errors = body(error.gravity_m_s2, error.mass_kg, Some(error.delay_s));
         let Samples { contact, flight } = self.samples;
         let mut out = String::from(
-            "# What `romc identify` found in recordings. SI units: m, s, kg, N m, rad.\n",
+            "# Identified from recordings by `romc identify`. SI units: m, s, kg, N m, rad.\n",
         );
         let notes = self.notes.iter();
         out.extend(notes.map(|note| format!("# {}\n", note.replace(['\n', '\r'], " "))));

@@ -1,8 +1,8 @@
-//! What recordings say of the robot: gravity, mass, the joints' losses, the legs' own inertia. Enters: recordings and
-//! the robot's geometry. Leaves: an [`Identification`], each value with its standard error, and the file that keeps it.
-//! Read `estimate` first, the loop around the fit and the refusal of recordings that contradict each other;
+//! Identification of the robot from recordings: gravity, mass, the joints' losses, the legs' own inertia. In:
+//! recordings and the robot's geometry. Out: an [`Identification`], each value with its standard error, and its file.
+//! Read `estimate` first, the loop around the fit and the rejection of recordings that contradict each other;
 //! `equations` has the linear equations of every sample, `windows` their averages, `fit` the weighted least squares.
-//! `docs/identify.md` has the method and measured figures.
+//! `docs/explanation/identification.md` has the method and measured values.
 //!
 //! ```
 //! use std::path::Path;

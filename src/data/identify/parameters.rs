@@ -11,7 +11,7 @@ pub(crate) const DRY: usize = 5; // first of three dry frictions, N m
 pub(crate) const ARMATURE: usize = 8; // first of three, kg m^2
 pub(crate) const TRUNK_FORWARD: usize = 11; // first moment of the trunk along its x axis, kg m
 pub(crate) const TRUNK_UP: usize = 12; // along its z axis
-pub(crate) const LEG_SIDE: usize = 13; // first moment of a leg beside its axis of abduction, kg m
+pub(crate) const LEG_SIDE: usize = 13; // first moment of a leg sideways from its axis of abduction, kg m
 pub(crate) const THIGH: usize = 14; // first moment along its length, with the calf's mass at the knee, kg m
 pub(crate) const THIGH_SECOND: usize = 15; // second moment of the same, kg m^2
 pub(crate) const CALF: usize = 16; // first moment along its length, kg m
@@ -42,7 +42,7 @@ const HIP_LIKE_THIGH: [(usize, f64, f64); 3] = [
     (ARMATURE, 0.3, 1e-3),
 ];
 
-/// What is known of any quadruped of this size and mass (kg). `losses` are present estimates, SI.
+/// Prior knowledge of any quadruped of this size and mass (kg). `losses` are present estimates, SI.
 pub(crate) fn priors(
     geometry: &LegGeometry,
     mass_kg: f64,

@@ -1,5 +1,5 @@
-//! Plausibility: what a recording says that a robot cannot have done, with row and column; samples are left out only by
-//! [`without`], when asked. Numbers that are not finite never get here: reading refuses them.
+//! Plausibility: values in a recording that are physically impossible for the robot, with row and column. Samples are
+//! removed only by [`without`], on request. Numbers that are not finite never get here, because reading rejects them.
 
 use super::*;
 
@@ -17,7 +17,7 @@ const BODY_XY: Range<usize> = JOINT_DIM..JOINT_DIM + 2; // coordinates of the bo
 const CLIPPED_SAMPLES: usize = 5; // equal consecutive velocities at an extreme that count as clipped
 const STEP_SHARE: f64 = 0.5; // departure of a time step from the median, as a share of it
 
-/// What is wrong with a run of samples; a finding's `bound` is what its `value` breaks.
+/// A kind of fault in a run of samples; the `value` of a finding violates its `bound`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Implausible {
     Torque,
@@ -28,9 +28,9 @@ pub enum Implausible {
     Acceleration,
     Clipped,
     TimeStep,
-    /// `value` is the span of thigh and calf (the knee's column) or the height of the hip over the foot (the flexion's),
-    /// as in [`LegGeometry::spans`](crate::robot::LegGeometry::spans), `bound` where damping begins. The robot may well
-    /// have done that: such samples are reported, and never left out.
+    /// `value` is the span of thigh and calf (the knee's column) or the height of the hip over the foot (the
+    /// flexion's), as in [`LegGeometry::spans`](crate::robot::LegGeometry::spans); `bound` is where damping begins.
+    /// Such samples may be real: they are reported, and never removed.
     NearSingular,
 }
 
@@ -44,7 +44,7 @@ impl Implausible {
         match self {
             Self::Torque => "torque above the joint's limit",
             Self::JointAngle => "angle outside the joint's limits",
-            Self::Speed => "speed above what is possible",
+            Self::Speed => "speed above the possible one",
             Self::Jump => "position jumps faster than is possible",
             Self::Velocity => "velocity disagrees with differences of the position",
             Self::Acceleration => "acceleration disagrees with differences of the velocity",
@@ -297,7 +297,7 @@ fn slope(time_s: &[f64], values: &[f64], j: usize) -> f64 {
     (values[j] - values[j - 1]) / (time_s[j] - time_s[j - 1])
 }
 
-/// Three times the median change of slope from step to step: what noise puts between a rate and differences.
+/// Three times the median change of slope from step to step: the difference between a rate and a slope due to noise.
 fn noise(time_s: &[f64], values: &[f64]) -> f64 {
     let change = |j: usize| (slope(time_s, values, j + 1) - slope(time_s, values, j)).abs();
     3.0 * quantile((1..values.len().saturating_sub(1)).map(change), 0.5)

@@ -1,22 +1,23 @@
-//! Segments whose time stamps disagree with their motion, mended; and times since an epoch, kept to the nanosecond. A
-//! logger that counts samples says that time passes evenly even where samples came late or were lost; between two the
-//! robot moved by velocity times elapsed time. Coordinates that disagree on the clock are themselves wrong.
+//! Repair of segments whose time stamps disagree with their motion; and times since an epoch, exact to the nanosecond.
+//! A logger that counts samples writes even time steps also where samples came late or were lost. Between two samples
+//! the robot moved by velocity times elapsed time. If coordinates disagree on the elapsed time, the coordinates are
+//! faulty.
 
 use super::mismatch::falls_of;
 use super::preprocess::resampled;
 use super::*;
 
 const LEAST_DISAGREEMENT: f64 = 0.03; // elapsed over stamped time from which a segment's clock is replaced
-const JOINT_WEIGHT: f64 = 0.01; // weight of a joint's motion (rad/s)^2 beside that of the body's position (m/s)^2
+const JOINT_WEIGHT: f64 = 0.01; // weight of a joint's motion (rad/s)^2 relative to that of the body's position (m/s)^2
 const STANDSTILL: f64 = 1e-3; // motion that counts as evidence of either clock, (m/s)^2
 const AGREES: f64 = 0.25; // largest deviation of a coordinate's elapsed over stamped time from the median, relative
 const COORDINATES: usize = JOINT_DIM + BODY_DIM / 2; // joints, body position: body angles are mended by themselves
 const SAME_SAMPLE: f64 = 0.4; // samples closer than this share of a step are the same sample, logged again
-const LOST_STEPS: f64 = 5.0; // steps between two samples from which what lies between them is lost rather than late
+const LOST_STEPS: f64 = 5.0; // steps between two samples from which the samples between them are lost rather than late
 const RATE_DISAGREEMENT: f64 = 0.2; // of the trunk's angular rates with its angles, from which they are replaced
 const EVEN: f64 = 0.01; // unevenness of time steps, relative, from which a segment is resampled
 
-/// A segment at even time steps, and what its own clock said.
+/// A segment at even time steps, and the repairs of its clock.
 #[derive(Debug, Clone)]
 pub(crate) struct Timed {
     /// At even steps.
@@ -136,7 +137,7 @@ fn lost(samples_s: &[f64], time_s: &[f64], step_s: f64) -> Vec<bool> {
     time_s.iter().map(of).collect()
 }
 
-/// The samples at times that their motion says, without those that were logged twice.
+/// The samples at times computed from their motion, without those that were logged twice.
 fn by_motion(segment: &Segment, elapsed: &[Interval]) -> Segment {
     let least_s = SAME_SAMPLE * segment.mean_step_s();
     let mut now = segment.time_s[0];
@@ -253,7 +254,7 @@ impl Instant {
     }
 }
 
-/// The time of day, and what its zone is ahead of Greenwich, in s.
+/// The time of day, and the offset of its zone from Greenwich, in s.
 fn without_zone(time: &str) -> Option<(&str, i64)> {
     if let Some(clock) = time.strip_suffix(['Z', 'z']) {
         return Some((clock, 0));

@@ -1,6 +1,6 @@
-//! Logs that generated controllers write (`NAME_log_write` of `--emit controller-c`): the columns of a recording without
+//! Logs of generated controllers (`NAME_log_write` of `--emit controller-c`): the columns of a recording without
 //! accelerations, then those of the command. Numbers may be infinite or undefined, and times may stand still or go
-//! back, as in the measurements that a controller refuses.
+//! back, as in measurements that a controller refuses.
 
 use super::foreign::{TextFormat, read_lines};
 use super::lines::{Lines, cells};

@@ -1,10 +1,11 @@
 //! Numbers that lost their decimal point, and the samples that they were before a resampling.
 //!
 //! A spreadsheet that separates thousands by points reads `1.13946` as 113946 and `6.06e-05` as 6.06, and leaves
-//! `0.374` alone; some exports divide all by 1000. Angles of a joint beyond a full turn give that away. A number of
-//! magnitude 1 or more may then stand for itself with the point one or more places to the left, down to 1, and one
-//! between 1 and 10 for 1e-5 times itself: the one that continues the motion is chosen. Where the file was resampled
-//! afterwards, by a cubic spline, its rows mix broken and sound numbers; the samples of the spline are found first.
+//! `0.374` alone; some exports divide all by 1000. Joint angles beyond a full turn reveal such a file. Then a number of
+//! magnitude 1 or more may represent itself with the point one or more places to the left, down to 1. A number between
+//! 1 and 10 may also represent 1e-5 times itself. The value that continues the motion is chosen. If the file was
+//! resampled afterwards, by a cubic spline, its rows mix broken and sound numbers; the samples of the spline are found
+//! first.
 
 use super::*;
 
@@ -98,7 +99,7 @@ fn remake(rows: &mut DMatrix<f64>, remade: impl Fn(&[f64]) -> Vec<f64>) {
     }
 }
 
-/// What a number may stand for.
+/// The values that a number may represent.
 fn meanings(value: f64) -> Vec<f64> {
     let mut all = vec![value];
     let mut divisor = 10.0;

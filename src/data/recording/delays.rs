@@ -1,5 +1,5 @@
-//! Columns that are later than the motion, or held: rates that are filtered, clipped or differences of held samples,
-//! and a body whose place arrives later than the joints. Angles of joints and body are taken to be right.
+//! Columns that lag the motion, or are held: rates that are filtered, clipped or differences of held samples, and a
+//! body position that arrives later than the joints. Angles of joints and body are assumed to be right.
 
 use super::mismatch::foot_slip_m;
 use super::preprocess::slopes;
@@ -8,7 +8,8 @@ use super::*;
 const HALF_WINDOW_S: f64 = 0.015; // of the slopes that replace rates
 const LONGEST_S: f64 = 0.03; // longest delay that is looked for
 const LEAST_S: f64 = 0.004; // shortest that counts
-/// What a delay leaves of the disagreement without it, at most: of rates (their unexplained share), of feet (their slip).
+/// Largest share of the disagreement that may remain after the correction of a delay: of rates (their unexplained
+/// share), of feet (their slip).
 const RATES_EXPLAINED: f64 = 0.75;
 const UNEXPLAINED: f64 = 0.2; // share of rates above which they are noise rather than late
 const SLIP_EXPLAINED: f64 = 0.75;
@@ -126,7 +127,7 @@ fn clipped(rates: &DMatrix<f64>, slopes: &DMatrix<f64>) -> Option<f64> {
         })
 }
 
-/// Share of the squares of rates that slopes of `lag` samples before do not explain, whatever the factor.
+/// Share of the squares of rates that the slopes of `lag` samples before do not explain, with the best factor.
 fn unexplained(rates: &DMatrix<f64>, slopes: &DMatrix<f64>, lag: usize) -> f64 {
     let n = rates.ncols() - lag;
     let (late, early) = (rates.columns(lag, n), slopes.columns(0, n));

@@ -12,7 +12,7 @@ pub type RecordingError = Located<RecordingFault>;
 pub(super) type Outcome<T> = Result<T, RecordingError>;
 pub(super) type Checked<T> = Result<T, RecordingFault>;
 
-/// What is wrong at a place.
+/// A fault at a place in a recording.
 #[derive(Debug, Error)]
 pub enum RecordingFault {
     #[error("found {found}, expected {expected}")]
@@ -70,7 +70,7 @@ impl RecordingFault {
     }
 
     pub(super) fn other_format(format: &OtherFormat) -> Self {
-        let makes = "a text table or an MCAP log; this makes one";
+        let makes = "a text table or an MCAP log; convert the file with";
         unexpected(&*format.what, format!("{makes}: {}", format.remedy))
     }
 

@@ -29,7 +29,8 @@ pub struct RecordingSet {
 }
 
 impl RecordingSet {
-    /// Reads recordings of `robot`, two at a time where there are two cores; `self` has what was read before an error.
+    /// Reads recordings of `robot`, two at a time on two or more cores; `self` has those that were read before an
+    /// error.
     ///
     /// # Errors
     /// The first fault in the order of the files, or a recording that contradicts physics or the others.
@@ -144,7 +145,7 @@ fn chosen(file: &RecordingFile, mut recording: Recording) -> Vec<Recording> {
         .collect()
 }
 
-/// What becomes of samples that a robot cannot have done.
+/// Treatment of physically impossible samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ImplausibleSamples {
     #[default]
@@ -157,7 +158,7 @@ pub enum ImplausibleSamples {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Accelerations {
-    /// The recording's own columns, differences where it has none.
+    /// Columns of the recording, or differences if it has none
     #[default]
     Recorded,
     /// Differences of the recorded velocities.
@@ -186,8 +187,8 @@ pub struct ConditionOptions {
     pub smoothing: Option<(SavitzkyGolay, SmoothedRows)>,
 }
 
-/// Applies the steps in the order of [`ConditionOptions`] to a recording with these findings; returns it with the
-/// number of samples left out: implausible ones and pieces between them that are too short.
+/// Applies the steps in the order of [`ConditionOptions`] to a recording with these findings. Returns it with the
+/// number of samples removed: implausible ones and pieces between them that are too short.
 ///
 /// # Errors
 /// [`RecordingFault::Unexpected`] if nothing long enough remains, or a segment is shorter than the filter.

@@ -9,8 +9,9 @@ const LEAST_SWING_S: f64 = 0.06; // of a foot; shorter ones are chatter of its c
 const LEAST_PIECE: usize = 50; // samples, as a training needs them
 
 impl Segment {
-    /// The motion, cut where it has turned by 0.25 rad, in pieces of 50 samples or more. Each piece is turned about the vertical
-    /// through the world's origin, so that it begins with yaw 0. A motion that never leaves +-0.25 rad stays as it is.
+    /// The motion, cut where it has turned by 0.25 rad, in pieces of 50 samples or more. Each piece is turned about the
+    /// vertical through the world's origin, so that it begins with yaw 0. A motion that never leaves +-0.25 rad stays
+    /// unchanged.
     pub fn by_heading(&self) -> Vec<Cow<'_, Segment>> {
         let yaw = self.x.row(YAW);
         if yaw.iter().all(|yaw| yaw.abs() <= LARGEST_TURN_RAD) {
@@ -57,7 +58,8 @@ pub fn about_vertical([x, y]: [f64; 2], angle_rad: f64) -> [f64; 2] {
     [cosine * x - sine * y, sine * x + cosine * y]
 }
 
-/// Mean time from one touchdown of a foot to its next, in s; none unless feet touch down three times each in a motion, in the mean.
+/// Mean time from one touchdown of a foot to its next, in s; none unless feet touch down three times each in a motion,
+/// on average.
 pub fn stride_s<'a>(motions: impl Iterator<Item = &'a Segment>) -> Option<f64> {
     let (mut total_s, mut strides, mut feet) = (0.0, 0, 0);
     for segment in motions {

@@ -33,7 +33,7 @@ impl<'a> Lines<'a> {
         Self::of(path, file, size.map_or(u64::MAX, |size| size.len()))
     }
 
-    /// Of a source of so many bytes, which bound what they may unpack to, plain or gzip.
+    /// Lines of a source of `size` bytes, plain or gzip; the size limits the unpacked length.
     pub(crate) fn of(path: &'a Path, mut source: impl Read + 'a, size: u64) -> Outcome<Self> {
         let mut start = Vec::with_capacity(MAGIC_BYTES);
         let mut first = (&mut source).take(MAGIC_BYTES as u64);

@@ -1,7 +1,7 @@
-//! Mismatches: what whole jumps say that cannot be true of this robot. A recording of possible samples can still be of
-//! another robot, in other units, or have legs, signs or columns exchanged. The robot's geometry shows it: a foot on
-//! the ground stays where it is, the feet carry the weight, a body in flight falls. Figures over a whole recording are
-//! compared with the bounds of `docs/recordings.md`.
+//! Mismatches: contradictions between whole recordings and this robot. A recording of possible samples can still be of
+//! another robot, in other units, or have legs, signs or columns exchanged. The robot's geometry reveals it: a foot on
+//! the ground stays in place, the feet carry the weight, a body in flight falls. Metrics over a whole recording are
+//! compared with the bounds of `docs/reference/recordings.md`.
 
 mod feet;
 mod stance;
@@ -19,7 +19,7 @@ const READING_FACTOR: f64 = 1.4; // times that feet have to stay better in place
 const READING_LEAST_M: f64 = 3e-4; // by how much they have to stay better in place, m
 const PLACE: (f64, f64) = (2.0, 0.004); // the same two with the body's place read otherwise, factor and m
 const FALL_M_S2: (f64, f64) = (-16.0, -6.5); // vertical acceleration of the body in flight, m/s^2
-const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7); // force of the feet over what weight and acceleration need
+const WEIGHT_SHARE: (f64, f64) = (0.45, 1.7); // force of the feet over the force for weight and acceleration
 const UNCARRIED_S: f64 = 0.08; // longest time on the ground in which torques may carry less than a quarter of that, s
 const HIP_SHARE: f64 = -0.3; // least share of hips' torques that hold the feet on their own side: 1 for vertical forces
 const HIP_SHARE_OF_PAIR: f64 = -0.5; // the same where both legs of one end alone are below that
@@ -66,7 +66,7 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     let balance = Balance::of(recording, robot);
     let (place, is_attitude) = place(recording, robot, &slip).unzip();
     let floor_m = feet::floor_m(recording, robot);
-    // In another attitude the feet's heights say nothing of their columns.
+    // In another attitude the feet's heights do not identify their columns.
     let columns = match is_attitude {
         Some(true) => None,
         _ => feet::columns(recording, robot),
@@ -89,7 +89,7 @@ pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     found.into_iter().flatten().collect()
 }
 
-/// The figures that [`mismatches`] compares with its bounds; none where a recording has too little of what they need.
+/// The metrics that [`mismatches`] compares with its bounds; none if a recording has too few data for them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figures {
     foot_slip_m: Option<f64>, // root mean square of the places of feet on the ground about the medians of their stances
@@ -112,7 +112,7 @@ impl Figures {
     }
 }
 
-/// What cannot be true of any robot, or of one robot: the index of the recording, and words.
+/// A contradiction of recordings with any robot, or with one robot: the index of the recording, and words.
 pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
     let each = || balances.iter().enumerate();
     let shares = || each().filter_map(|(at, balance)| Some((at, balance.weight_share?)));
@@ -223,13 +223,13 @@ fn weight(balance: &Balance, robot: &Robot) -> Found {
     let (value, (low, high)) = (balance.weight_share?, WEIGHT_SHARE);
     let mass_kg = (1e6 * robot.mass_kg()).round() / 1e6;
     let words = format!(
-        "the torques carry {value:.3} of what {mass_kg} kg need ({low} to {high} are accepted): torques in other \
+        "the torques carry {value:.3} of the force that {mass_kg} kg need ({low} to {high} are accepted): torques in other \
          units, of other signs or other joints, or another robot"
     );
     mismatch("weight", beyond(value, WEIGHT_SHARE), words)
 }
 
-/// Times of the robot on the ground that its torques do not carry, as where joints are controlled besides.
+/// Times of the robot on the ground that its torques do not carry, as with additional position control of the joints.
 fn carried(recording: &Recording, robot: &Robot) -> Found {
     let segments = recording.segments.iter();
     let times: Vec<_> = segments
@@ -242,8 +242,8 @@ fn carried(recording: &Recording, robot: &Robot) -> Found {
         .filter(|time| time.end - time.start > UNCARRIED_S);
     let shown = long.map(|time| format!("{:.2} to {:.2} s", time.start, time.end));
     let words = format!(
-        "on the ground the torques carry less than a quarter of what the motion needs ({}): a model whose inputs they are \
-         cannot predict it there; were joints controlled by position besides?",
+        "on the ground the torques carry less than a quarter of the force that the motion needs ({}): a model with these \
+         inputs cannot predict it there; were joints also controlled by position?",
         shown.take(4).collect::<Vec<_>>().join(", ")
     );
     mismatch("carried", outside(longest_s, 0.0, UNCARRIED_S), words)
@@ -271,7 +271,7 @@ fn hip_torques(balance: &Balance) -> Found {
 
 const MILLISECONDS: &str = "velocities per millisecond, or positions in millimetres";
 const TURNS: &str = "positions in degrees and velocities in radians";
-/// Factors by which velocities may be off, with what they come from: a unit with the expected one, or other words.
+/// Factors of wrong velocities, with their causes: a unit with the expected one, or other words.
 const FACTORS: [(f64, &str, &str); 6] = [
     (57.2958, "degrees where radians", "deg/s"),
     (0.017_453_3, TURNS, ""),

@@ -1,8 +1,8 @@
-//! Recorded jumps: reading, checking, phases, preprocessing, writing. Enters: CSV files of one or several jumps, plain
-//! or gzip, or logs of other programs. Leaves: segments of consecutive samples in SI units, samples as columns; spans
-//! of contact phases; reports of what is implausible, or not this robot. Read [`Segment`] for the data first, then
-//! [`Reader`] for the format, [`mod@check`], [`mismatch`], [`condition()`], [`PhaseRule`] and [`preprocess`] for what is
-//! done with it, and [`write()`].
+//! Recorded jumps: reading, checking, phases, preprocessing, writing. In: CSV files of one or several jumps, plain or
+//! gzip, or logs of other programs. Out: segments of consecutive samples in SI units, samples as columns; spans of
+//! contact phases; reports of implausible samples and of recordings that are not of this robot. Read [`Segment`] for
+//! the data first, then [`Reader`] for the format. [`mod@check`], [`mismatch`], [`condition()`], [`PhaseRule`] and
+//! [`preprocess`] process recordings, [`write()`] writes them.
 //!
 //! ```
 //! use romc::recording::{self, PhaseRule};

@@ -80,7 +80,8 @@ impl PhaseRule {
         ])
     }
 
-    /// A trot: `fr_rl` and `fl_rr`, the diagonal pairs or one foot of them, `all` for every other contact, and `flight`.
+    /// A trot: `fr_rl` and `fl_rr`, the diagonal pairs or one foot of them, `all` for every other contact, and
+    /// `flight`.
     pub fn trot() -> Self {
         let pairs = ["fr_rl=1001,1000,0001", "fl_rr=0110,0100,0010"];
         Self::read([pairs[0], pairs[1], "all=any", "flight=none"])
@@ -185,7 +186,7 @@ fn merge_short(runs: impl Iterator<Item = Run>, min_samples: usize) -> Vec<Run> 
     let mut out: Vec<Run> = Vec::new();
     for (phase, range) in runs {
         match out.last_mut() {
-            // A short first run has nothing before it and joins what follows.
+            // A short first run has nothing before it and joins the next run.
             Some((first, before)) if before.len() < min_samples => {
                 *first = phase;
                 before.end = range.end;

@@ -1,8 +1,9 @@
 //! From segments to phases ready for training: accelerations by differences, smoothing, resampling of each phase to
 //! whole batches (section IV-C4). Nothing crosses the border of a segment. Scaling belongs to the model.
 //!
-//! Savitzky-Golay smoothing fits a polynomial to each window of equally spaced samples by least squares; its value at
-//! the centre, at the ends off centre, replaces a sample: none is lost, polynomials up to the order pass unchanged.
+//! Savitzky-Golay smoothing fits a polynomial to each window of equally spaced samples by least squares. Its value at
+//! the centre replaces a sample; at the ends of the data its value off the centre. No sample is lost, and polynomials
+//! up to the order are unchanged.
 
 use std::str::FromStr;
 
@@ -51,8 +52,8 @@ pub fn differences(time_s: &[f64], rows: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Slopes of straight lines through the samples within `half_s` of each time, or of the nearest such window inside: they
-/// see through samples that are held or noisy. Rows as of [`differences`].
+/// Slopes of straight lines through the samples within `half_s` of each time, or of the nearest such window inside.
+/// They are robust against samples that are held or noisy. Rows as of [`differences`].
 pub(super) fn slopes(time_s: &[f64], rows: &Rows, half_s: f64) -> Rows {
     let n = time_s.len().min(rows.ncols());
     let mut out = DMatrix::zeros(rows.nrows(), rows.ncols());

@@ -1,6 +1,6 @@
-//! How files become recordings: by romc's own names or a map of columns, with clocks as stamped or mended. romc's own
-//! text: `;` or tabs with decimal comma or point, or `,` with decimal point, found from the header; columns by name in
-//! any order; gzip found from the first two bytes. Memory is bounded by the samples kept.
+//! From files to recordings: by romc's own names or a map of columns, with clocks as stamped or repaired. romc's own
+//! text uses `;` or tabs with decimal comma or point, or `,` with decimal point, detected from the header. Columns are
+//! identified by name in any order, gzip by the first two bytes. Memory is bounded by the samples kept.
 
 use std::sync::Arc;
 
@@ -12,15 +12,15 @@ use super::foreign::{TextFormat, assemble, is_mcap, read_lines, read_mcap, read_
 use super::lines::Lines;
 use super::*;
 
-/// What becomes of clocks that disagree with the motion.
+/// Treatment of clocks that disagree with the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Clocks {
     /// Times, steps and angular rates stay as recorded
     #[default]
     Recorded,
-    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, rates that the angles
-    /// contradict become their slopes; lost decimal points and a late place of the body are mended
+    /// Times that disagree with the motion are rebuilt from it, uneven steps are resampled, and rates that contradict
+    /// the angles become their slopes. Lost decimal points and a late body position are also repaired
     Repaired,
 }
 
@@ -32,19 +32,19 @@ pub struct Reader {
     pub(super) clocks: Clocks,
 }
 
-/// A recording and what was done to it besides reading.
+/// A recording and the changes made to it while reading.
 #[derive(Debug, Clone)]
 pub struct Reading {
     /// In SI units.
     pub recording: Recording,
-    /// What was derived, resampled, turned or cut, in words.
+    /// Quantities derived, resampled, turned or cut, in words.
     pub notes: Vec<String>,
-    /// What was mended, segment by segment; empty with [`Clocks::Recorded`].
+    /// The repairs, segment by segment; empty with [`Clocks::Recorded`].
     pub mended: Vec<Mended>,
 }
 
 impl Reader {
-    /// A reader by a map of columns, or romc's own names, that treats clocks as told.
+    /// A reader by a map of columns, or romc's own names, with this treatment of clocks.
     pub fn new(map: Option<ColumnMap>, clocks: Clocks) -> Self {
         Self {
             map: map.map(Arc::new),
@@ -53,7 +53,7 @@ impl Reader {
         }
     }
 
-    /// The reader for recordings of a robot, whose names of joints it knows; the Go1's otherwise.
+    /// The reader for recordings of a robot, for the names of its joints; the default is the Go1.
     pub fn for_robot(self, robot: &'static Robot) -> Self {
         let robot = Some(robot);
         Self { robot, ..self }
@@ -249,13 +249,13 @@ fn by_guess(path: &Path, robot: &Robot) -> Outcome<Reading> {
     }
     let map = ColumnMap::parse(&format!("{}: the guessed map", path.display()), &guess.text)?;
     let mut reading = assemble(path, &logs, &map)?;
-    let note = "topics are taken by their names (`romc inspect --guess` prints the map)";
+    let note = "topics are identified by their names (`romc inspect --guess` prints the map)";
     reading.notes.push(note.to_owned());
     reading.notes.extend(guess.notes);
     Ok(reading)
 }
 
-const REBUILT: &str = "times are rebuilt from the motion, which takes {} s in a recorded second";
+const REBUILT: &str = "times are rebuilt from the motion, which lasts {} s per recorded second";
 const EVENED: &str = "uneven steps are resampled";
 const REPLACED: &str = "angular rates, which disagree with the angles, are slopes of these";
 /// Repairs of clocks, in words; `{}` is the range of [`Mended::elapsed_ratio`].
@@ -265,7 +265,7 @@ const REPAIRS: [(fn(&Mended) -> bool, &str); 3] = [
     (|m| m.rates_replaced, REPLACED),
 ];
 
-/// What was done to several recordings besides reading.
+/// The changes made to several recordings while reading.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReadingNotes {
     recordings: usize,

@@ -208,9 +208,10 @@ impl Segment {
         std::array::from_fn(|i| self.torque_nm[(i, sample)])
     }
 
-    /// Accelerations, 18 x n: [`Self::ddx`] averaged over 20 ms within stretches of equal contact (a foot down, or none),
-    /// so that noise and the spikes of landings do not become torques; of a walk over 10 ms, 5 samples at 500 Hz, within stretches of the same feet:
-    /// the spike of a touchdown belongs to the stance that it begins.
+    /// Accelerations, 18 x n: [`Self::ddx`] averaged over 20 ms within stretches of equal contact (a foot down, or
+    /// none), so that noise and the spikes of landings do not become torques. For a walk they are averaged over 10 ms,
+    /// 5 samples at 500 Hz, within stretches of the same feet: the spike of a touchdown belongs to the stance that it
+    /// begins.
     fn smoothed_accelerations(&self) -> DMatrix<f64> {
         let (window_s, stretches) = match self.is_walk {
             true => (
@@ -261,11 +262,11 @@ impl Segment {
         out
     }
 
-    /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model: `tau` are the torques at
-    /// the links, recorded ones less [`Segment::losses`], `F` and `M` what they and the contacts do to the body
-    /// (equation 22); under the published rule the file's own, if it carries them. Torques beyond a limit of the robot's
-    /// motors, such as commanded ones, count as the limit. Near a singularity of a leg in contact its force is damped
-    /// ([`Robot::damped_force_map`]).
+    /// Input `u = [tau; F; M]`, 18 x n, in N m and N (equation 23), by the rule of a model. `tau` are the torques at
+    /// the links, recorded ones minus [`Segment::losses`]. `F` and `M` are the force and moment on the body by these
+    /// torques and the contacts (equation 22); under the published rule the file's own, if it has them. Torques beyond
+    /// a limit of the robot's motors, such as commanded ones, count as the limit. Near a singularity of a leg in
+    /// contact its force is damped ([`Robot::damped_force_map`]).
     ///
     /// # Errors
     /// [`RecordingFault::Wrench`] with the row of an angle or torque that is not finite.

@@ -1,5 +1,5 @@
 //! Writer of the recordings' CSV format. Numbers have the fewest digits that read back to the same bits. Files appear
-//! whole or not at all: they are written beside their place and then renamed.
+//! whole or not at all: they are written under a temporary name in the same folder and then renamed.
 
 use std::fmt::Write as _;
 use std::io::Write;
@@ -20,7 +20,7 @@ pub enum Notation {
     Comma,
 }
 
-/// What a file looks like.
+/// The notation and columns of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WriteOptions {
     /// Cell separator and decimal mark.

@@ -152,7 +152,7 @@ impl SettingText {
         }
     }
 
-    /// What switches it off in the generated C of this precision, if it is a bound of the supervisor.
+    /// The value that disables it in the generated C of this precision, if it is a bound of the supervisor.
     pub(in crate::deploy) fn off(&self, real: &str) -> Option<String> {
         match (self.setting.accepts, self.setting.kind) {
             (Accepts::Bound, "Real") => Some(format!("({real})INFINITY")),

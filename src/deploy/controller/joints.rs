@@ -71,7 +71,8 @@ fn axis(of_joint: [f64; 3]) -> String {
     }
 }
 
-/// What the names of the leg's joints, and of no others, begin with up to a `_`, or the leg's name here; with `foot`.
+/// The common beginning, up to a `_`, of the names of the leg's joints and of no others, otherwise the leg's name; with
+/// `foot`.
 fn foot_name(robot: &Robot, leg: Leg) -> String {
     let names = &robot.joint_names;
     let first = names[LEG_JOINT_DIM * leg.index()];

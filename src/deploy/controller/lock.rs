@@ -80,7 +80,7 @@ pub(crate) const LICENCES: [(&str, &str); 2] = [
     ("LICENSE-MIT", include_str!("../../../LICENSE-MIT")),
 ];
 
-/// The sources below the generated crate, each with a first line that says what it is.
+/// The sources below the generated crate, each with a first line that states its origin.
 pub(crate) fn files(provenance: &str) -> impl Iterator<Item = (String, String)> {
     let below = |folder: &str, path: &str| format!("{folder}{}", path.replace("lib.rs", "mod.rs"));
     let control = romc_control::sources::SOURCES

@@ -11,7 +11,7 @@ use crate::mpc::Drives;
 use control_model::{ControlModelText, SettingText};
 use joints::JointTexts;
 
-/// What the files of a controller, as a crate or in C, take from the model, the robot and romc.
+/// Data of the model, the robot and romc for the files of a controller, as a crate or in C.
 pub(super) struct Facts<'a> {
     pub(super) model: &'a str,
     pub(super) name: &'a str,

@@ -1,6 +1,6 @@
-//! The controller in C99 alone, `NAME-controller-c/`. In: a complete linear model. Out: its equations as `--emit c`
-//! makes them, and the controller in one file: solver and steps are made from their Rust (`src/translate`), the rest
-//! has the operations of `control/online` in their order, for the same bits. Read
+//! The controller in C99 alone, `NAME-controller-c/`. In: a complete linear model. Out: its equations as made by
+//! `--emit c`, and the controller in one file. Solver and steps are translated from their Rust (`src/translate`); the
+//! rest has the operations of `control/online` in their order, for the same bits. Read
 //! `templates/controller_c/source.askama` first.
 
 mod ros2_control;
@@ -28,7 +28,7 @@ struct Facts<'a> {
     row_numbers: usize,
     solver_stage: String,
     n_phases: usize,
-    /// Whether the model knows what its states say of its inputs, in all phases.
+    /// Whether the model has the distribution of inputs given states, in all phases.
     has_given_state: bool,
     rows: &'a StageRows,
     /// Whether the model has strides to walk by.

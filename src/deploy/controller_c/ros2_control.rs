@@ -1,4 +1,4 @@
-//! A plugin of ros2_control around the controller in C: `ros2_control/` beside it.
+//! A plugin of ros2_control around the controller in C, in the folder `ros2_control/` next to it.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -12,7 +12,7 @@ struct Facts<'a> {
     /// Name of the package, its namespace and its library.
     package: String,
     version: &'static str,
-    /// The columns of a jump with what a robot can be, as an initialiser.
+    /// The columns of a jump with the physical limits of the robot, as an initialiser.
     columns: String,
 }
 

@@ -46,7 +46,7 @@ pub(super) struct Source<'a> {
     walk: Option<WalkText>,
 }
 
-/// What the controller of a model with strides has besides.
+/// Additional data in the controller of a model with strides.
 struct WalkText {
     /// Initialisers.
     gait: String,
@@ -169,8 +169,9 @@ fn feet_of_phase(plant: &ControlModel, numbers: Numbers) -> String {
     numbers.matrix((0..plant.phases().len()).map(feet))
 }
 
-/// Where iterations end. In single precision rounding ends the progress earlier; torques of a lift would be off by 0.1 N m
-/// with the complementarity of a plan, and weights of rows that link stages have to stay far below the inverse of rounding.
+/// Tolerances at which iterations end. In single precision rounding ends the progress earlier. With the complementarity
+/// of a plan, torques of a lift would have an error of 0.1 N m. Weights of rows that link stages have to stay far below
+/// the inverse of rounding.
 fn solver_numbers(precision: Precision, accepted_residual: f64) -> [(&'static str, f64); 5] {
     [
         ("TOLERANCE", TOLERANCE, 1e-4),
@@ -307,7 +308,8 @@ fn is_value(word: &str) -> bool {
     word.starts_with("ONLINE_") && (separated(",") || separated(" }"))
 }
 
-/// Types for the header of a controller: a stage of the horizon's solver, the state of the controller, the state of a walk.
+/// Types for the header of a controller: a stage of the horizon's solver, the state of the controller, the state of a
+/// walk.
 pub(super) fn stage(name: &str, upper: &str, real: &str, walks: bool) -> String {
     let rename = |word: &str| match word {
         "real" => Some(real.to_owned()),

@@ -77,7 +77,7 @@ impl<'a> Assembly<'a, '_> {
             let expected = match is_mixed {
                 true => format!("numbers for all of them, or one with --map {name}.weight=TENSOR"),
                 false => "one linear layer, or --activation NAME (elu, relu, gelu, silu, softplus, tanh, \
-                          sigmoid) to say what is between them"
+                          sigmoid) for the activation between them"
                     .to_owned(),
             };
             return Err(self.tensors.refused(Place::Whole, found, expected));
@@ -155,7 +155,7 @@ impl<'a> Assembly<'a, '_> {
         let expected = || match (layers, part) {
             ([_], _) => self.expected_weights(part, are_kernels),
             _ => format!(
-                "layers from {ends}, each taking the outputs of the one before, among {}",
+                "layers from {ends}, each with the outputs of the previous one as inputs, among {}",
                 described(layers)
             ),
         };
@@ -268,7 +268,7 @@ impl<'a> Assembly<'a, '_> {
     fn one_of(&self, factor: &Role, deviation: &Role) -> Read<Option<&'a Assigned<'a>>> {
         match (self.find(factor), self.find(deviation)) {
             (Some(_), Some(other)) => {
-                let found = format!("{deviation} beside {factor}");
+                let found = format!("{deviation} together with {factor}");
                 Err(self.refused(other, found, "one of the two"))
             }
             (one, None) | (None, one) => Ok(one),
@@ -299,7 +299,7 @@ impl<'a> Assembly<'a, '_> {
         })
     }
 
-    /// Takes the subtracted mean into the biases: of `E(s (x - m))` and `D(z) / s + m` to `E'(s x)` and `D'(z) / s`.
+    /// Adds the subtracted mean to the biases: `E(s (x - m))` and `D(z) / s + m` become `E'(s x)` and `D'(z) / s`.
     pub(super) fn fold_mean(&mut self, parts: &mut Parts) -> Read<()> {
         let Some(assigned) = self.find(&Role::StateMean) else {
             return Ok(());

@@ -30,7 +30,7 @@ impl Expander<'_> {
             name if is_in("by command", name.strip_prefix("end").unwrap_or("")) => {
                 Kind::End(name["end".len()..].to_owned())
             }
-            // These take room and print nothing.
+            // These reserve space and print nothing.
             "phantom" | "hphantom" | "vphantom" => {
                 self.argument();
                 Kind::command(",")
@@ -91,7 +91,7 @@ impl Expander<'_> {
         Ok(None)
     }
 
-    /// `\catcode`\@=11`, which makes `@` a letter; other characters stay what they are here.
+    /// `\catcode`\@=11`, which makes `@` a letter; other characters keep their category.
     fn category(&mut self, token: &Token) -> Read<()> {
         self.takes(&Kind::Character('`'));
         let is_at = |token: Token| token.is_command("@") || token.kind == Kind::Character('@');
@@ -120,7 +120,7 @@ impl Expander<'_> {
         token.with(kind(spelled(&name)))
     }
 
-    /// What is spelled before the command `end`, which is passed.
+    /// The text spelled before the command `end`, which is consumed.
     pub(super) fn name_to(&mut self, end: &str) -> String {
         let tokens = std::iter::from_fn(|| self.code().filter(|token| !token.is_command(end)));
         spelled(&tokens.collect::<Vec<_>>())
@@ -225,7 +225,7 @@ impl Expander<'_> {
         Ok(None)
     }
 
-    /// Passes a branch up to its `\fi`, or to an `\else`, whose branch is then read; what is passed.
+    /// Skips a branch up to its `\fi`, or to an `\else`, whose branch is then read. Returns the skipped tokens.
     fn skip(&mut self, start: &Token, stops_at_else: bool) -> Read<Vec<Token>> {
         let mut passed = Vec::new();
         let mut depth = 0;
@@ -258,7 +258,7 @@ impl Expander<'_> {
         self.refuse(start, " without its end", "`\\fi`")
     }
 
-    /// What conditions decide is not followed, nor are macros that are defined in it.
+    /// Text that depends on conditions is not read, nor are macros that are defined in it.
     fn undecided(&mut self, token: &Token, tokens: &[Token], refusal: Refusal) -> Printed {
         let mut open = vec![tokens.to_vec()];
         let mut seen = BTreeSet::new();

@@ -23,7 +23,7 @@ const EXPANDED: Refusal = (
     ", a macro whose body is expanded where it is defined",
     "`\\def` or `\\newcommand`",
 );
-/// A name and what it means from there on; none where the text ends early.
+/// A name and its meaning from there on; none where the text ends early.
 type Definition = (String, Meaning);
 
 impl Expander<'_> {
@@ -191,7 +191,7 @@ impl Expander<'_> {
         Some((name, Meaning::Unread(UNREAD_FORM, matters)))
     }
 
-    /// Whether mathematics, or the end of the document, may be in what tokens print.
+    /// Whether the printed tokens may contain mathematics, or the end of the document.
     pub(super) fn matters(&self, tokens: &[Token]) -> bool {
         let is_layout = |name: &str| {
             let mut lists = ["layouts", "cases", "documents"].into_iter();

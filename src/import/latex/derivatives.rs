@@ -53,7 +53,7 @@ fn fraction(tokens: &[Token], at: usize) -> Option<Derivative> {
     ends_product(&tokens[end..]).then(|| (order, tokens[behind..end].to_vec(), end))
 }
 
-/// Whether what follows is no power and no further factor, which a derivative in front might mean as well.
+/// Whether neither a power nor a further factor follows, which a derivative in front might also include.
 fn ends_product(tokens: &[Token]) -> bool {
     let mut rest = tokens
         .iter()
@@ -92,7 +92,7 @@ fn power(tokens: &[Token], at: usize) -> Position {
     found().unwrap_or((1, at))
 }
 
-/// What stands in the braces that open at `at`, and the place behind them.
+/// The tokens in the braces that open at `at`, and the place behind them.
 fn group(tokens: &[Token], at: usize) -> Option<(&[Token], usize)> {
     if tokens.get(at)?.kind != Kind::Open {
         return None;
@@ -101,7 +101,7 @@ fn group(tokens: &[Token], at: usize) -> Option<(&[Token], usize)> {
     Some((&tokens[at + 1..behind - 1], behind))
 }
 
-/// What stands in a group, or one token, and the place behind it.
+/// The tokens of a group, or one token, and the place behind it.
 fn argument(tokens: &[Token], at: usize) -> Option<(&[Token], usize)> {
     group(tokens, at).or_else(|| Some((tokens.get(at..=at)?, at + 1)))
 }

@@ -1,4 +1,4 @@
-//! What TeX makes of a document before it prints: macros replaced, definitions held until their scope ends.
+//! Expansion of a TeX document before it is printed: macros are replaced, definitions hold until their scope ends.
 
 use super::*;
 
@@ -14,7 +14,7 @@ pub(super) struct Macro {
     pub(super) matters: bool,
 }
 
-/// Why something is not read, behind its name, and what would be.
+/// Why something is not read, behind its name, and the accepted alternative.
 pub(super) type Refusal = (&'static str, &'static str);
 
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ pub(super) enum Meaning {
 /// A group, environment, formula or cell that is open.
 struct Scope {
     opener: Token,
-    /// What ends it; nothing for a cell, which ends with its column, row or environment.
+    /// Its closing token; none for a cell, which ends with its column, row or environment.
     closer: Option<Kind>,
     has_at_letters: bool,
     /// The names that are defined until it ends.
@@ -82,7 +82,7 @@ impl<'t> Expander<'t> {
                 Some(Meaning::Macro(found)) => self.expand(&token, &found).map(|()| None)?,
                 Some(Meaning::Unread(refusal, matters)) => self.unread(&token, refusal, matters)?,
                 Some(Meaning::Same(kind)) => self.command(token.with(kind))?,
-                // The end of an environment that the document defines, behind what its end printed.
+                // The end of an environment that the document defines, behind the text printed by its end.
                 _ if matches!(token.kind, Kind::End(_)) => {
                     self.pass(&token)?;
                     None
@@ -143,7 +143,8 @@ impl<'t> Expander<'t> {
         Err(ImportError::at(self.file, token.place, found, expected))
     }
 
-    /// What is not followed here: in a formula a token that says so, in text nothing, unless mathematics may be in it.
+    /// Text that is not read: in a formula it becomes a token with the reason. Elsewhere it is ignored, or refused if
+    /// it may contain mathematics.
     pub(super) fn unread(
         &self,
         token: &Token,
@@ -211,7 +212,7 @@ impl<'t> Expander<'t> {
         Some(before)
     }
 
-    /// Puts the body of a macro, with its arguments, before what comes next; it stands at the place of `token`.
+    /// Puts the body of a macro, with its arguments, before the following tokens; it has the place of `token`.
     fn expand(&mut self, token: &Token, found: &Macro) -> Read<()> {
         let mut arguments = Vec::with_capacity(found.parameters);
         if let Some(default) = &found.default {
@@ -305,8 +306,8 @@ impl Expander<'_> {
         }
     }
 
-    /// Opens and closes what a printed token opens and closes. What closes something else is refused, in a formula only
-    /// with `\begingroup`, which its reader does not see.
+    /// Opens and closes scopes as a printed token does. A token that closes another scope is refused; in a formula only
+    /// with `\begingroup`, because its reader checks all other scopes.
     pub(super) fn pass(&mut self, token: &Token) -> Read<()> {
         let innermost = self.open.last();
         let is_open = innermost.is_some_and(|scope| scope.opener.kind == token.kind);
@@ -358,7 +359,7 @@ impl Expander<'_> {
                     let line = opener.place.0;
                     format!("{} for {} in line {line}", closer.quoted(), opener.quoted())
                 }
-                None => format!("what {} closes before it", token.quoted()),
+                None => format!("the opening of {} before it", token.quoted()),
             };
             return self.refuse(token, "", &expected);
         }

@@ -1,13 +1,13 @@
-//! One right side: from LaTeX to the grammar of candidate terms, each piece with its place. What is ambiguous in print
-//! is refused: `\sin z_1 u_1`, a product that goes on without a sign behind a slash (`2/3z_1`, `z_1/2u_1`), a number
-//! after a variable. Nesting is limited, so the machine's stack is safe.
+//! One right side: from LaTeX to the grammar of candidate terms, each piece with its place. Ambiguous print is refused:
+//! `\sin z_1 u_1`, a product that goes on without a sign behind a slash (`2/3z_1`, `z_1/2u_1`), a number after a
+//! variable. Nesting is limited, so the machine's stack is safe.
 
 use super::variables::Symbol;
 use super::*;
 
 const FACTOR: &str = "a number, a variable, a function or a group";
 const BARS: &[&str] = &["|", "\\rvert", "\\vert", "\\|"];
-/// What opens a sum, and what closes it.
+/// Opening delimiters of a sum, and their closing ones.
 const DELIMITERS: [(&str, &[&str]); 8] = [
     ("(", &[")"]),
     ("[", &["]"]),
@@ -176,7 +176,7 @@ impl Reader<'_> {
                 }
                 kind if self.starts_factor(&kind) => {
                     let refusal = match after_slash {
-                        true => Some("`\\frac`, or parentheses around what the slash divides by"),
+                        true => Some("`\\frac`, or parentheses around the divisor"),
                         false => self.refusal(&kind, last, literal_end == Some(from)),
                     };
                     if let Some(expected) = refusal {
@@ -190,7 +190,7 @@ impl Reader<'_> {
         }
     }
 
-    /// What could be before a factor that follows without a sign, where that has other readings.
+    /// The expected text before a factor that follows without a sign, where that is ambiguous.
     fn refusal(&self, kind: &Kind, last: Last, is_behind_literal: bool) -> Option<&'static str> {
         let command = match kind {
             Kind::Command(name) => name,
@@ -288,7 +288,7 @@ impl Reader<'_> {
         Ok(last)
     }
 
-    /// A variable, or a group in braces, which stands for what is in it; sums need parentheses that are printed.
+    /// A variable, or a group in braces, which stands for its contents; sums need parentheses that are printed.
     fn variable_or_braces(&mut self, place: Position, kind: &Kind) -> Read<Last> {
         let start = self.at;
         if let Some(symbol) = self.symbol()? {
@@ -320,7 +320,7 @@ impl Reader<'_> {
         }
     }
 
-    /// What `read` makes of the argument that comes next, between an opening text and a parenthesis.
+    /// The result of `read` on the next argument, between an opening text and a parenthesis.
     fn enclosed<T>(
         &mut self,
         place: Position,

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// What stretches over lines, with its ends: displays, and what is not printed as mathematics.
+/// Regions over several lines, with their ends: displays, and text that is not printed as mathematics.
 const STRETCHES: [(&str, &str); 6] = [
     ("$$", "$$"),
     ("\\[", "\\]"),
@@ -31,7 +31,7 @@ struct Markdown {
     tokens: Vec<Token>,
     /// The mark and length of an open fence, and whether mathematics is in it.
     fence: Option<(char, usize, bool)>,
-    /// The end of what is open: `$$` of a display, `-->` of a comment.
+    /// The end of the open region: `$$` of a display, `-->` of a comment.
     skips: Option<&'static str>,
     is_behind_text: bool,
     is_in_list: bool,
@@ -179,7 +179,7 @@ fn is_reference(content: &str) -> bool {
     name.is_some_and(|(name, _)| !name.contains('['))
 }
 
-/// The length of what begins with a backslash, of a span of code, or of its marks alone, at the start of `text`.
+/// The length of an escape with a backslash, of a span of code, or of its marks alone, at the start of `text`.
 fn code_or_escape(text: &str) -> Option<usize> {
     if let Some(escaped) = text.strip_prefix('\\') {
         return Some(1 + escaped.chars().next().map_or(0, char::len_utf8));

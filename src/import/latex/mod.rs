@@ -1,6 +1,6 @@
-//! Equations of latent accelerations from `.tex` and Markdown files to sections in the grammar of candidate terms, each
-//! piece with its place. Displays without a left side `\ddot z_k =` are skipped, as is the text, unless the only
-//! equations are in its lines; in a display that is read, what has no meaning here is an error.
+//! From equations of latent accelerations in `.tex` and Markdown files to sections in the grammar of candidate terms,
+//! each piece with its place. Displays without a left side `\ddot z_k =` are skipped. Text is also skipped, unless the
+//! only equations are in its lines. In a display that is read, anything without a meaning here is an error.
 //!
 //! Read `token`, `markdown` (text to tokens), `expander`, `commands`, `definitions` (what is printed), `sections`, then
 //! for a right side `derivatives`, `reader`, `expression`, `variables`, `numbers`. `words.txt` has LaTeX's words by

@@ -1,5 +1,5 @@
 //! Numbers (literals, powers of ten, `\num`) and roots (`\sqrt{z_1}`, `\sqrt[3]{z_1}`). Braces, fonts and the ends of
-//! macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX takes a single digit as an argument (`x^12`,
+//! macros do not print: `0.12{345}` is 0.12345, `1{,}5` is 1.5. Where TeX reads a single digit as an argument (`x^12`,
 //! `\frac12`), the number ends behind it.
 
 use super::definitions::changes_digits;

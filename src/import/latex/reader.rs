@@ -5,14 +5,14 @@ use super::*;
 
 const MAX_DEPTH: usize = 60;
 
-/// How integers of a document's coefficients were rounded, where it says so.
+/// The rounding of coefficients printed as integers, if a comment of the document states it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Digits {
     Decimals(usize),
     Significant(usize),
 }
 
-/// What was read last, where it decides whether a product may go on without a sign.
+/// The last piece, as far as it decides whether a product may go on without a sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Last {
     Number,
@@ -94,7 +94,7 @@ impl<'a> Reader<'a> {
         open.first().copied()
     }
 
-    /// Passes what prints nothing; what follows, or nothing at the end.
+    /// Skips tokens that print nothing; returns the next one, or none at the end.
     pub(super) fn peek(&mut self) -> Option<&Token> {
         while self.at < self.end {
             let after = match &self.tokens[self.at].kind {
@@ -190,7 +190,7 @@ impl<'a> Reader<'a> {
         let is_digit = |at: usize| self.kind(at).is_some_and(|kind| kind.digit().is_some());
         let (first, end) = match &self.tokens[at].kind {
             Kind::Open => (at + 1, after - 1),
-            // TeX would take the space for the argument.
+            // TeX would use the space as the argument.
             _ if is_blank(&self.tokens[at - 1].kind) && is_digit(at) && is_digit(at + 1) => {
                 return self.unexpected("braces around an argument of several digits");
             }
@@ -209,7 +209,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// What reads in two ways in print, and is refused.
+/// Ambiguous print, which is refused.
 impl Reader<'_> {
     /// Whether a row or column ends right before a place.
     pub(super) fn breaks_before(&self, at: usize) -> bool {

@@ -171,7 +171,7 @@ fn has_left_side(contents: &[Token], name: &str) -> bool {
     inside.any(|token| token.is_command("ddot"))
 }
 
-/// The digits that a comment states, none in what is no such comment.
+/// The digits that a comment states; none for any other comment.
 fn stated_digits(comment: &str) -> Option<Option<Digits>> {
     let rest = comment.trim().strip_prefix("Coefficients have ")?;
     let mut words = rest.split_whitespace();
@@ -371,7 +371,7 @@ pub(super) fn items(file: &str, tokens: Vec<Token>, text: &str) -> Read<Vec<Item
     Ok(items)
 }
 
-/// Only comments count of what stands before `\begin{document}`; equations there are refused.
+/// Only comments count before `\begin{document}`; equations there are refused.
 fn begin_document(file: &str, items: &mut Vec<Item>) -> Read<()> {
     for item in &*items {
         let (Item::Display(tokens) | Item::Inline(tokens)) = item else {
@@ -402,7 +402,7 @@ fn inline(expander: &mut Expander) -> Read<Option<Item>> {
     Ok(tokens.map(|tokens| Item::Inline(plain(tokens))))
 }
 
-/// The first token of what is not followed, and what could be there.
+/// The first token that is not read, and the accepted alternative.
 pub(super) fn unread(tokens: &[Token]) -> Option<(&Token, &'static str)> {
     tokens.iter().find_map(|token| match &token.kind {
         Kind::Unread(_, expected) => Some((token, *expected)),

@@ -1,4 +1,4 @@
-//! Tokens of LaTeX with their places, as TeX takes them from a file: one after the other.
+//! Tokens of LaTeX with their places, in the order in which TeX reads them from a file.
 
 use std::collections::{HashSet, VecDeque};
 use std::sync::LazyLock;
@@ -48,7 +48,7 @@ pub(super) enum Kind {
     Comment(String),
     Paragraph,
     Character(char),
-    /// What TeX would follow and romc does not, and what could be there.
+    /// A token that TeX would follow and romc does not, and the accepted alternative.
     Unread(Box<str>, &'static str),
 }
 
@@ -180,7 +180,7 @@ pub(super) struct Lexer<'t> {
     place: Position,
     starts_line: bool,
     is_spaced: bool,
-    /// What one character made besides the last token.
+    /// Tokens of one character in addition to the last token.
     queued: VecDeque<Token>,
     pub(super) has_at_letters: bool,
 }

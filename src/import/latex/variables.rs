@@ -116,7 +116,7 @@ impl Reader<'_> {
             Some(Kind::Command(opener)) if opener == "left" && !self.is_bar_behind() => {
                 self.delimited(place)
             }
-            // Braces do not print: a sum or a power of what is in them would read otherwise without.
+            // Braces do not print: without them a sum or a power in them would have another meaning.
             Some(Kind::Open) => {
                 let last = self.inside(|reader| match reader.next_kind() {
                     Some(Kind::Character('(' | '[')) => reader.factor(false),

@@ -11,9 +11,9 @@ use crate::mpc::problem::to_upright;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, clap::ValueEnum)]
 pub enum ReferenceInput {
-    /// The recorded torques and forces, projected into the latent space.
+    /// Projection of the recorded torques and forces
     Recorded,
-    /// None: the controller finds the input itself.
+    /// No input; the controller computes its own
     None,
 }
 
@@ -117,7 +117,7 @@ pub fn along_recording(
     })
 }
 
-/// The torques that the lift makes of exactly projected recorded inputs, at every sample: what the lift alone loses.
+/// Lifted torques of exactly projected recorded inputs, at every sample: the error of the lift alone.
 fn lift_comparison(
     controller: &mut Controller,
     recording: &Recording,

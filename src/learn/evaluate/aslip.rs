@@ -201,8 +201,11 @@ impl Baseline {
         rule: &InputRule,
         segments: &[&Segment],
     ) -> Result<Vec<Self>, RecordingError> {
-        let published = ("ASLIP, published constants", Aslip::PUBLISHED);
-        let fitted = fit_aslip(rule, segments)?.map(|fitted| ("ASLIP, fitted constants", fitted));
+        let published = ("ASLIP (published constants)", Aslip::PUBLISHED);
+        let fitted = fit_aslip(rule, segments)?.map(|fitted| match fitted.stiffness_n_m {
+            0.0 => ("point mass (fitted)", fitted),
+            _ => ("ASLIP (fitted constants)", fitted),
+        });
         let templates = [published].into_iter().chain(fitted);
         let baselines = templates.map(|(name, template)| Self {
             name,

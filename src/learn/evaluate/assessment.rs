@@ -37,7 +37,8 @@ pub struct Assessment<'a> {
     pub linearised: Vec<Option<LinearisedPhase>>,
     /// Of walks.
     pub stride: Option<StrideGrowth>,
-    /// Of walks: residuals of the model, of a constant velocity and of a constant latent velocity, restarted every stride.
+    /// For walks: residuals of the model, of a constant velocity and of a constant latent velocity, restarted every
+    /// stride.
     pub over_stride: Option<[CoordinateSums; 3]>,
     pub lift: LiftSums,
     pub active_terms: usize,

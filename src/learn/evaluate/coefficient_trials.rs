@@ -5,9 +5,9 @@ use super::*;
 const SAMPLES: usize = 1000;
 /// R^2 of latent accelerations at which a reading explains that those of another were worse.
 pub(super) const GOOD_R2: f64 = 0.2;
-/// How many times smaller an order that has a name makes the residual for it to be taken.
+/// Factor by which an order with a name must reduce the residual to be accepted.
 const NAMED: f64 = 1.2;
-/// The same of exchanged phases and of orders without a name, which are many.
+/// The same for exchanged phases and for orders without a name, which are many.
 const UNNAMED: f64 = 4.0;
 const NO_RESIDUAL: f64 = 1e-9; // share of the variance below which residuals count as equal
 

@@ -1,4 +1,4 @@
-//! Figures of a controller's run along a recording, those that depend on the dynamics beside baselines.
+//! Metrics of a controller's run along a recording; those that depend on the dynamics are compared with baselines.
 
 use super::along_recording::{control_samples, set_reference};
 use super::prediction::{prediction_error, recorded_stages, uninformed};
@@ -189,8 +189,8 @@ pub fn control_metrics(
     Ok(metrics)
 }
 
-/// Settings of a walk for a model with strides, otherwise the default ones; at the rate of the slowest recording where that
-/// has fewer samples than a default stage.
+/// Settings of a walk for a model with strides, otherwise the default ones. If a recording has fewer samples than a
+/// default stage, the stage has the time step of the slowest recording.
 pub fn usual_settings(model: &ReducedModel, recordings: &[Recording]) -> MpcSettings {
     let default = crate::mpc::settings_for(model);
     let segments = recordings.iter().flat_map(|recording| &recording.segments);

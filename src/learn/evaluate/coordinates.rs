@@ -131,7 +131,7 @@ impl CoordinateSums {
         self.windows += rollout.windows.len();
     }
 
-    /// The same of latent coordinates that keep the velocity at the start of each window, decoded: maps without dynamics.
+    /// The same for latent coordinates with the velocity at the start of each window, decoded: maps without dynamics.
     pub(super) fn add_constant_latent_velocity(
         &mut self,
         model: &ReducedModel,

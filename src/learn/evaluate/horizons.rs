@@ -1,5 +1,6 @@
 //! Prediction errors of all coordinates over several horizons, compared with baselines: a constant velocity, a robot at
-//! rest, the mean training jump, a rigid body, and of walks the mean training stride and a linear inverted pendulum.
+//! rest, the mean training jump, a rigid body. Baselines of walks are also the mean training stride and a linear
+//! inverted pendulum.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -28,8 +29,9 @@ struct Motion<'a> {
 }
 
 impl<'a> Horizon {
-    /// Predictions with restarts every 0.1, 0.2 and 0.3 s, all samples; of walks also over a stride and 2 s, each from the axes
-    /// of the heading at its start; and from each take-off, the sample of the touchdown only.
+    /// Predictions with restarts every 0.1, 0.2 and 0.3 s, at all samples; of walks also over a stride and 2 s, each
+    /// from the axes of the heading at its start. Also predictions from each take-off, at the sample of the touchdown
+    /// only.
     pub fn all(model: &ReducedModel, assessment: &'a Assessment<'_>) -> Result<Vec<Self>> {
         let compiled = CompiledModel::new(model)?;
         let segments: Vec<&Segment> = assessment.runs.iter().map(|run| &*run.segment).collect();
@@ -181,7 +183,7 @@ impl<'a> Horizon {
     }
 }
 
-/// Samples from each take-off to the touchdown after it, both counted.
+/// Samples from each take-off to the touchdown after it, both included.
 fn flights(segment: &Segment) -> Result<Vec<Range<usize>>> {
     let rule = PhaseRule::two_phase().with_min_samples(CHATTER_SAMPLES);
     let spans = rule.spans(segment)?.into_iter();
@@ -233,7 +235,7 @@ impl MeanJump {
     }
 }
 
-/// The training's mean stride at the speed, yaw rate and height that a motion has in the mean, in step with its touchdowns. A
+/// The training's mean stride at the mean speed, yaw rate and height of a motion, synchronised with its touchdowns. A
 /// prediction is the change along it.
 struct MeanStride {
     nodes: DMatrix<f64>, // n x 40, see StridePrior
@@ -300,8 +302,8 @@ const BODY: [usize; BODY_DIM] = [
     BODY_X + 5,
 ];
 
-/// `ddx = F_x / m` and likewise `y`, `ddz = F_z / m - g`, `ddpitch = M_y / I_y` and likewise roll and yaw, with `1 / m` and
-/// `1 / I` by least squares of the recorded accelerations.
+/// `ddx = F_x / m` and likewise `y`, `ddz = F_z / m - g`, `ddpitch = M_y / I_y` and likewise roll and yaw. `1 / m` and
+/// `1 / I` are fitted to the recorded accelerations by least squares.
 struct RigidBody {
     by: [f64; 4], // 1 / m, then 1 / I of roll, pitch and yaw
     rule: InputRule,
@@ -366,8 +368,9 @@ fn moved_by(
     })
 }
 
-/// A linear inverted pendulum over the middle `p` of the feet on the ground: `ddx = (g / h) (x - p_x)` and likewise `y`, with
-/// the mean height `h` of the body over its feet (Kajita et al. 2001); without a foot on the ground `ddx = 0`.
+/// A linear inverted pendulum over the middle `p` of the feet on the ground: `ddx = (g / h) (x - p_x)` and likewise
+/// `y`, with the mean height `h` of the body over its feet (Kajita et al. 2001). Without a foot on the ground
+/// `ddx = 0`.
 struct Pendulum {
     middle: Vec<Option<[f64; 2]>>,
     rate_per_s2: f64, // g / h

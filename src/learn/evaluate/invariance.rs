@@ -1,4 +1,4 @@
-//! What a model says of known physics, from its file alone: invariance to shifts, gravity, mass, left and right. A
+//! Tests of a model against known physics, from its file alone: invariance to shifts, gravity, mass, mirror symmetry. A
 //! state is the posture decoded from `z = 0`, at rest and at 1 m/s along x, y and z; the input is the phase's mean.
 
 use super::*;
@@ -33,7 +33,7 @@ pub struct PhaseInvariance {
     /// Change of the body's acceleration for a robot 0.3 m further on, (m/s^2)/m.
     pub shift_x: f64,
     pub shift_y: f64,
-    /// Largest difference between a state with one joint off by 0.1 rad and its mirror image, m/s^2.
+    /// Largest difference between a state with one joint displaced by 0.1 rad and its mirror image, m/s^2.
     pub mirror_asymmetry: f64,
 }
 
@@ -193,9 +193,9 @@ fn mirrored(vector: &DVector<f64>) -> DVector<f64> {
     image
 }
 
-/// The combination of latent coordinates that is one body coordinate and joints alone, and of several the one that inputs
-/// move least in flight. With a flight phase also its acceleration there, and by how much inputs move it, as a share of
-/// how they move the coordinates.
+/// The combination of latent coordinates that consists of one body coordinate and joints alone. Of several, it is the
+/// one that inputs accelerate least in flight. With a flight phase also returns its acceleration there, and the gain of
+/// inputs on it as a share of their gain on the coordinates.
 fn momentum(
     model: &ReducedModel,
     rest: &DVector<f64>,

@@ -1,7 +1,7 @@
 //! Figures of a model's quality.
 //!
 //! In: rollouts and recordings. Out: fits (root mean square in SI units, coefficient of determination), template models
-//! under the same inputs, stability, the losses of the lift and a [`Verdict`]. `docs/mathematics.md` defines each
+//! under the same inputs, stability, the losses of the lift and a [`Verdict`]. `docs/reference/metrics.md` defines each
 //! figure once. Start with `assessment`, then [`coordinates`](Fit).
 
 mod along_recording;
@@ -28,7 +28,7 @@ pub(crate) use coordinates::is_plausible;
 pub use coordinates::{
     ByContact, Comparison, CoordinateSums, Fit, FitSums, LAMBDA, PointwiseSums, combined_loss,
 };
-pub use invariance::Invariance;
+pub use invariance::{Invariance, PhaseInvariance};
 pub use prediction::{LinearisedPhase, PredictionError, eigenvalues};
 pub(crate) use prediction::{linearise_phases, state_matrix};
 pub use round_trip::RoundTrip;

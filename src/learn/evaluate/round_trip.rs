@@ -1,4 +1,5 @@
-//! Whether a model made elsewhere fits recordings before anything is integrated, or which usual slip explains it.
+//! Whether a model made elsewhere fits recordings, before anything is integrated, and the common mistake that explains
+//! a bad fit.
 
 use super::coefficient_trials::{CoefficientTrials, GOOD_R2, Tensors};
 use super::*;
@@ -6,7 +7,7 @@ use super::*;
 const SAMPLES: usize = 240;
 const LARGEST_ERROR: f64 = 1.0; // relative; beyond it maps do not fit: that of an answer that never changes
 const EXPLAINED: f64 = 4.0; // times smaller that a slip has to make the error to explain it
-/// How much larger than the smallest an error may be for an earlier slip to be taken: left and right differ little.
+/// Largest error relative to the smallest at which an earlier slip is preferred: left and right differ little.
 const ALIKE: f64 = 1.5;
 const SMALL_ERROR: f64 = 0.01; // relative; needs no explanation
 const UNEXPLAINED: f64 = 0.3; // relative error beyond which no slip explains anything, however much larger it was
@@ -15,7 +16,7 @@ const UNEXPLAINED: f64 = 0.3; // relative error beyond which no slip explains an
 pub struct RoundTrip {
     /// Mean square of `decode(encode(x)) - x` over that of the deviation of `x` from its mean, scaled units.
     pub error: f64,
-    /// What explains the error, in words with the option of an import that mends it, and the error then.
+    /// The explanation of the error, in words with the option of an import that corrects it, and the error then.
     pub slip: Option<(String, f64)>,
     /// Name of each phase and R^2 of its latent accelerations; none without samples of it.
     pub acceleration_r2: Vec<(String, Option<f64>)>,
@@ -25,7 +26,7 @@ pub struct RoundTrip {
     pub trials: CoefficientTrials,
 }
 
-/// What a foreign model is easily given wrong: order or scaling of the coordinates, or both.
+/// Common mistakes in a foreign model: wrong order or scaling of the coordinates, or both.
 type Slip = (Option<CoordinateOrder>, Option<ScalingSlip>);
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,7 +83,7 @@ impl RoundTrip {
         !self.maps_fit() || self.acceleration_slip.is_some()
     }
 
-    /// What is wrong with the model along the recordings, if anything is, and the option of an import that mends it.
+    /// The fault of the model along the recordings, if there is one, and the option of an import that corrects it.
     pub fn fault(&self) -> Option<String> {
         if !self.maps_fit() {
             let found = "decode(encode(x)) misses the recordings by";
@@ -90,12 +91,12 @@ impl RoundTrip {
             return Some(match &self.slip {
                 Some((advice, error)) => format!("{found}, by {error:.3} times {advice}"),
                 None => format!(
-                    "{found}, whatever the usual factors, means and orders: has the training \
+                    "{found}, with any of the usual factors, means and orders: has the training \
                      converged, is it this robot, and are these its maps?"
                 ),
             });
         }
-        // Equations that say no more of the accelerations than a constant do not fit.
+        // Equations that explain the accelerations no better than a constant do not fit.
         let equations_fit = self.all_acceleration_r2.is_none_or(|r2| r2 >= 0.0);
         if equations_fit && self.acceleration_slip.is_none() {
             return None;
@@ -141,7 +142,7 @@ impl ScalingSlip {
             Self::Factor(factor) => {
                 return format!("with factor {factor}: expected --scaling {factor}");
             }
-            Self::Centred => "with their mean taken off: expected a tensor mean.state",
+            Self::Centred => "with their mean subtracted: expected a tensor mean.state",
             Self::Standardised => {
                 "as (x - mean) / standard deviation: expected tensors mean.state and std.state"
             }

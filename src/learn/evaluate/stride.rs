@@ -12,8 +12,8 @@ const LEAST_STRIDES: usize = 3; // of one motion, by which phases count as repea
 pub struct StrideGrowth {
     /// Names of its phases and their mean durations in s.
     pub phases: Vec<(String, f64)>,
-    /// The largest magnitude of the eigenvalues of `e^(A_k T_k) ... e^(A_1 T_1)`, the Floquet multipliers, with `A` of each
-    /// phase at its mean state: the factor by which the fastest deviation grows.
+    /// The largest magnitude of the Floquet multipliers, the eigenvalues of `e^(A_k T_k) ... e^(A_1 T_1)` with `A` of
+    /// each phase at its mean state. It is the factor by which the fastest deviation grows.
     pub largest_multiplier: Option<f64>,
 }
 
@@ -70,8 +70,8 @@ pub(crate) fn transition(rates: &DMatrix<f64>, duration_s: f64) -> DMatrix<f64> 
     (state_matrix(rates) * duration_s).exp()
 }
 
-/// The most frequent sequence of phases from one beginning of the phase that lasts longest to its next, with mean durations
-/// in s. `motions` are spans of phases with their durations. None unless a motion has [`LEAST_STRIDES`] of them.
+/// The most frequent sequence of phases from one beginning of the longest phase to its next, with mean durations in s.
+/// `motions` are spans of phases with their durations. None unless a motion has [`LEAST_STRIDES`] of them.
 pub(crate) fn usual_stride(motions: &[Vec<(usize, f64)>]) -> Option<Vec<(usize, f64)>> {
     let mut total_s: BTreeMap<usize, f64> = BTreeMap::new();
     for (phase, duration_s) in motions.iter().flatten() {

@@ -1,4 +1,4 @@
-//! What a model is fit for: rows that compare a figure with a baseline and a threshold, for a use each.
+//! The uses for which a model is fit: each row compares a metric with a baseline and a threshold.
 
 use super::*;
 
@@ -18,7 +18,7 @@ const TORQUES: &str = "torques";
 const CONTROL: &str = "control";
 pub const TORQUES_IN_CONTACT: &str = "R^2 of torques in contact";
 pub const AFTER_A_PUSH: &str = "deviation after a push";
-const ONE_STAGE: &str = "error one stage ahead as a share of the baseline's";
+const ONE_STAGE: &str = "error one step ahead, share of the baseline's";
 const CONSTANT_VELOCITY: &str = "constant velocity";
 const CONSTANT_LATENT_VELOCITY: &str = "constant latent velocity";
 const NO_DYNAMICS: &str = "no dynamics";
@@ -98,7 +98,7 @@ impl VerdictRow {
         }
     }
 
-    /// `deviation after a push 12.3 mm, at most 11.9 mm (feedback off: 12.1 mm)`.
+    /// `deviation after a push 12.3 mm, at most 11.9 mm (no feedback: 12.1 mm)`.
     pub fn words(&self) -> String {
         let shown = |value: f64| match self.unit {
             "m" => format!("{:.1} mm", 1e3 * value),
@@ -117,8 +117,8 @@ impl VerdictRow {
     }
 }
 
-/// Uses are `0.1 s` (predictions between restarts, by their time), `whole motion`, of walks `a stride` instead, `torques` (those that the controller
-/// finds itself) and `control`; one that is not measured is in neither list.
+/// Uses are `0.1 s` (predictions between restarts, by their time), `whole motion` (for walks `a stride`), `torques`
+/// (computed by the controller without recorded inputs) and `control`. A use that is not measured is in neither list.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Verdict {
     pub fit_for: Vec<String>,
@@ -164,14 +164,19 @@ pub fn verdict(
 }
 
 /// The verdict with a controller of [`usual_settings`], and why this one was not measured, if so.
+/// `progress(done, total)` is called after each recording.
 pub fn verdict_by_default(
     model: &ReducedModel,
     recordings: &[Recording],
     assessment: &Assessment<'_>,
+    mut progress: impl FnMut(usize, usize),
 ) -> (Verdict, Option<EvaluateError>) {
     let settings = usual_settings(model, recordings);
-    let measured = recordings.iter();
-    let measured = measured.map(|recording| control_metrics(model, recording, settings));
+    let measured = recordings.iter().zip(1..).map(|(recording, done)| {
+        let metrics = control_metrics(model, recording, settings);
+        progress(done, recordings.len());
+        metrics
+    });
     match measured.collect::<Result<Vec<_>, _>>() {
         Ok(control) => {
             let control: Vec<&ControlMetrics> = control.iter().collect();
@@ -219,7 +224,7 @@ fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> 
         let body = ["body.x", "body.z"].map(|name| row(name, &[name], "m", &limit));
         rows.extend(body.into_iter().flatten());
         if of != short {
-            continue; // open loop, the least difference at take-off decides where pitch and legs end
+            continue; // in open loop, small differences at take-off determine where pitch and legs end
         }
         let in_plane = |name: &&str| name.ends_with(".hy") || name.ends_with(".kn");
         let names = Robot::state_names();
@@ -264,7 +269,7 @@ fn worst_of(control: &[&ControlMetrics]) -> Vec<VerdictRow> {
     worst
 }
 
-/// What passes of the control while predictions fail is not due to the dynamics: it counts as not measured.
+/// If predictions fail, a passed test of the control is not due to the dynamics: it counts as not measured.
 fn without_predictions(rows: &mut [VerdictRow], fails_soon: bool) {
     let mut one_stage = rows.iter().filter(|row| row.name == ONE_STAGE);
     if fails_soon || one_stage.any(VerdictRow::is_failed) {
@@ -304,7 +309,7 @@ fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
     let push = VerdictRow::new(
         (CONTROL, AFTER_A_PUSH, "m"),
         metrics.recovery_rms_m.filter(|_| off.is_some()),
-        ("feedback off", off),
+        ("no feedback", off),
         (Bound::AtMost, NO_BETTER * off.unwrap_or(0.0)),
     );
     let unplanned = VerdictRow::new(

@@ -4,11 +4,12 @@
 //! trajectory; measurements. Out: a [`Command`] per control step, whose torques are always within the robot's limits,
 //! and a [`Status`].
 //!
-//! `of_model` extracts what the controller needs; `romc_control::online` is the controller, the folder that is emitted
-//! for a robot. Read `online/problem` first (the optimal control problem), then `reference` (the trajectory, encoded),
-//! `horizon` (phases and linearised dynamics, with `linearise`), `stage` (one stage, scaled), the solvers (`conic` and
-//! `qp` for clarabel, `structured`), `controller`, `step` (plan to command) and `lift` (torques that the ground can
-//! answer). [`evaluate::along_recording()`](crate::evaluate::along_recording()) runs it on recorded jumps.
+//! `of_model` extracts the data that the controller needs. `romc_control::online` is the controller, the folder that is
+//! emitted for a robot. Read `online/problem` first (the optimal control problem), then `reference` (the trajectory,
+//! encoded), `horizon` (phases and linearised dynamics, with `linearise`) and `stage` (one stage, scaled). The solvers
+//! follow (`conic` and `qp` for clarabel, `structured`), then `controller`, `step` (plan to command) and `lift`
+//! (torques consistent with ground forces). [`evaluate::along_recording()`](crate::evaluate::along_recording()) runs it
+//! on recorded jumps.
 
 mod of_model;
 mod strides;

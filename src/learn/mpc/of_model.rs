@@ -50,11 +50,11 @@ pub fn controller(model: &ReducedModel, settings: MpcSettings) -> Result<Control
     Ok(Controller::with_plant(plant, dynamics, settings)?)
 }
 
-/// Matrices of a nonlinear model are those at the state decoded from `z = 0` until a reference comes.
+/// Matrices of a nonlinear model are those at the state decoded from `z = 0` until a reference is set.
 ///
 /// # Errors
-/// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input statistics, [`MpcError::StateDim`]
-/// if it is not over the robot's 18 coordinates, and [`MpcError::Statistics`] if a covariance cannot be factorised.
+/// [`MpcError::Model`] if the model has no encoder, decoder, scaling, robot or input statistics. [`MpcError::StateDim`]
+/// if it is not over the robot's 18 coordinates. [`MpcError::Statistics`] if a covariance cannot be factorised.
 pub fn control_model(model: &ReducedModel) -> Result<ControlModel, MpcError> {
     if !model.is_linear() {
         let stand = model.decode(&DVector::zeros(model.latent_dim()))?;
@@ -179,21 +179,25 @@ fn with_floor(mut covariance: DMatrix<f64>) -> DMatrix<f64> {
 pub const LIFTS: [(&str, &str, Lift); 2] = [
     (
         "transpose",
-        "`u = W_e^T u_lat`, the paper's",
+        "`u = W_e^T u_lat`, as in the paper",
         Lift::Transpose,
     ),
     (
         "consistent",
-        "Torques whose own ground reaction forces reproduce the latent input",
+        "Torques with ground forces that reproduce the latent input",
         Lift::Consistent,
     ),
 ];
 
 pub const SOLVERS: [(&str, &str, Solver); 2] = [
-    ("clarabel", "General interior point", Solver::Clarabel),
+    (
+        "clarabel",
+        "General interior-point solver",
+        Solver::Clarabel,
+    ),
     (
         "riccati",
-        "Gains prepared ahead where no limit is active, else an interior point stage by stage",
+        "Structured solver with gains prepared in advance",
         Solver::Riccati,
     ),
 ];
@@ -222,7 +226,7 @@ pub enum MpcError {
     Strides(#[from] RobotError),
     #[error("the recording cannot be used for control")]
     Recording(#[from] RecordingError),
-    #[error("the model's encoder takes {found} coordinates, the robot has {expected}")]
+    #[error("the model's encoder expects {found} coordinates, the robot has {expected}")]
     StateDim { found: usize, expected: usize },
     #[error("input statistics of phase `{phase}`: the covariance cannot be factorised")]
     Statistics { phase: String },

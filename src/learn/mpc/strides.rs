@@ -1,4 +1,4 @@
-//! What a controller walks by: the strides of a model over the velocity, and settings for walks.
+//! The reference of walks: the strides of a model over the velocity, and settings for walks.
 
 use super::*;
 use crate::model::{ReducedModel, STRIDE_WIDTH};
@@ -27,8 +27,8 @@ pub fn settings_for(model: &ReducedModel) -> MpcSettings {
     }
 }
 
-/// The model's strides at the training's mean frequency, duty and height, which are affine in the velocity. A stand has the
-/// mean posture of each leg on the ground and the mean input.
+/// The model's strides at the training's mean frequency, duty and height, which are affine in the velocity. The stand
+/// has the mean posture of each leg on the ground and the mean input.
 ///
 /// # Errors
 /// Those of a model without strides or robot, and of a node whose legs have no forces.

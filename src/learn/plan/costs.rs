@@ -71,7 +71,7 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
     out
 }
 
-/// Feet rise after take-off as they do in the prior: where they rise more slowly, a soft floor holds them.
+/// Feet rise after take-off as in the prior. If they rise more slowly, the cost acts like a soft floor.
 fn add_take_off(task: &Task<'_>, y: &[f64], part: usize, out: &mut Vec<(Affine, f64)>) {
     let (settings, of) = (task.settings, &task.seed.parts[part]);
     let (before, after) = (task.seed.parts[part - 1].landmark.feet, of.landmark.feet);

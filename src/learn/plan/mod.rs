@@ -1,8 +1,8 @@
-//! Jumps that nobody recorded: a goal in, a trajectory of the model's coordinates out.
+//! New jumps without a recording: a goal in, a trajectory of the model's coordinates out.
 //!
 //! In: a model with landmarks and prior of its training jumps (`JumpPrior`), a [`Goal`]. Out: a [`Plan`], which is a
-//! recording, and its distance from what was recorded. Read `transcribe` first, which states the program; `seed` makes
-//! the trajectory it starts from, `solve` solves it by sequential convex programs on `QpSolver`, `motion` samples the
+//! recording, and its distance from the recorded jumps. Read `transcribe` first, which states the program. `seed` makes
+//! the initial trajectory, `solve` solves the program by sequential convex programs on `QpSolver`, `motion` samples the
 //! result and checks it between the nodes, `verdict` judges it.
 //!
 //! ```

@@ -1,5 +1,5 @@
-//! A plan as a recording, and its margins between the nodes: velocities and inputs are linear there, positions their
-//! integral; torques are the lifted input with the losses of the very motion that is written.
+//! A plan as a recording, and its margins between the nodes. Velocities and inputs are linear there, positions their
+//! integral. Torques are the lifted input plus the losses of the same motion.
 
 use super::costs::moved_foot;
 use super::transcribe::NodeValues;
@@ -12,9 +12,9 @@ pub struct Margins {
     pub torque_share: f64,
     pub beyond_joint_limit_rad: f64, // largest over the joints, negative inside
     pub beyond_friction_n: f64,
-    /// At the nodes, beyond what it does in the prior, along and above the floor, m.
+    /// Displacement at the nodes beyond that in the prior, along and above the floor, m.
     pub foot_slip_m: [f64; 2],
-    /// Of a foot on the ground from where it came down, along the floor, and below its height at the start, m.
+    /// Displacement of a foot on the ground from its touchdown, along the floor, and below its height at the start, m.
     pub foot_drift_m: [f64; 2],
 }
 

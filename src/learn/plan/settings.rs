@@ -11,8 +11,8 @@ const ANY: f64 = f64::INFINITY;
 /// Makes [`PlanSettings`] of a table: field, default, and the upper end of its range from zero.
 macro_rules! settings {
     ($($(#[$doc:meta])* $field:ident: $type:ty = $default:expr, $most:expr;)*) => {
-        /// What a plan is weighed and bounded by. Deviations are those from the prior, each in standard deviations of
-        /// the training, averaged over the coordinates and summed over time in units of 10 ms.
+        /// Weights and bounds of a plan. Deviations are relative to the prior, each in standard deviations of the
+        /// training, averaged over the coordinates and summed over time in units of 10 ms.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub struct PlanSettings {
@@ -51,10 +51,11 @@ settings! {
     smoothness: f64 = 3.0, ANY;
     /// Weight of feet that leave their place, per [`Self::foot_m`].
     feet: f64 = 3.0, ANY;
-    /// Weight of feet that rise otherwise than in the prior, per [`Self::foot_m`], and for how long after take-off, s.
+    /// Weight of feet that rise differently from the prior, per [`Self::foot_m`], and the time of this cost after
+    /// take-off, s.
     take_off: f64 = 3.0, ANY;
     take_off_s: f64 = 0.04, 0.1;
-    /// How many times the deviations of the input and of the velocities count at the last node before a take-off.
+    /// Factors on the deviations of the input and of the velocities at the last node before a take-off.
     at_take_off: [f64; 2] = [3.0, 100.0], ANY;
     /// Displacement of a foot along and above the floor that counts one, m.
     foot_m: [f64; 2] = [0.005, 0.004], 1.0;

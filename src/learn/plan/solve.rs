@@ -37,7 +37,7 @@ pub struct Plan {
     pub solve_ms: f64,
 }
 
-/// Plans a jump; one that is not to be trusted is no error: its [`Verdict`] says so.
+/// Plans a jump. An unreliable plan is no error: its [`Verdict`] reports it.
 pub fn plan(model: &ReducedModel, goal: &Goal, settings: &PlanSettings) -> Result<Plan> {
     let clock = Instant::now();
     let seed = Seed::new(model, goal, settings)?;
@@ -103,8 +103,9 @@ fn solve(task: &mut Task<'_>) -> Result<(Vec<f64>, usize)> {
         }
     }
     let (defect, programs) = (task.defect(&y), task.settings.programs);
-    let found =
-        format!("the equations are still off by {defect:.1e} after {programs} convex programs");
+    let found = format!(
+        "the equations still have a residual of {defect:.1e} after {programs} convex programs"
+    );
     Err(PlanError::Unsolved { goal_m, found })
 }
 
@@ -124,7 +125,7 @@ fn reached(motion: &Segment) -> [f64; 2] {
     [x[(BODY_X, last)] - x[(BODY_X, 0)], height.max() - height[0]]
 }
 
-/// What accelerations of the thrust that the deviations do not explain make of distance and rise.
+/// Standard deviations of distance and rise due to the thrust's accelerations that the deviations do not explain.
 fn expected_error(task: &Task<'_>, y: &[f64]) -> [f64; 2] {
     let parts = &task.seed.parts;
     let flight = task.flight();
@@ -162,7 +163,7 @@ pub struct GoalMap {
     pub points: Vec<MappedGoal>,
 }
 
-/// Plans a grid of goals around the training jumps; `done` is told how many of how many.
+/// Plans a grid of goals around the training jumps; `done` receives the number of finished goals and of all goals.
 pub fn reach(
     model: &ReducedModel,
     settings: &PlanSettings,

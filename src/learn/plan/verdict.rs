@@ -6,7 +6,7 @@ const LEAST_WEIGHT_SHARE: f64 = 0.5;
 const NO_SLACK: f64 = 2e-3;
 const NO_JOINT: f64 = 2e-3;
 const NO_FRICTION_N: f64 = 2.0;
-/// Twice what plans and recordings with rolling, point-like feet show.
+/// Twice the drift of plans and recordings with rolling, point-like feet.
 const FOOT_DRIFT_M: [f64; 2] = [0.04, 0.02];
 
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +34,7 @@ impl Verdict {
     }
 }
 
-/// The verdict on what a point of a task plans; `carried` of the weight is carried by its torques.
+/// The verdict on the plan at a point of a task; `carried` is the share of the weight that its torques carry.
 pub(crate) fn verdict(task: &Task<'_>, y: &[f64], plan: &Plan, carried: Option<f64>) -> Verdict {
     let refused = refusals(task, y, plan, carried);
     if !refused.is_empty() {
@@ -56,7 +56,7 @@ fn refusals(task: &Task<'_>, y: &[f64], plan: &Plan, carried: Option<f64>) -> Ve
         let percent = 100.0 * slack;
         (slack > NO_SLACK).then(|| match bound {
             Bound::Torque => format!(
-                "it would take torques {percent:.0} % beyond the share of the limits that plans may use"
+                "it would need torques {percent:.0} % beyond the share of the limits that plans may use"
             ),
             Bound::Joint => format!("joints would leave their limits by {slack:.3} rad"),
             Bound::Friction => {
@@ -82,12 +82,12 @@ fn refusals(task: &Task<'_>, y: &[f64], plan: &Plan, carried: Option<f64>) -> Ve
             .then(|| format!("the force is {force:.0} N outside the friction cone between nodes")),
         carried.map(|share| {
             format!(
-                "its torques carry {share:.3} of what the robot's weight needs: the model's inputs cannot be lifted \
+                "its torques carry {share:.3} of the robot's weight: the model's inputs cannot be lifted \
                  to forces of its feet"
             )
         }),
         (deviation > most).then(|| {
-            format!("its input is {deviation:.1} standard deviations from what was recorded, more than {most}")
+            format!("its input is {deviation:.1} standard deviations from the recorded ones, more than {most}")
         }),
     ]))
 }
@@ -106,7 +106,7 @@ fn doubts(seed: &Seed<'_>, settings: &PlanSettings, plan: &Plan) -> Vec<String> 
     let lost = seed.start_lost.join(", ");
     reasons(["distance", "apex"].into_iter().zip(beyond).map(outside).chain([
         (deviation > settings.warn_deviation).then(|| {
-            format!("its input is {deviation:.1} standard deviations from what was recorded")
+            format!("its input is {deviation:.1} standard deviations from the recorded ones")
         }),
         (drift[0] > FOOT_DRIFT_M[0] || drift[1] > FOOT_DRIFT_M[1]).then(|| {
             format!(

@@ -8,7 +8,7 @@ const MOST_SAMPLES: f64 = 1e6;
 const SPEEDS: usize = 8; // of a map
 const YAW_RATES: usize = 7;
 const STRIDES: f64 = 2.0; // of each of its walks
-const SMOOTHED: usize = 2; // samples beside each that velocities are averaged over
+const SMOOTHED: usize = 2; // samples on each side of a sample over which velocities are averaged
 const NAMES: [(&str, &str); 3] = [
     ("speed", "m/s"),
     ("sideways speed", "m/s"),
@@ -54,7 +54,7 @@ pub struct MappedWalk {
     pub torque_share: f64,
 }
 
-/// Plans walks up to the ends of what is planned for at all.
+/// Plans walks over the whole range in which walks are planned.
 ///
 /// # Errors
 /// Those of [`walk`].
@@ -100,8 +100,9 @@ pub fn walk_reach(model: &ReducedModel) -> Result<WalkMap> {
     })
 }
 
-/// A stride of the goal's gait, over and over: half a stride as the prior has it, half as the mirror image of the gait turning
-/// the other way. Velocities are differences of the positions, torques those of the prior with the losses of this very motion.
+/// A stride of the goal's gait, repeated: half a stride from the prior, half the mirror image of the gait that turns
+/// the other way. Velocities are differences of the positions. Torques are those of the prior plus the losses of this
+/// motion.
 ///
 /// # Errors
 /// Those of a model without strides or robot, and for more than 1e6 samples.

@@ -1,5 +1,5 @@
-//! Adaptive integration of `dy/dt = f(t, y)` by extrapolation: Gragg's explicit midpoint rule first, and where that
-//! needs too many evaluations (a stiff problem), the linearly implicit Euler rule from the same start.
+//! Adaptive integration of `dy/dt = f(t, y)` by extrapolation: Gragg's explicit midpoint rule first. If it needs too
+//! many evaluations (a stiff problem), the linearly implicit Euler rule restarts from the same state.
 //!
 //! A step of length `H` is computed with `n_0 < n_1 < ...` substeps, and the results are extrapolated to infinitely
 //! many (Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, II.9, and II, IV.9): order `2j + 2` or
@@ -104,7 +104,8 @@ struct Plan {
 }
 
 impl Plan {
-    /// Takes the length at which entry `j`, whose `error` grows with the power `order`, should do, if it costs less.
+    /// Chooses the step length at which entry `j`, whose `error` grows with the power `order`, is expected to succeed,
+    /// if it costs less.
     fn consider(&mut self, j: usize, error: f64, order: usize, spent: f64, h: f64) {
         let factor = 0.9 * (0.5 / error.max(1e-300)).powf(1.0 / order as f64);
         let factor = factor.clamp(0.02, 4.0);
@@ -137,7 +138,7 @@ impl<S: OdeSystem> Stepper<'_, S> {
                     break 'times;
                 }
                 let trial = self.step(time, &y, h);
-                // a step that a requested time cut short says little about the next
+                // a step that a requested time cut short does not determine the next length
                 let cut = trial.end.is_some() && h < length && length.is_finite();
                 let least = if cut { length } else { 0.0 };
                 length = trial.next.max(least);
@@ -170,7 +171,7 @@ impl<S: OdeSystem> Stepper<'_, S> {
             jacobian = DMatrix::zeros(y.len(), y.len());
             self.system.jacobian(time, y.as_slice(), &mut jacobian);
         }
-        // Of the substeps; also what the order grows by with every result.
+        // Of the substeps; also the increase of the order with every result.
         let multiple = match self.method {
             IntegrationMethod::Explicit => 2,
             IntegrationMethod::Implicit => 1,

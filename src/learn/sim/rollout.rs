@@ -89,7 +89,7 @@ pub(crate) fn rollout_over(
 
 /// Tolerance and bound for models whose coordinates are far from one, so that rollouts do not depend on their scale.
 fn at_scale(recorded: &LatentSegment) -> IntegrationOptions {
-    /// Largest coordinates between which the options are taken as they are.
+    /// Range of largest coordinates in which the options are used unchanged.
     const USUAL: [f64; 2] = [1e-3, 1e3];
     let mut options = IntegrationOptions::default();
     let largest = recorded.z.amax();
@@ -150,8 +150,9 @@ fn roll_window(
     }
 }
 
-/// States from `initial`, stretch after stretch of like samples, as far as they are reached, and when they left every
-/// bound; `of_stretch` integrates one over its times, which end at the first sample of the next.
+/// States from `initial`, stretch after stretch of similar samples, as far as they are reached, and the time at which
+/// they left every bound. `of_stretch` integrates one stretch over its times, which end at the first sample of the
+/// next.
 pub(crate) fn integrate_stretches(
     initial: &[f64],
     time_s: &[f64],

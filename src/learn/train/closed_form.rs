@@ -19,7 +19,7 @@ pub(super) fn closed_form(
         return Err(TrainError::Option {
             option: "encoder-layers or decoder-layers",
             found: format!("{:?} and {:?}", maps.encoder_layers, maps.decoder_layers),
-            expected: "none with the closed form, which learns linear maps; take `--method joint`",
+            expected: "none with the closed form, which learns linear maps; use `--method joint`",
         });
     }
     let task = Task::new(recordings, robot, options)?;
@@ -35,7 +35,7 @@ pub(super) fn closed_form(
 
 fn fit(task: &Task<'_>, seed: u64, monitor: &mut Monitor<'_>) -> Outcome {
     let options = task.options;
-    monitor.stage("searching the latent space");
+    monitor.stage("searching the latent space", None);
     let (frame, d) = (&task.frame, options.latent_dim);
     let basis = find_subspace(&task.moments, frame, d, &options.encoder, seed);
     let encoder = task.encoder_over(&basis)?.into();

@@ -35,8 +35,8 @@ impl ScaleOptions {
         }
     }
 
-    /// State and torques 0.1, forces 0.005, moments 0.05 in the body's axes: all of one size. In the world's axes
-    /// moments of a jump nearly cancel, and what remains is the least exact part of the input: 0.02.
+    /// State and torques 0.1, forces 0.005, moments 0.05 in the body's axes, so that all have similar sizes. In the
+    /// world's axes moments of a jump nearly cancel, and the remainder is the least exact part of the input: 0.02.
     pub fn in_frame(frame: WrenchFrame) -> Self {
         Self {
             state: 0.1,
@@ -371,7 +371,7 @@ impl Split {
         while counts.iter().sum::<usize>() != jumps {
             let given: usize = counts.iter().sum();
             let sets = (0..3).filter(|set| self.shares[*set] > 0);
-            // `max_by_key` takes the last of equals: reversed, training comes first.
+            // `max_by_key` returns the last of equals: reversed, training comes first.
             if given < jumps {
                 let next = sets.rev().max_by_key(|set| owed(&counts, *set));
                 counts[next.expect("invariant: a share is not 0")] += 1;

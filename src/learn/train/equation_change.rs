@@ -1,5 +1,5 @@
-//! The least change of one equation that predicts left-out parts of recordings better: of single coefficients, or of the
-//! equation as a whole.
+//! The least change of one equation that predicts left-out parts of recordings better: of single coefficients, or of
+//! the equation as a whole.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
@@ -64,7 +64,7 @@ pub(super) struct Family {
     shift: Option<Shift>,
 }
 
-/// What coefficients change by before anything else: found in all parts, and without each.
+/// Change of the coefficients before all others: found in all parts, and without each.
 pub(super) struct Shift {
     pub(super) of_all: DVector<f64>,
     pub(super) without: Vec<DVector<f64>>,

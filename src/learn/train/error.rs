@@ -1,4 +1,4 @@
-//! What can keep a model from being trained.
+//! Errors of a training.
 
 use thiserror::Error;
 
@@ -50,7 +50,7 @@ pub enum TrainError {
     NoStableModel { candidates: usize },
     #[error(
         "{path}: term `{term}` is {found:e} at sample {sample} ({time_s} s) in phase `{phase}`, expected a finite number \
-         below {limit:e}: leave it out, or scale or shift what is inside"
+         below {limit:e}: leave it out, or scale or shift its argument"
     )]
     TermValue {
         path: PathBuf,

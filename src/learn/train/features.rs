@@ -22,7 +22,7 @@ macro_rules! vectorised {
                     plain($($argument),*);
                 }
                 if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                    // SAFETY: the processor has what this is compiled for.
+                    // SAFETY: the processor supports the compiled instructions.
                     return unsafe { with_avx2($($argument),*) };
                 }
             }
@@ -117,8 +117,8 @@ impl Features {
         &values.values[self.tape.terms[term]]
     }
 
-    /// Adds to `gradient` (`n x 3 latent_dim`) what `theta_gradient` (`n x library_dim`) means for the variables of the
-    /// batch that `values` holds.
+    /// Adds to `gradient` (`n x 3 latent_dim`) the gradient by the variables of the batch in `values`, from
+    /// `theta_gradient` (`n x library_dim`).
     pub(super) fn backward(
         &self,
         theta_gradient: &DMatrix<f64>,

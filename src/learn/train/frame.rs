@@ -50,11 +50,13 @@ impl Frame {
         }
     }
 
-    /// With [`Coordinates::Named`] the first rows are the momentum of the coordinates in `body`. With pitch among them and
-    /// four or more rows beside, the next four are foot positions relative to the centre of mass, unless these are walks. The others combine
-    /// `active` coordinates. In the plane these are mirror-symmetric sums of joints, and pitch where it has no row. With
-    /// a row that changes sign in a mirror image the sums of the legs that move alike ([`paired_joints`]) if these are enough, else
-    /// all joints, and all of the body without a row.
+    /// With [`Coordinates::Named`] the first rows are the momentum of the coordinates in `body`. If pitch is among them
+    /// and there are at least four more rows, the next four are foot positions relative to the centre of mass, except
+    /// for walks. The other rows combine `active` coordinates.
+    ///
+    /// In the plane these are mirror-symmetric sums of joints, and pitch if it has no row. With a row that changes sign
+    /// in a mirror image they are the sums of the legs that move alike ([`paired_joints`]) if these are enough.
+    /// Otherwise they are all joints, and all body coordinates without a row.
     pub(super) fn new(
         training: &Dataset,
         active: &[usize],
@@ -113,8 +115,9 @@ impl Frame {
         }
     }
 
-    /// How many of `latent_dim` coordinates predictions of whole jumps are judged by: of the whole body the first two, the
-    /// centre of mass. Errors of rotation and legs there grow with the least difference at take-off.
+    /// Number of latent coordinates, of `latent_dim`, by which predictions of whole jumps are judged. For the whole
+    /// body it is the first two, the centre of mass, because errors of rotation and legs grow with small differences at
+    /// take-off.
     pub(super) fn judged_over_jumps(&self, latent_dim: usize) -> usize {
         if self.legs.is_empty() && !self.is_spatial() {
             latent_dim
@@ -123,8 +126,8 @@ impl Frame {
         }
     }
 
-    /// How many momentum rows have their own equations for deviations from the mean jump: all, if the rotation is one.
-    /// Without it their equations miss what the pitch does, and regressions find some of that.
+    /// Number of momentum rows with their own equations for deviations from the mean jump: all if the rotation is one
+    /// of them. Without it their equations lack the effect of pitch, of which regressions find a part.
     pub(super) fn known_in_deviations(&self) -> usize {
         if self.body.contains(&PITCH) {
             self.body.len()
@@ -165,8 +168,8 @@ fn image(rows: &DMatrix<f64>, robot: &Robot) -> DMatrix<f64> {
     })
 }
 
-/// A basis of the space of orthonormal columns, as far as a mirror leaves this space alone, of rows that it leaves alone and
-/// of rows that it turns around.
+/// A basis of the span of orthonormal columns in two parts: symmetric rows, which a mirror leaves unchanged, and
+/// antisymmetric rows, whose sign it changes. It spans the columns only as far as the mirror maps their span to itself.
 pub(super) fn symmetry_classes(basis: &DMatrix<f64>, robot: &Robot) -> [DMatrix<f64>; 2] {
     let eigen = basis.tr_mul(&image(basis, robot)).symmetric_eigen();
     [1.0, -1.0].map(|parity| {
@@ -207,8 +210,8 @@ pub(super) fn has_leg_rows(body: &BodyRows, latent_dim: usize) -> bool {
     body.coordinates.contains(&PITCH) && latent_dim >= body.coordinates.len() + LEG_ROWS
 }
 
-/// Orthonormal directions of the pairs of a left and a right joint with one among `active`: with `parity` 1 those that a
-/// mirror leaves alone, with -1 those that it turns around.
+/// Orthonormal directions of the pairs of a left and a right joint with one among `active`. With `parity` 1 a mirror
+/// leaves them unchanged, with -1 it changes their sign.
 pub(super) fn joints_of_pairs(active: &[usize], robot: &Robot, parity: f64) -> Vec<DVector<f64>> {
     let joints = PAIRS
         .into_iter()
@@ -320,8 +323,9 @@ fn mean_over(training: &Dataset, stances: &[(usize, Range<usize>)], row: &DVecto
     sum / count - row.dot(&mean(&training.states(None)))
 }
 
-/// Gives each pair's rows the weights of its abductions with which the lift `W_e^T u_lat` returns their torques best, by
-/// regression on `u_lat = pinv(W_e^T) u`, which depends on these weights in turn: [`ABDUCTION_ROUNDS`] times.
+/// Sets the weights of the abductions in each pair's rows, with which the lift `W_e^T u_lat` returns their torques
+/// best. The weights come from a regression on `u_lat = pinv(W_e^T) u`, which depends on them: it is repeated
+/// [`ABDUCTION_ROUNDS`] times.
 fn add_abductions(
     training: &Dataset,
     momentum: &DMatrix<f64>,

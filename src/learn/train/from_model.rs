@@ -1,10 +1,13 @@
 //! A trained model refined on few recordings: of hardware after a simulation, or of another robot.
 //!
-//! Encoder and decoder stay. In each equation of each phase the coefficients that the model uses, and a constant, change
-//! by the least that predicts left-out recordings better: `xi + argmin |Y - Theta (xi + delta)|^2 / n + ridge |delta
-//! rms(Theta)|^2`, with the largest ridge whose error on left-out parts is within a standard error of the best. Where it
-//! predicts left-out parts better, the equation is multiplied by one number instead: recorded torques are not always what
-//! the motors gave. In flight a joint control that torques do not show is added (`joint_control`). Equations without a variable (free fall, a rotation that nothing changes) are physics and stay.
+//! Encoder and decoder stay. In each equation of each phase the coefficients that the model uses, and a constant,
+//! change by the least that predicts left-out recordings better: `xi + argmin |Y - Theta (xi + delta)|^2 / n + ridge
+//! |delta rms(Theta)|^2`. The ridge is the largest whose error on left-out parts is within a standard error of the
+//! best.
+//!
+//! If it predicts left-out parts better, the equation is multiplied by one number instead, because recorded torques may
+//! differ from the motors' torques. In flight a joint control that torques do not contain is added (`joint_control`).
+//! Equations without a variable (free fall, a rotation that nothing changes) are physics and stay.
 
 use serde_json::{Map, Value, json};
 
@@ -110,7 +113,7 @@ pub fn refine_from(
     let phases = model.phases().iter().cloned().zip(xi);
     let phases = phases.map(|(phase, xi)| Phase { xi, ..phase });
     let is_same_robot = model.robot().is_ok_and(|own| own.name == robot.name);
-    // What another robot's jumps look like is not what this one's do.
+    // Jumps of another robot are no prior for those of this one.
     let mut prior = model.jump_prior().ok().cloned().filter(|_| is_same_robot);
     // Plans then obey the refined equations.
     for part in prior.iter_mut().flat_map(|prior| &mut prior.parts) {
@@ -130,7 +133,7 @@ pub fn refine_from(
     })
 }
 
-/// The model's, with the command and recordings of the refinement and what it changed.
+/// The model's provenance, with the command and recordings of the refinement and its changes.
 fn provenance(
     model: &ReducedModel,
     origin: &Origin,
@@ -330,7 +333,7 @@ impl Data<'_> {
             let (before, mut after) = (own.xi[(term, k)], change.after[term]);
             let least = f64::MIN_POSITIVE.sqrt();
             let errors = (after - before).abs() / change.deviations[term].max(least);
-            // What brakes the momentum does not drive it.
+            // A damping term of the momentum must not become driving.
             let is_braking = self.features.variable_term(d + k) == Some(term);
             if k < 2 && is_braking && before <= 0.0 {
                 after = after.min(0.0);

@@ -23,7 +23,7 @@ pub(super) struct Growth {
 /// An eigenvalue that grows too fast, and how its rate changes with the lower half of every phase's `A`.
 struct Mode {
     value: Complex<f64>,
-    excess: f64, // of its rate above what is aimed at
+    excess: f64, // of its rate above the target
     slopes: Vec<DMatrix<f64>>,
 }
 
@@ -46,8 +46,8 @@ impl Growth {
         self.excess(&self.lower_halves(xi)) == [0.0; 2]
     }
 
-    /// Changes the coefficients until the bound admits them, each time by the least that does to first order as
-    /// `inverse` weighs changes. Where such steps do not end, what depends on the state is scaled down.
+    /// Changes the coefficients until they satisfy the bound, each time by the change that is least in the metric of
+    /// `inverse` to first order. If such steps do not end, the terms that depend on the state are scaled down.
     pub(super) fn hold(&self, xi: &mut [Xi], inverse: impl Fn(&[Xi]) -> Vec<Xi>) {
         for _ in 0..STEPS {
             let lower = self.lower_halves(xi);
@@ -138,8 +138,8 @@ impl Growth {
         all
     }
 
-    /// The eigenvalues that are too fast, one of each conjugate pair, and how their rates change with the lower halves
-    /// of `phases`: differences of the nearest of the `values` once one phase has changed.
+    /// The eigenvalues that are too fast, one of each conjugate pair, and the derivatives of their rates by the lower
+    /// halves of `phases`. These are differences to the nearest of the `values` after one phase has changed.
     fn fast(
         &self,
         lower: &[DMatrix<f64>],
@@ -179,7 +179,7 @@ impl Growth {
         modes
     }
 
-    /// The least change, as `inverse` weighs it, that takes the excess off the modes to first order.
+    /// The least change, in the metric of `inverse`, that removes the excess of the modes to first order.
     fn least_change(
         &self,
         modes: &[Mode],

@@ -1,4 +1,4 @@
-//! Joint position control that recorded torques of legs in flight do not contain, such as that of a robot that is also
+//! Joint position control that recorded torques of legs in flight do not contain, as on a robot that also receives
 //! commanded postures: `ddz = -2 w dz - w^2 z` with one rate `w` for all equations, which is critically damped.
 
 use nalgebra::{DVector, Matrix2, Vector2};
@@ -15,7 +15,7 @@ pub(super) struct Controlled {
     pub(super) terms: [usize; 2],
 }
 
-/// Coefficients of `dz` and `z` that fit best if each equation is multiplied and shifted as well; none if none is better.
+/// Coefficients of `dz` and `z` that fit best if each equation is also multiplied and shifted; none if none is better.
 pub(super) fn coefficients(
     equations: &[Controlled],
     sums: &Sums,

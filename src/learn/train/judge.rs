@@ -18,7 +18,7 @@ pub(super) struct Judge<'a> {
     pub features: &'a Features,
     set: EncodedSet<'a>,
     windows: [Vec<Window>; 2], // short and long
-    scales: [Vec<f64>; 2], // what errors are multiplied by; one number for each coordinate that counts
+    scales: [Vec<f64>; 2],     // factors on errors; one number for each coordinate that counts
 }
 
 impl<'a> Judge<'a> {

@@ -1,4 +1,4 @@
-//! What is known of the latent dynamics before a regression, in the coordinates of a [`Frame`].
+//! Prior knowledge of the latent dynamics before a regression, in the coordinates of a [`Frame`].
 
 use super::body::Y;
 use super::frame::{LegRow, TURN};
@@ -18,10 +18,10 @@ const SHARED_RIDGE: f64 = 1e-5; // the same
 pub(super) struct Knowledge {
     pub known: DMatrix<f64>,    // zero where nothing is known
     pub free: DMatrix<bool>,    // to be chosen by a regression
-    pub kept: DMatrix<bool>,    // free, and stay whatever they explain
+    pub kept: DMatrix<bool>,    // free, and never removed
     pub braking: DMatrix<bool>, // free, and at most 0 once refined
     shared: Vec<Vec<usize>>,    // terms of each momentum column that is the same in all phases
-    affine: Range<usize>,       // columns of the joints beside such columns
+    affine: Range<usize>,       // columns of the joints, if there are such columns
     standing: Vec<Standing>,    // equations of the legs, if they stand in this phase
     swinging: Range<usize>,     // columns of the legs, if this phase is flight
     left_out: Vec<RecipePart>,
@@ -95,7 +95,7 @@ impl Knowledge {
         !self.left_out.contains(&part)
     }
 
-    /// With the equations of the legs in flight known. They depend on inputs only, so that positions are linear in their
+    /// With the fitted equations of the legs in flight. They depend on inputs only, so positions are linear in their
     /// coefficients: least squares over windows and whole flights of the training.
     pub(super) fn with_flights(
         &self,
@@ -125,8 +125,8 @@ impl Knowledge {
         !self.shared.is_empty()
     }
 
-    /// With the momentum columns of [`Self::share_body`] known: ridge regression over windows of all motions, whatever the phases in them,
-    /// without a velocity that would drive.
+    /// With the fitted momentum columns of [`Self::share_body`]: ridge regression over windows of all motions, across
+    /// phases. A velocity with a positive coefficient is omitted, because it would drive.
     pub(super) fn with_shared_body(
         &self,
         (theta, target): &(DMatrix<f64>, DMatrix<f64>),
@@ -151,9 +151,9 @@ impl Knowledge {
         fitted
     }
 
-    /// The momentum columns become known, the same in all phases with feet on the ground: forces and moments, a constant
-    /// upwards and of pitch, the own velocity of `x` and `y`. Contact is in the forces, so that one equation holds in every
-    /// phase; in flight it is free fall.
+    /// Marks the momentum columns as known and equal in all phases with feet on the ground. Their terms are forces and
+    /// moments, a constant upwards and of pitch, and the own velocity of `x` and `y`. The forces represent contact, so
+    /// one equation holds in every phase; in flight it is free fall.
     fn share_body(&mut self, features: &Features, frame: &Frame) {
         let d = features.latent_dim;
         for (k, &coordinate) in frame.body.iter().enumerate() {
@@ -201,17 +201,19 @@ impl Knowledge {
         self.standing.iter().find(|of| of.column == column)
     }
 
-    /// What is known of each phase in a frame that holds momentum: the centre of mass as `z1` (forwards) and `z2`
+    /// Prior knowledge of each phase in a frame with momentum rows: the centre of mass as `z1` (forwards) and `z2`
     /// (upwards), the rotation about it as `z3`, then foot positions. The floor is the same everywhere: no term depends
-    /// on `z1`. Forces move a centre of mass and losses brake it, wherever it and the legs are: no term of `ddz1` and
-    /// `ddz2` depends on a position, and each keeps its own velocity, braking.
+    /// on `z1`. Forces accelerate a centre of mass and losses brake it, at any position of it and the legs: no term of
+    /// `ddz1` and `ddz2` depends on a position, and each keeps its own velocity, braking.
     ///
-    /// With feet on the ground `ddz2` depends on its own force and velocity alone, and keeps its constant (gravity, less
-    /// what the ground carries of the legs' weight). `ddz3` depends on velocities, on force and moment, and on products
-    /// of these with the height if the library has them. The equations of the legs are affine, start from [`Standing`] and keep all terms. In
-    /// flight `ddz1 = 0`, `ddz2 = -g`, `ddz3 = 0`, no term depends on force or moment, and the legs depend on their own
-    /// inputs only. Momentum rows that change sign in a mirror image depend on forces and moments (`y` on its own force
-    /// alone). No term depends on place or heading.
+    /// With feet on the ground `ddz2` depends on its own force and velocity alone, and keeps its constant (gravity
+    /// minus the share of the legs' weight that the ground carries). `ddz3` depends on velocities, on force and moment,
+    /// and on products of these with the height if the library has them. The equations of the legs are affine, start
+    /// from [`Standing`] and keep all terms.
+    ///
+    /// In flight `ddz1 = 0`, `ddz2 = -g`, `ddz3 = 0`, no term depends on force or moment, and the legs depend on their
+    /// own inputs only. Momentum rows that change sign in a mirror image depend on forces and moments (`y` on its own
+    /// force alone). No term depends on place or heading.
     pub(super) fn of_phases(
         training: &Dataset,
         features: &Features,
@@ -335,8 +337,9 @@ impl Knowledge {
         }
     }
 
-    /// Without the terms that a mirror image contradicts: each latent coordinate stays or changes sign in it (`parity` 1 or
-    /// -1), and so do the terms of its equation. Terms of one variable that are not affine are left.
+    /// Without the terms that contradict mirror symmetry: each latent coordinate stays or changes sign in a mirror
+    /// image (`parity` 1 or -1), and so do the terms of its equation. Terms of one variable that are not affine are
+    /// left.
     pub(super) fn with_parity(&self, features: &Features, parity: &[f64]) -> Self {
         let (mut allowed, d) = (self.clone(), features.latent_dim);
         for (term, variables) in features.variables() {

@@ -4,7 +4,7 @@ use nalgebra::DMatrixViewMut;
 
 use super::*;
 
-const FITS: &str = "invariant: a trained or checked map takes the robot's coordinates";
+const FITS: &str = "invariant: a trained or checked map accepts the robot's coordinates";
 
 /// Latent samples of one jump; columns are samples, scaled units.
 #[derive(Clone, Debug)]

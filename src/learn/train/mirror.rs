@@ -1,5 +1,5 @@
-//! Phases that are each other's mirror images, such as the two of a trot: the equations of one are those of the other with the
-//! signs that a mirror changes.
+//! Phases that are each other's mirror images, such as the two of a trot. The equations of one are those of the other
+//! with the signs that a mirror changes.
 
 use super::*;
 use crate::robot::{ContactFlags, FOOT_DIM};

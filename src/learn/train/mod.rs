@@ -1,8 +1,8 @@
-//! Learning: recordings in, a reduced-order model with its figures out.
+//! Learning: recordings in, a reduced-order model with its metrics out.
 //!
-//! In: recordings of jumps, a robot, [`TrainOptions`]. Out: a [`Trained`] model, whose provenance says how to repeat
-//! it, and a [`TrainReport`]. Read `closed_form.rs` first: it walks from the dataset over the encoder's row space
-//! (`subspace`) and the decoder (`latent`) to the dynamics (`weak_form`, `sparse`, `select`), judged by rollouts.
+//! In: recordings of jumps, a robot, [`TrainOptions`]. Out: a [`Trained`] model, whose provenance contains the command
+//! to repeat it, and a [`TrainReport`]. Read `closed_form.rs` first: it goes from the dataset over the encoder's row
+//! space (`subspace`) and the decoder (`latent`) to the dynamics (`weak_form`, `sparse`, `select`), judged by rollouts.
 
 mod body;
 mod closed_form;

@@ -5,8 +5,8 @@ use super::frame::joints_of_pairs;
 use super::*;
 
 const FLIGHT_WINDOW_S: f64 = 0.05; // over which accelerations are averaged
-/// The same with feet on the ground: of a walk whatever feet do in between, else short, because slow motions of one stance say
-/// little in long ones.
+/// The same with feet on the ground. The first is for jumps, short because slow motions of one stance determine little
+/// over long windows; the second is for walks, across changes of feet.
 const WINDOW_S: [f64; 2] = [0.02, 0.1];
 const STRIDE: usize = 2; // samples between the starts of two of these
 const TRIM: usize = 4; // samples left out at both ends of a flight, where feet still slip or already touch
@@ -14,16 +14,21 @@ const LEAST_FLIGHTS: usize = 50; // averaged accelerations in flight that identi
 const LEAST_SHARE: f64 = 0.05; // of all samples that they begin at
 const FLIGHT_RIDGE: f64 = 1e-2; // relative to the mean square of all joints' accelerations
 const RIDGE: f64 = 1e-3; // the same with feet on the ground
-const LOAD_RIDGE: f64 = 1e-5; // on what else is in the regression, relative to the mean square of each
+const LOAD_RIDGE: f64 = 1e-5; // on the other columns of the regression, relative to the mean square of each
 
-/// The momentum rows of these body coordinates, as columns: `x + c_x^T q`, `pitch + c_t^T q` and so on over the joints `q`.
-/// In flight the centre of mass falls freely and the angular momentum about it is constant: `ddx + c_x^T ddq = 0`, `ddz +
-/// c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The regression of the body's accelerations on those of the joints (ridge) gives
-/// `c`, to first order in `q`. In walks, and where flights are fewer than [`LEAST_FLIGHTS`] or [`LEAST_SHARE`], it is that of all samples,
-/// where forces and moments on the body change the momentum: `dd(b + c_b^T q) = B [F; M] - k db + a`, with the velocity of `x`
-/// and `y` alone, because feet that roll brake them; of `y` also on roll, which moves a centre of mass below the body's origin.
-/// Of the body alone if forces are in its axes. By symmetry a row in the plane has sums of left and right joints only, and one
-/// that changes sign in a mirror image differences: this is the regression over the samples and their mirror images.
+/// The momentum rows of these body coordinates, as columns: `x + c_x^T q`, `pitch + c_t^T q` and so on over the joints
+/// `q`. In flight the centre of mass falls freely and the angular momentum about it is constant: `ddx + c_x^T ddq = 0`,
+/// `ddz + c_z^T ddq = -g`, `ddpitch + c_t^T ddq = 0`. The regression of the body's accelerations on those of the joints
+/// (ridge) gives `c`, to first order in `q`.
+///
+/// In walks, and if flights are fewer than [`LEAST_FLIGHTS`] or [`LEAST_SHARE`], the regression uses all samples. There
+/// forces and moments on the body change the momentum: `dd(b + c_b^T q) = B [F; M] - k db + a`. Only the equations of
+/// `x` and `y` contain their velocity, because rolling feet brake them. The equation of `y` also contains roll, which
+/// moves a centre of mass below the body's origin. If forces are in the body's axes, the rows are those of the body
+/// alone.
+///
+/// By symmetry a row in the plane has only sums of left and right joints, and a row that changes sign in a mirror image
+/// only differences. This is the regression over the samples and their mirror images.
 pub(super) fn momentum_rows(
     training: &Dataset,
     coordinates: &[usize],
@@ -99,8 +104,8 @@ pub(super) fn momentum_rows(
     rows
 }
 
-/// What changes the momentum of a body coordinate: of a centre of mass its own force, of a rotation the forces and moments
-/// that a mirror changes as it does the rotation.
+/// Forces and moments that change the momentum of a body coordinate: for a centre of mass its own force, for a rotation
+/// the forces and moments with the same mirror symmetry.
 pub(super) fn loads_on(coordinate: usize) -> impl Iterator<Item = usize> {
     let is_rotation = coordinate >= ROLL;
     let lateral = is_lateral(coordinate);
@@ -111,8 +116,8 @@ pub(super) fn loads_on(coordinate: usize) -> impl Iterator<Item = usize> {
     (JOINT_DIM..STATE_DIM).filter(suits)
 }
 
-/// Weights of the joints, then of what else explains `target`: ridge regression on the joints' accelerations (`k x n`) and on
-/// these, with a ridge on the joints relative to their mean square. None at rest.
+/// Weights of the joints, then of the other regressors `also`: ridge regression of `target` on the joints'
+/// accelerations (`k x n`) and on these, with a ridge on the joints relative to their mean square. None at rest.
 fn joint_weights(
     of_joints: DMatrix<f64>,
     also: Vec<DVector<f64>>,

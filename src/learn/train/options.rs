@@ -1,4 +1,4 @@
-//! What to train and how.
+//! Options of a training.
 
 use clap::ValueEnum;
 
@@ -15,14 +15,14 @@ use crate::robot::{Actuators, JOINT_NAMES};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Encoder, decoder and coefficients each from a least-squares problem; seconds.
+    /// Least-squares problems, one after the other; seconds
     ClosedForm,
-    /// Encoder, decoder and coefficients together by Adam, as published; minutes.
+    /// All parts together by Adam, as in the paper; minutes
     Joint,
 }
 
 impl Method {
-    /// Learns a model, deterministically. A cancelled training ends with the seeds begun by then.
+    /// Learns a model, deterministically. A cancelled training ends with the seeds that have begun.
     ///
     /// # Errors
     /// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
@@ -96,8 +96,8 @@ pub enum Transfer {
 pub struct EncoderOptions {
     /// Weight of the lift loss, the input energy that the latent input cannot carry, against the reconstruction error.
     pub lift_weight: f64,
-    /// Weight of the three body positions in the reconstruction error, of all body coordinates where `body` has lateral ones;
-    /// the others have 1.
+    /// Weight of the three body positions in the reconstruction error, or of all body coordinates if `body` has lateral
+    /// ones; the others have 1.
     pub body_weight: f64,
     /// Coordinates with a smaller standard deviation (rad or m) are masked unless they are actuated.
     pub least_std: f64,
@@ -117,29 +117,27 @@ pub struct EncoderOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum MirrorImages {
-    /// Every training recording once more, legs exchanged, abductions, y, roll and yaw negated
+    /// Each recording again with left and right exchanged
     Added,
-    /// The recordings alone
+    /// No mirror images
     None,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyEquations {
-    /// Those of each phase by itself; in flight free fall
+    /// Own equations in each phase; free fall in flight
     PerPhase,
-    /// One for all phases with feet on the ground, of forces, moments and constants; in flight free fall
+    /// The same in all phases on the ground; free fall in flight
     AllPhases,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coordinates {
-    /// The centre of mass forwards and upwards, then rows over joints and pitch that are the same left and right. From
-    /// five coordinates on also the rotation about the centre of mass, from seven on foot positions relative to it. The
-    /// dynamics obey known physics.
+    /// Centre of mass, joints and pitch; from d = 5 rotation, from d = 7 foot positions. The dynamics obey known physics
     Named,
-    /// Any rows over all coordinates that move or are actuated.
+    /// Any rows over coordinates that move or are actuated
     Free,
 }
 
@@ -149,7 +147,7 @@ pub struct RegressionOptions {
     /// Parts of the recipe for named coordinates that are left out.
     pub leave_out: Vec<RecipePart>,
     pub body_equations: BodyEquations,
-    /// Of all candidates within this share of the best validation score, the one with fewest terms is taken.
+    /// Of all candidates within this share of the best validation score, the one with the fewest terms is chosen.
     pub slack: f64,
     /// Steps by which rollouts of the training jumps refine the coefficients chosen; 0 leaves the regression's.
     pub refinements: usize,
@@ -217,8 +215,8 @@ impl TrainOptions {
         InputRule::new(robot, self.actuators.clone(), self.wrench_frame)
     }
 
-    /// The settings of the paper: motors' torques, forces in the body's axes, one scale, no mask, no lift loss, Xi from
-    /// ones, the published library and transfer steps, accelerations as recorded.
+    /// The settings of the paper: motors' torques, forces in the body's axes, one scale, no mask, no lift loss,
+    /// accelerations as recorded. Also Xi from ones, the published library and transfer steps.
     pub fn paper(name: impl Into<String>, latent_dim: usize) -> Self {
         let mut options = Self::new(name, latent_dim);
         options.library = Some(LibraryChoice::Standard(StandardLibrary::default()));
@@ -235,7 +233,7 @@ impl TrainOptions {
         options
     }
 
-    /// What the encoder's rows are made of: networks have no rows to hold, so theirs are free.
+    /// The coordinates of the encoder's rows: networks have no fixed rows, so theirs are free.
     pub fn coordinates(&self) -> Coordinates {
         match self.joint.maps.is_linear() {
             true => self.encoder.coordinates,

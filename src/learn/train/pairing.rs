@@ -8,11 +8,11 @@ use crate::robot::{LEG_JOINT_DIM, Leg};
 
 use Leg::{FrontLeft, FrontRight, RearLeft, RearRight};
 
-/// Least share of a joint's energy, of torques or of motion, from which on a sum or a difference over the pairs is needed.
+/// Least share of a joint's energy, of torques or of motion, from which a sum or a difference over the pairs is needed.
 const LEAST_SHARE: f64 = 0.1;
 
 type Pairs = [[Leg; 2]; 2];
-/// Left and right, as in jumps and bounds. A mirror leaves it alone, and the others.
+/// Left and right, as in jumps and bounds. A mirror maps this set of pairs to itself, and each of the others.
 const BESIDE: Pairs = [[FrontRight, FrontLeft], [RearRight, RearLeft]];
 /// Across, as in trots; in front and behind, as in paces.
 const OTHERS: [Pairs; 2] = [
@@ -20,9 +20,9 @@ const OTHERS: [Pairs; 2] = [
     [[FrontRight, RearRight], [FrontLeft, RearLeft]],
 ];
 
-/// Orthonormal directions of joints with one among `active`: sums and differences over the pairs of legs that move alike, those
-/// that torques or motions need. None unless legs across, or in front and behind, need fewer than those beside each other do:
-/// where left and right move alike, their differences are what moves the body sideways.
+/// Orthonormal directions of joints with one among `active`: the sums and differences over the pairs of legs that move
+/// alike which torques or motions need. None unless diagonal pairs, or front and rear legs of a side, need fewer than
+/// left and right legs. If left and right legs move alike, their differences move the body sideways.
 pub(super) fn paired_joints(training: &Dataset, active: &[usize]) -> Option<Vec<DVector<f64>>> {
     let moments = training.moments();
     let of_pairs = |pairs: &Pairs| {

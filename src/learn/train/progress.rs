@@ -6,11 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub enum Progress {
     Stage {
         name: &'static str,
+        /// How many [`Self::Done`] and [`Self::Step`] follow at most; unknown for a search that ends by itself.
+        steps: Option<usize>,
     },
-    /// After a candidate or epoch of the stage: figures of the moment, ready to print.
-    Done {
-        text: String,
-    },
+    /// After a candidate or epoch of the stage: metrics of the moment, ready to print.
+    Done { text: String },
+    /// After one without metrics.
+    Step,
 }
 
 /// Listens to a training and may stop it.
@@ -29,11 +31,16 @@ impl<'a> Monitor<'a> {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    pub(crate) fn stage(&mut self, name: &'static str) {
-        (self.listener)(Progress::Stage { name });
+    pub(crate) fn stage(&mut self, name: &'static str, steps: impl Into<Option<usize>>) {
+        let steps = steps.into();
+        (self.listener)(Progress::Stage { name, steps });
     }
 
     pub(crate) fn done(&mut self, text: String) {
         (self.listener)(Progress::Done { text });
+    }
+
+    pub(crate) fn step(&mut self) {
+        (self.listener)(Progress::Step);
     }
 }

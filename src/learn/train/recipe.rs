@@ -1,4 +1,4 @@
-//! Parts of the recipe for named coordinates that a training can leave out; `docs/learning.md` has the effect of each.
+//! Parts of the recipe for named coordinates that a training can leave out; `docs/evaluation/training-choices.md` has the effect of each.
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};

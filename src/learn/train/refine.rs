@@ -1,7 +1,7 @@
-//! Coefficients of a regression refined by what their rollouts predict: Gauss-Newton on the errors of 0.1 s predictions
-//! and of whole jumps (the prediction-error method, Ljung, System Identification, 2nd ed. 1999, section 7.2); and terms
-//! dropped that these rollouts do not miss, by the quadratic form of the errors (the optimal brain surgeon, Hassibi and
-//! Stork, Second order derivatives for network pruning, NIPS 1992).
+//! Refinement of the coefficients of a regression by their rollouts: Gauss-Newton on the errors of 0.1 s predictions
+//! and of whole jumps (the prediction-error method, Ljung, System Identification, 2nd ed. 1999, section 7.2). Terms
+//! with little effect on these rollouts are dropped, by the quadratic form of the errors (the optimal brain surgeon,
+//! Hassibi and Stork, Second order derivatives for network pruning, NIPS 1992).
 
 use super::knowledge::brake;
 use super::rollout::CoefficientIndex;
@@ -104,7 +104,7 @@ impl Refiner<'_> {
         let Some(weights) = self.weights(&start.xi).filter(|_| !free.indices.is_empty()) else {
             return start;
         };
-        monitor.stage("refining coefficients by rollouts");
+        monitor.stage("refining coefficients by rollouts", steps);
         self.descend(start, &free, weights, steps, monitor)
     }
 
@@ -177,7 +177,8 @@ impl Refiner<'_> {
         brake(self.knowledge, xi);
     }
 
-    /// Score of coefficients, infinite if they grow faster than they may or diverge; or a number above `limit` if it is.
+    /// Score of coefficients, infinite if they exceed the growth bound or diverge; some number above `limit` if the
+    /// score is above it.
     pub(super) fn score_within(&self, xi: &[Xi], limit: f64) -> f64 {
         match self.growth.admits(xi) {
             true => self.judge.score_within(xi, limit),
@@ -270,7 +271,7 @@ impl Refiner<'_> {
             return refined;
         };
         let mut thinned = refined;
-        monitor.stage("dropping terms that rollouts do not miss");
+        monitor.stage("dropping terms that rollouts do not miss", None);
         while !monitor.cancelled() {
             let free = FreeCoefficients::of(&thinned.xi, self.knowledge);
             let model = self.model(&thinned.xi, &free, weights);
@@ -349,7 +350,7 @@ impl QuadraticForm {
         })
     }
 
-    /// What the form rises by without a term, the others where it is lowest then.
+    /// Increase of the form without a term, if the others minimise it then.
     fn loss(&self, i: usize) -> f64 {
         (self.to_zero[i] - self.lowest[i]).powi(2) / self.inverse[(i, i)]
     }

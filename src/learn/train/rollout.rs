@@ -61,8 +61,8 @@ pub(super) fn windows(dataset: &Dataset, restart: Restart) -> Vec<Window> {
     windows
 }
 
-/// Latent positions predicted in every row, `latent_dim x steps` (samples `start + 1 ..= start + steps`), whatever the
-/// other rows. The latent input is interpolated linearly, the phase is that of the sample a step starts from. Values
+/// Latent positions predicted in every row, `latent_dim x steps` (samples `start + 1 ..= start + steps`), independent
+/// of the other rows. The latent input is interpolated linearly; a step has the phase of its first sample. Values
 /// beyond 1e6 are infinite from there on.
 pub(super) fn predict(
     candidate: Candidate<'_>,

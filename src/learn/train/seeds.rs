@@ -23,7 +23,7 @@ impl Seeds {
         match outcome.and_then(with_finite_coefficients) {
             Ok(finished) => self.finished.push(finished),
             Err(error) if is_of_one_seed(&error) => {
-                monitor.stage("leaving out a seed without a model");
+                monitor.stage("leaving out a seed without a model", None);
                 monitor.done(format!("seed {seed}: {error}"));
                 self.failure.get_or_insert(error);
             }
@@ -50,7 +50,7 @@ impl Seeds {
             return Err(self.failure.unwrap_or(TrainError::Cancelled));
         };
         let mut report = task.report(&best, &reports[0].judged);
-        // A single seed without losses has nothing that the report does not say.
+        // A single seed without losses adds nothing to the report.
         if reports.len() > 1 || reports[0].losses.is_some() {
             (report.seeds, report.support_overlap) = (reports, overlap);
         }

@@ -1,4 +1,4 @@
-//! Choosing Xi: many candidates, judged by what their rollouts predict on jumps that were not fitted.
+//! Selection of Xi: many candidates, judged by their rollouts on jumps that were not fitted.
 
 use std::collections::BTreeSet;
 
@@ -44,9 +44,9 @@ pub struct Choice {
     pub active: usize,
 }
 
-/// Of all combinations of windows, ridges and prunings within the slack of the best by `judge`, the sparsest: Xi of
-/// every phase, how it was fitted, and the number of candidates. Once there is a best, errors are relative to its own.
-/// If cancelled, the search ends as soon as a candidate is stable.
+/// The sparsest of all combinations of windows, ridges and prunings within the slack of the best by `judge`. Returns Xi
+/// of every phase, how it was fitted, and the number of candidates. Once there is a best, errors are relative to its
+/// own. If cancelled, the search ends as soon as a candidate is stable.
 pub(super) fn select(
     set: EncodedSet<'_>,
     (knowledge, mirror): (&[Knowledge], &Mirror),
@@ -190,8 +190,8 @@ impl Trial<'_> {
 type Regressions = [(usize, Vec<Regression>)]; // of every phase, for each of the windows
 
 impl Refiner<'_> {
-    /// All combinations; where there are terms to choose that are not affine also those without them, and the best of these
-    /// grown by such terms: rollouts of full libraries diverge more often than not.
+    /// All combinations. If there are nonlinear terms to choose, also those without them, and the best of these grown
+    /// by such terms, because rollouts of full libraries often diverge.
     fn try_all<'r>(
         &self,
         regressions: &'r Regressions,
@@ -232,7 +232,8 @@ impl Refiner<'_> {
             Pruning::Threshold(_) => has(RecipePart::Thresholds),
         };
         let prunings: Vec<_> = PRUNINGS.into_iter().filter(is_tried).collect();
-        monitor.stage("fitting the dynamics");
+        let combinations = regressions.len() * RIDGES.len() * prunings.len();
+        monitor.stage("fitting the dynamics", combinations);
         for &(window, ref regressions) in regressions {
             for ridge in RIDGES {
                 if monitor.cancelled() && enough(&tried) {
@@ -245,6 +246,7 @@ impl Refiner<'_> {
                     let mut xi: Vec<_> = fits.iter().map(|phase| phase[number].clone()).collect();
                     self.mirror.copy(&mut xi);
                     if tried.iter().any(|trial: &Trial<'_>| trial.now.xi == xi) {
+                        monitor.step();
                         continue;
                     }
                     let score = self.judge.score_within(&xi, f64::MAX);
@@ -272,7 +274,7 @@ impl Refiner<'_> {
     fn sweep(&self, trial: &mut Trial<'_>, limit: f64, monitor: &mut Monitor<'_>) {
         let mut order = trial.places(Regression::losses);
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        monitor.stage("dropping terms that predictions do not miss");
+        monitor.stage("dropping terms that predictions do not miss", order.len());
         for place in order {
             if monitor.cancelled() {
                 return;
@@ -284,7 +286,7 @@ impl Refiner<'_> {
 
     /// Adds terms that explain most of the accelerations wherever the score falls by [`LEAST_GAIN`] or more.
     fn grow(&self, trial: &mut Trial<'_>, monitor: &mut Monitor<'_>) {
-        monitor.stage("adding terms that predictions gain by");
+        monitor.stage("adding terms that predictions gain by", ROUNDS * ATTEMPTS);
         for _ in 0..ROUNDS {
             let before = trial.now.score;
             let mut order = trial.places(Regression::gains);

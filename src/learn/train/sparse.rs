@@ -30,7 +30,7 @@ pub(crate) enum Pruning {
 }
 
 impl Regression {
-    /// `theta` is `n x library_dim`, `target` is `n x latent_dim`; what is known is subtracted from the target.
+    /// `theta` is `n x library_dim`, `target` is `n x latent_dim`; the known part is subtracted from the target.
     pub(super) fn new(theta: &DMatrix<f64>, target: &DMatrix<f64>, knowledge: Knowledge) -> Self {
         let n = theta.nrows().max(1) as f64;
         let unknown = target - theta * &knowledge.known;
@@ -53,8 +53,8 @@ impl Regression {
         }
     }
 
-    /// Xi of the terms that are `allowed` or kept, by ridge regression with each of the `prunings`. Contributions, not bare
-    /// coefficients, decide (STLSQ of Brunton et al. 2016 otherwise). Eliminations share one walk.
+    /// Xi of the terms that are `allowed` or kept, by ridge regression with each of the `prunings`. Contributions, not
+    /// bare coefficients, decide (otherwise STLSQ of Brunton et al. 2016). Eliminations share one path.
     pub(super) fn fit_each(
         &self,
         ridge: f64,
@@ -281,7 +281,7 @@ struct SupportFit {
 }
 
 impl SupportFit {
-    /// What the ridge objective gains without term `j`: `c_j^2 / P_jj`, with `c` the solution and `P` the inverse.
+    /// Increase of the ridge objective without term `j`: `c_j^2 / P_jj`, with `c` the solution and `P` the inverse.
     fn rise(&self, j: usize) -> f64 {
         self.solution[j].powi(2) / self.inverse[(j, j)]
     }

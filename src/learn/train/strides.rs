@@ -1,4 +1,4 @@
-//! Strides of the training walks over what describes a gait, so that gaits can be planned that nobody recorded.
+//! Strides of the training walks as a function of gait parameters, from which new gaits are planned.
 
 use super::*;
 use crate::model::{GAIT_DIM, GoalRange, STRIDE_WIDTH, StridePrior};
@@ -6,14 +6,14 @@ use crate::recording::{about_vertical, between};
 use crate::robot::FOOT_DIM;
 
 const NODES: usize = 40;
-const LEAST_HALVES: usize = 20; // half strides that a regression takes, mirror images counted
+const LEAST_HALVES: usize = 20; // half strides that a regression needs, mirror images included
 const RIDGE: f64 = 3.0; // on features of unit variance, against one half stride
 const LEAST_SWING_S: f64 = 0.04; // of a pair in the air; shorter ones are chatter of its contacts
 const HALF_S: [f64; 2] = [0.1, 0.4]; // duration of half a stride
 
-/// Half strides of all motions from a touchdown of the pair of the front right foot to the next of the other, by ridge
-/// regression over their gaits. None if there are fewer than [`LEAST_HALVES`], as in jumps, or without mirror images: the
-/// other half of a stride is the mirror image of the first.
+/// Half strides of all motions by ridge regression over their gaits, each from a touchdown of the front right foot's
+/// pair to the next of the other. The other half of a stride is the mirror image of the first. None if there are fewer
+/// than [`LEAST_HALVES`], as in jumps, or without mirror images.
 pub(super) fn learn_strides(training: &Dataset) -> Option<StridePrior> {
     let has_images = training.jumps.iter().any(|motion| motion.is_image);
     let halves: Vec<Half> = (training.jumps.iter())
@@ -58,7 +58,7 @@ fn halves_of(training: &Dataset, motion: &Jump) -> Vec<Half> {
     let after_s = |from: usize, to: usize| motion.time_s[to] - motion.time_s[from];
     let halves = first.iter().filter_map(|&start| {
         let end = second.iter().copied().find(|end| *end > start)?;
-        // Pairs take turns: all feet of a pronk come down together.
+        // The pairs alternate: all feet of a pronk come down together.
         let is_together = |other: &usize| after_s(start, *other).abs() < HALF_S[0];
         let fits = !second.iter().any(is_together) && after_s(start, end) <= HALF_S[1];
         fits.then(|| half(training, motion, start..end))
@@ -111,7 +111,7 @@ fn half(training: &Dataset, motion: &Jump, range: Range<usize>) -> Half {
             nodes[(node, 2 * STATE_DIM + foot)] = down(left) + between * (down(right) - down(left));
         }
     }
-    // Steady motion along x and of yaw is taken off.
+    // Steady motion along x, y and of yaw is subtracted.
     let rate = |i: usize| (nodes[(NODES - 1, i)] - nodes[(0, i)]) / duration_s;
     let rates = [BODY_X, BODY_X + 1, YAW].map(rate);
     for (i, rate) in [BODY_X, BODY_X + 1, YAW].into_iter().zip(rates) {

@@ -1,5 +1,5 @@
-//! The encoder's row space. Reconstruction and lift depend on `W_e` only through the space its rows span, so the search
-//! runs over orthonormal bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`) of the directions of a [`Frame`];
+//! The encoder's row space. Reconstruction and lift depend on `W_e` only through the space its rows span. The search
+//! therefore runs over orthonormal bases `Q` (`state_dim x latent_dim`, `W_e = Q^T`) of the directions of a [`Frame`].
 //! [`varimax`] then chooses the basis inside the space: as few coordinates per latent as possible.
 
 use nalgebra::SymmetricEigen;
@@ -15,8 +15,8 @@ pub(super) struct Moments {
 
 impl Moments {
     /// Coordinates that move (standard deviation of at least `least_std`, scaled) or are actuated (at least
-    /// `least_share` of the input's energy): without one that rests because a torque holds it (hip abduction), the lift
-    /// could not return that torque.
+    /// `least_share` of the input's energy). A joint may rest because a torque holds it (hip abduction): without it the
+    /// lift could not return that torque.
     pub(super) fn active_coordinates(&self, least_std: f64, least_share: f64) -> Vec<usize> {
         let least_energy = least_share * self.input.trace();
         let moves = |i: usize| self.state[(i, i)].sqrt() >= least_std;
@@ -225,8 +225,9 @@ pub(super) fn varimax(loadings: &DMatrix<f64>) -> DMatrix<f64> {
     rotation
 }
 
-/// The order of the columns that puts first the one which weighs the first coordinate of `order_by` most, then that of
-/// the next (body x as z1 and body z as z2), the others by weight; and signs that make dominant entries positive.
+/// The order of the columns, and signs that make dominant entries positive. First is the column with the largest weight
+/// of the first coordinate of `order_by`, then that of the next (body x as z1 and body z as z2), then the others by
+/// weight.
 pub(super) fn order_and_sign(
     loadings: &DMatrix<f64>,
     order_by: &[usize],

@@ -1,4 +1,4 @@
-//! A training, whatever its method: checked recordings, fitted maps and dynamics, metrics, the model with its origin.
+//! A training by any method: checked recordings, fitted maps and dynamics, metrics, the model with its origin.
 
 use std::path::Path;
 
@@ -185,12 +185,12 @@ impl Task<'_> {
         Ok(builder.build()?)
     }
 
-    /// What the latent state says of the latent input, one entry a phase; of linear encoders.
+    /// Distribution of the latent input given the latent state, one entry per phase; for linear encoders.
     fn inputs_given_states(&self, fitted: &Fitted) -> Vec<Option<InputGivenState>> {
         let Some(encoder) = fitted.maps.encoder.as_affine() else {
             return vec![None; fitted.xi.len()];
         };
-        // Where the robot is, and which way it looks, is in `z` but says nothing of its inputs.
+        // Place and heading of the robot are in `z`, but its inputs do not depend on them.
         let shifts = encoder.weights().select_columns(&PLACE);
         let set = fitted.maps.training_set(self);
         let phases = fitted.xi.iter().enumerate();

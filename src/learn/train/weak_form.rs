@@ -1,4 +1,4 @@
-//! Regression targets over windows: what an acceleration does in the time that a prediction takes.
+//! Regression targets over windows: the effect of an acceleration over the time of a prediction.
 
 use super::*;
 
@@ -60,7 +60,7 @@ pub(super) fn windowed_samples(
     windows_of(set, features, set.dataset.spans(Some(phase)), window)
 }
 
-/// The same of whole motions, with windows of [`MOTION_WINDOW`] samples whatever the phases in them.
+/// The same over whole motions, with windows of [`MOTION_WINDOW`] samples across phases.
 pub(super) fn samples_of_all_phases(
     set: EncodedSet<'_>,
     features: &Features,

@@ -171,7 +171,7 @@ pub(super) enum RobotValue {
     Entry(RobotEntry),
 }
 
-/// Reads a value by what stands in the file: words that say what is expected, then a visit for each form.
+/// Reads a value in one of several forms: words for the expected forms, then a visit for each form.
 macro_rules! read_by_form {
     ($value:ty, $words:literal, $($visit:tt)*) => {
         impl<'de> Deserialize<'de> for $value {
@@ -321,7 +321,7 @@ fn object<'de, D: Deserializer<'de>>(source: D) -> Result<Map<String, Value>, D:
     }
 }
 
-/// JSON of any form; the bound is on its number of values, each of which takes up to a hundred times its bytes.
+/// JSON of any form. The bound limits the number of its values, because each needs up to a hundred times its bytes.
 struct Bounded<'a>(&'a Cell<usize>);
 
 impl<'de> DeserializeSeed<'de> for Bounded<'_> {

@@ -1,8 +1,8 @@
 //! The model file, `romc-model/1` and `romc-model/2`.
 //!
-//! A path or bytes enter; a checked [`ReducedModel`] leaves, or an error which names file, tensor, index, what was found
-//! and what was expected. [`write()`] makes files that are equal byte for byte for equal models. Read `manifest.rs`
-//! first: it is the file's grammar.
+//! In: a path or bytes. Out: a checked [`ReducedModel`], or an error with the file, tensor, index, the value found and
+//! the value expected. [`write()`] makes files that are equal byte for byte for equal models. Read `manifest.rs` first:
+//! it is the file's grammar.
 //!
 //! ```
 //! use romc::artifact;

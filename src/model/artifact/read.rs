@@ -37,7 +37,7 @@ pub fn read(path: &Path) -> Result<ReducedModel> {
     read_from_bytes(&name, &bytes)
 }
 
-/// The same of a file in memory; `file` names it in errors. Never panics, whatever the bytes are.
+/// The same for a file in memory; `file` names it in errors. Never panics, for any bytes.
 pub fn read_from_bytes(file: &str, bytes: &[u8]) -> Result<ReducedModel> {
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let text = format!("found more than {MAX_FILE_BYTES} bytes, which no model file needs");
@@ -93,12 +93,12 @@ fn foreign(file: &str, bytes: &[u8]) -> Option<ArtifactError> {
 /// Looks at the schema first: for a file of a later version it is the fault, not unknown keys.
 fn check_schema(file: &str, bytes: &[u8]) -> Result<()> {
     if bytes.trim_ascii_start().first() == Some(&b'[') {
-        // serde would take an array for an object whose keys are left out.
+        // serde would accept an array as an object whose keys are left out.
         let place = Place::Key(".".into(), 1, 1);
         return Err(ArtifactError::at(file, place, "an array", "an object"));
     }
     let Ok(probe) = parse::<SchemaProbe>(file, bytes) else {
-        // No JSON at all: reading the whole grammar meets the same fault, and knows its place.
+        // No JSON at all: reading the whole grammar finds the same fault, with its position.
         return Ok(());
     };
     let found: String = match probe.schema {

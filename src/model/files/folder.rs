@@ -62,10 +62,10 @@ pub fn write_files(
     write_files_since(&Emitted::of(folder)?, folder, files, overwrite)
 }
 
-/// Writes the files into `folder`, which is made if it does not exist. Every file is first written beside its place,
+/// Writes the files into `folder`, which is made if it does not exist. Every file is first written next to its place,
 /// then moved there; nothing is moved before all are written. Files of earlier runs that are no longer emitted stay.
-/// Runs at the same time into one folder move their files one after the other, under the lock of its list; of two that
-/// write other contents under one name, the second is refused, unless it may replace.
+/// Concurrent runs into one folder move their files one after the other, under the lock of its list. If two of them
+/// write different contents under one name, the second is refused, unless it may replace.
 ///
 /// # Errors
 /// [`FolderError::Foreign`], [`FolderError::Changed`] and [`FolderError::Concurrent`] before anything is written,
@@ -91,7 +91,7 @@ pub fn write_files_since(
     // The list comes first: after an interruption each finished file is known as ours.
     list.extend(files)?;
     for (part, is_there) in staged.iter_mut().zip(is_there) {
-        // What nobody has checked is not replaced.
+        // A file that has not been checked is not replaced.
         let overwrite = Overwrite::from(is_there || overwrite == Overwrite::Replace);
         let put = part.put(overwrite);
         put.map_err(|error| io_error(&part.place, error))?;
@@ -127,7 +127,7 @@ impl List {
         Self::opened(folder, &options, File::lock)?.ok_or_else(missing)
     }
 
-    /// Network file systems lock for one alone only what is open for writing.
+    /// Network file systems grant an exclusive lock only on files opened for writing.
     fn opened(
         folder: &Path,
         options: &OpenOptions,

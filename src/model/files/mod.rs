@@ -1,9 +1,9 @@
 //! Files that appear whole or not at all, and the folders that hold emitted files.
 //!
-//! Imports nothing; every stage that writes goes through here: [`write_whole`] replaces one file in one step,
-//! [`write_files`] puts [`EmittedFile`]s into a folder and lists them there with digests, so that only what romc wrote
-//! is replaced. Stages that read state the place of a fault with [`Located`], stop where [`size`] says, and name
-//! formats that they do not read by [`magic`]. `text` has what texts of files may do on a terminal or in a shell.
+//! Imports nothing; every stage that writes files uses it. [`write_whole`] replaces one file in one step.
+//! [`write_files`] puts [`EmittedFile`]s into a folder and lists them there with digests, so that only files of romc
+//! are replaced. Stages that read report the place of a fault with [`Located`], limit the size by [`size`], and
+//! identify unsupported formats by [`magic`]. `text` restricts texts of files that reach a terminal or a shell.
 
 pub mod magic;
 pub mod size;

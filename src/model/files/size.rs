@@ -1,4 +1,5 @@
-//! How many bytes are read of a file, and how many those may unpack to, whatever sizes it states of itself.
+//! Limits on the bytes read of a file, and on the bytes that those unpack to, independent of the sizes that the file
+//! states.
 
 use std::io::Read;
 
@@ -99,7 +100,7 @@ pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))
 }
 
-/// By their signs: a parsed table takes several hundred times its two bytes in a file.
+/// Counted by their signs: a parsed table needs several hundred times its two bytes in a file.
 const MOST_TABLES: usize = 20_000;
 
 pub fn read_toml(path: &Path) -> io::Result<String> {

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Unicode's categories Zl, Zp and what is invisible of Cf.
+/// Unicode's categories Zl and Zp, and the invisible characters of Cf.
 const INVISIBLE: [(char, char); 10] = [
     ('\u{ad}', '\u{ad}'),
     ('\u{61c}', '\u{61c}'),
@@ -21,7 +21,7 @@ pub fn is_invisible(c: char) -> bool {
     c.is_control() || (INVISIBLE.iter()).any(|(first, last)| (*first..=*last).contains(&c))
 }
 
-/// A path as a shell takes it; none is taken for an option.
+/// A path quoted for a shell; no path is interpreted as an option.
 pub fn shell_path(path: &Path) -> String {
     let text = path.display().to_string();
     match text.starts_with('-') && text != "-" {

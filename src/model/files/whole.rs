@@ -1,4 +1,4 @@
-//! One file, written beside its place and then moved there.
+//! One file, written next to its place and then moved there.
 
 use std::collections::hash_map::RandomState;
 use std::ffi::OsString;
@@ -45,12 +45,12 @@ impl Overwrite {
     }
 }
 
-/// Makes `path` of what `fill` writes, in one step, or replaces it.
+/// Creates or replaces `path` in one step with the bytes that `fill` writes.
 ///
 /// # Errors
-/// [`io::ErrorKind::AlreadyExists`] for a file that may not be replaced, also one that appears meanwhile, and those of
-/// the file system; then `path` is as it was, and nothing is left beside it. What a process that was killed has left
-/// there is removed by the next call.
+/// [`io::ErrorKind::AlreadyExists`] for a file that may not be replaced, also one that appears meanwhile, and errors of
+/// the file system. Then `path` is unchanged, and no other file is left. Files left by a killed process are removed by
+/// the next call.
 pub fn write_whole(
     path: &Path,
     overwrite: Overwrite,
@@ -59,7 +59,7 @@ pub fn write_whole(
     if !overwrite.allows(path) {
         return Err(io::ErrorKind::AlreadyExists.into());
     }
-    // What is no file, such as /dev/null or a pipe, would be gone; a link stays, its file is replaced.
+    // Anything but a regular file, such as /dev/null or a pipe, would be lost. A link stays; its file is replaced.
     let place = match path.metadata() {
         Ok(found) if !found.is_file() => {
             return Err(io::Error::other("it is there and no regular file"));
@@ -146,7 +146,7 @@ impl Part {
 impl Drop for Part {
     fn drop(&mut self) {
         if !self.is_placed {
-            // The first error is the one worth reporting.
+            // The first error is the relevant one.
             let _ = fs::remove_file(&self.path);
         }
     }

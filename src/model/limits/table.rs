@@ -1,4 +1,4 @@
-//! The ranges; the command line's help says what each setting is.
+//! The ranges of settings; the command line's help describes each setting.
 
 use super::Range;
 

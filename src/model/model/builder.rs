@@ -9,7 +9,7 @@ const MAX_STATE_DIM: usize = 256;
 const MAX_DESCRIPTION_LEN: usize = 10_000;
 const MAX_SAMPLE_TIME_S: f64 = 1.0;
 
-/// A method for each part that replaces it; the model's method of that name says what it is.
+/// A method for each part that replaces it; the model's method of that name documents it.
 macro_rules! setters {
     ($($part:ident: $value:ty;)*) => {
         $(pub fn $part(mut self, $part: $value) -> Self {

@@ -29,7 +29,7 @@ pub enum ModelError {
         source: Box<ParseError>,
     },
     #[error(
-        "phases[{phase}].feet of {name:?}: no foot pattern selects this phase, because earlier phases take all that it names"
+        "phases[{phase}].feet of {name:?}: no foot pattern selects this phase, because earlier phases already select all its patterns"
     )]
     UnreachablePhase { phase: usize, name: String },
     #[error("`{tensor}`[{row}][{column}]: found {found}, expected a finite number")]

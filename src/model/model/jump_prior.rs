@@ -1,6 +1,7 @@
-//! What a model keeps of its training jumps, so that others can be planned: a jump is cut at landmarks into parts with
-//! nodes at equal shares of the duration. With the features `phi = (1, g_1, g_2, g_3)` of a goal, `g = (goal - mean) /
-//! std`, a coordinate at a node is `c . phi`; per part `delta ddz = Xi^T (delta z, delta dz, delta u_lat)`.
+//! The jump prior: training jumps as stored in a model, from which other jumps are planned. A jump is divided at
+//! landmarks into parts with nodes at equal shares of the duration. With the features `phi = (1, g_1, g_2, g_3)` of a
+//! goal, `g = (goal - mean) / std`, a coordinate at a node is `c . phi`. Per part
+//! `delta ddz = Xi^T (delta z, delta dz, delta u_lat)`.
 
 use super::listed::Listed;
 use super::*;
@@ -21,7 +22,7 @@ pub struct GoalRange {
     pub most: f64,
 }
 
-/// Numbers that differ less say nothing of how motions depend on them, SI units.
+/// A number that varies less does not determine how motions depend on it, SI units.
 const LEAST_STD_M: f64 = 1e-3;
 
 impl GoalRange {

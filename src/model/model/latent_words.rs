@@ -15,7 +15,8 @@ const PAIRS: [(&str, [Leg; 2]); 2] = [
     ("front", [Leg::FrontRight, Leg::FrontLeft]),
     ("rear", [Leg::RearRight, Leg::RearLeft]),
 ];
-/// Cosine between a row's flexions and knees and those that move feet, from which on the row is the place of these feet.
+/// Least cosine between a row's flexions and knees and those that move feet, from which the row is named after the
+/// position of these feet.
 const LIKE_FEET: f64 = 0.95;
 const MOST: f64 = 0.9; // share of the squared weights of a row that names it after two legs
 const NONE: f64 = 1e-9;
@@ -37,7 +38,8 @@ impl fmt::Display for LatentWords {
 }
 
 impl ReducedModel {
-    /// Quantity and unit of each latent coordinate; empty unless a linear encoder maps the coordinates of a known robot.
+    /// Quantity and unit of each latent coordinate; empty unless a linear encoder maps the coordinates of a known
+    /// robot.
     pub fn latent_words(&self) -> Vec<LatentWords> {
         let (Ok(encoder), Ok(robot)) = (self.encoder(), self.robot()) else {
             return Vec::new();
@@ -78,7 +80,7 @@ fn words(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
     match (body.as_slice(), has_joints) {
         ([], _) => joints(row, rest, robot),
         ([one, ..], _) if (row[*one] - 1.0).abs() > NONE => together(),
-        // A centre of mass beside the body's origin moves with its rotation.
+        // A centre of mass away from the body's origin moves with the body's rotation.
         ([one, turns @ ..], true) if turns.is_empty() || (*one < ROLL && turns[0] >= ROLL) => {
             let (name, unit) = BODY[one - BODY_X];
             Words(name.to_owned(), Some(unit))

@@ -195,7 +195,8 @@ fn refined(projection: DMatrix<f64>, weights: &DMatrix<f64>) -> DMatrix<f64> {
     projection + step
 }
 
-/// The projector on what is orthogonal to the columns: `I` without columns that are zero.
+/// The projector onto the orthogonal complement of the columns. Zero columns are ignored; without other columns it is
+/// `I`.
 pub fn complement(columns: &DMatrix<f64>) -> DMatrix<f64> {
     let d = columns.nrows();
     let mut projector = DMatrix::identity(d, d);
@@ -209,7 +210,7 @@ pub fn complement(columns: &DMatrix<f64>) -> DMatrix<f64> {
     projector
 }
 
-/// What a layer applies to each of its units.
+/// Activation function of the units of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Activation {

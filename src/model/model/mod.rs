@@ -1,8 +1,7 @@
 //! The reduced-order model: encoder, decoder, library, coefficients, phases.
 //!
-//! What enters: matrices, candidate terms as text, phases; what leaves: a [`ReducedModel`] whose every shape, rank,
-//! name and number has been checked, so that no later stage has to doubt it. Read `rom.rs` first: it states the
-//! equations and the units.
+//! In: matrices, candidate terms as text, phases. Out: a [`ReducedModel`] whose every shape, rank, name and number has
+//! been checked, so that later stages need no checks. Read `rom.rs` first: it states the equations and the units.
 //!
 //! ```
 //! use nalgebra::{DMatrix, DVector};
@@ -21,7 +20,7 @@
 //! let [z, dz, u_lat] = [0.5, 1.0, 0.25].map(|value| DVector::from_element(1, value));
 //! assert_eq!(model.ddz(0, &z, &dz, &u_lat)?[0], -4.0 * 0.5 - 0.1 * 1.0 + 2.0 * 0.25);
 //!
-//! // What a latent-only model cannot do, it says.
+//! // A latent-only model returns an error for maps of robot states.
 //! assert!(model.encode(&DVector::zeros(18)).is_err());
 //! # Ok(())
 //! # }

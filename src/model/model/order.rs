@@ -8,8 +8,9 @@ use super::*;
 
 const KINDS: [&str; LEG_JOINT_DIM] = ["hx", "hy", "kn"];
 
-/// An order of the 18 coordinates of a robot, and of its inputs alike: names separated by commas, coordinates (`fr.hx`,
-/// `body.z`) or groups in romc's order: a leg (`fr`), a kind of joint over the legs (`kn`), `joints`, `body`.
+/// An order of the 18 coordinates of a robot, and of its inputs alike: names separated by commas. A name is a
+/// coordinate (`fr.hx`, `body.z`) or a group in romc's order: a leg (`fr`), a kind of joint over the legs (`kn`),
+/// `joints`, `body`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CoordinateOrder {
     text: String,

@@ -3,7 +3,7 @@
 //! Robot state `x` and generalised input `u = [tau; F_lin; F_ang]` are in SI units; `z`, `dz` and `u_lat` in scaled
 //! units. With the scale factors `s_x`, `s_u` (scaled = factor times SI):
 //!
-//! - `z = W_e (s_x x) + b_e`, `dz = W_e (s_x dx)`: positions take the bias, velocities do not;
+//! - `z = W_e (s_x x) + b_e`, `dz = W_e (s_x dx)`: the bias is added to positions, not to velocities;
 //! - `x = (W_d z + b_d) / s_x`, `dx = (W_d dz) / s_x`;
 //! - `u_lat = pinv(W_e^T) (s_u u)` (project), `u = (W_e^T u_lat) / s_u` (lift);
 //! - `ddz = Xi^T Theta(z, dz, u_lat)` with the Xi of the phase that the feet select.
@@ -57,7 +57,7 @@ impl ReducedModel {
         ModelBuilder::new(name.into(), library)
     }
 
-    /// Takes the model apart for a change; `build` checks the result again.
+    /// Converts the model to a builder for a change; `build` checks the result again.
     pub fn into_builder(self) -> ModelBuilder {
         self.parts
     }
@@ -166,7 +166,7 @@ impl ReducedModel {
         let mut statistics = self.parts.statistics.iter();
         let found = statistics.find_map(|(name, found)| (name == phase).then_some(found));
         let purpose =
-            "weighing inputs in control; `romc import --inputs-from` takes it from recordings";
+            "weighing inputs in control; `romc import --inputs-from` computes it from recordings";
         self.require(found, "input_statistics", purpose)
     }
 

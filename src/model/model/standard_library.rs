@@ -8,8 +8,8 @@ use super::*;
 
 pub(crate) const MAX_DEGREE: u32 = 8;
 
-/// Groups of terms in this order: constant; z; dz; monomials of degree 2 to `degree` over `(z, dz)`, graded, each with
-/// indices `i <= j <= k`; sin z; sin dz; cos z; cos dz; u.
+/// Groups of terms in this order: constant; z; dz; monomials of degree 2 to `degree` over `(z, dz)`; sin z; sin dz; cos
+/// z; cos dz; u. Monomials are graded, each with indices `i <= j <= k`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandardLibrary {

@@ -1,7 +1,7 @@
 //! Chains of affine layers with activations: encoders and decoders, linear or not.
 //!
-//! With `a_k = W_k y_(k-1) + b_k` and `y_k = phi_k(a_k)`, the map takes `y_0` to `y_L`; its Jacobian is `J = D_L W_L
-//! ... D_1 W_1` with `D_k = diag(phi_k'(a_k))`. An affine map is the chain of one linear layer.
+//! With `a_k = W_k y_(k-1) + b_k` and `y_k = phi_k(a_k)`, the map is `y_0 -> y_L`; its Jacobian is
+//! `J = D_L W_L ... D_1 W_1` with `D_k = diag(phi_k'(a_k))`. An affine map is the chain of one linear layer.
 
 use super::*;
 use crate::limits::table;
@@ -9,7 +9,7 @@ use crate::limits::table;
 pub const MAX_LAYERS: usize = 16;
 const MAX_LAYER_WIDTH: usize = table::LAYER_WIDTH.most as usize;
 
-/// `x -> W x + b` in scaled units; velocities and accelerations do not take the bias.
+/// `x -> W x + b` in scaled units; the bias is not added to velocities and accelerations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AffineMap {
     weights: DMatrix<f64>,
@@ -121,7 +121,7 @@ impl TryFrom<MapKeys> for StateMap {
         match (keys.weights, keys.bias, keys.layers) {
             (None, None, Some(layers)) => Ok(Self { layers }),
             (_, _, Some(_)) => {
-                Err("found `layers` beside `weights` or `bias`, expected one of the two")
+                Err("found `layers` together with `weights` or `bias`, expected one of the two")
             }
             (Some(weights), Some(bias), None) => Ok(AffineMap { weights, bias }.into()),
             (None, _, None) => Err("missing field `weights`"),
@@ -215,7 +215,7 @@ impl StateMap {
         })
     }
 
-    /// `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`: each layer takes `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
+    /// `y`, `J(x) dx` and `J(x) ddx + dJ/dt dx`: each layer maps `ddy -> phi''(a) (W dy)^2 + phi'(a) W ddy`.
     pub fn apply_rates(
         &self,
         x: &DVector<f64>,
@@ -255,7 +255,7 @@ impl StateMap {
         Ok(jacobian.expect("a map has a layer"))
     }
 
-    /// Checks what enters the first layer and what leaves the last; `expected` is the Jacobian's shape.
+    /// Checks the dimensions at the first and the last layer; `expected` is the Jacobian's shape.
     pub(super) fn check(&self, name: &str, expected: (usize, usize)) -> Result<()> {
         if let Some(affine) = self.as_affine() {
             let (tensor, found) = (format!("{name}.weights"), affine.weights().shape());

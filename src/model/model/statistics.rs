@@ -1,4 +1,4 @@
-//! Statistics of the training inputs, and what the latent state says of the latent input.
+//! Statistics of the training inputs, and the distribution of the latent input given the latent state.
 
 use super::*;
 
@@ -109,8 +109,8 @@ pub struct InputGivenState {
 }
 
 impl InputGivenState {
-    /// Ridge regression on samples in rows, `[z, dz, u_lat]`; `left` is the rest of `ddz`. Shifts of `z` along the
-    /// columns of `shifts` change no input. None for fewer samples than say something.
+    /// Ridge regression on samples in rows, `[z, dz, u_lat]`; `left` is the residual of `ddz`. Shifts of `z` along the
+    /// columns of `shifts` change no input. None if there are too few samples.
     pub fn of_samples(
         shifts: &DMatrix<f64>,
         mut variables: DMatrix<f64>,
@@ -165,7 +165,7 @@ impl InputGivenState {
 fn ridge(state: &DMatrix<f64>, both: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let variance = state.diagonal();
     let floor = f64::EPSILON * variance.amax();
-    // A coordinate that never moves says nothing.
+    // A coordinate that never moves has no influence.
     let inverse = variance.map(|v| if v > floor { 1.0 / v.sqrt() } else { 0.0 });
     let inverse = DMatrix::from_diagonal(&inverse);
     let normalised =

@@ -1,10 +1,12 @@
-//! What a model keeps of the strides of its training walks, so that others can be planned: half a stride, from the touchdown of
-//! one diagonal pair of feet to that of the other, at nodes of equal shares of its duration. The other half is its mirror
-//! image. With the features `phi = (1, f_1 .. f_6)` of a gait, `f = (value - mean) / std`, a number at a node is `c . phi`.
+//! The stride prior: strides of the training walks as stored in a model, from which other strides are planned. It
+//! contains half a stride, from the touchdown of one diagonal pair of feet to that of the other, at nodes of equal
+//! shares of its duration. The other half is its mirror image. With the features `phi = (1, f_1 .. f_6)` of a gait,
+//! `f = (value - mean) / std`, a number at a node is `c . phi`.
 
 use super::*;
 
-/// Forward and sideways velocity (m/s), yaw rate (rad/s), strides a second, share of a stride that a foot stands, height (m).
+/// Forward and sideways velocity (m/s), yaw rate (rad/s), strides per second, stance share of a foot in a stride,
+/// height (m).
 pub const GAIT_DIM: usize = 6;
 const FREQUENCY: usize = 3;
 const GAIT_FEATURES: usize = 1 + GAIT_DIM;
@@ -19,15 +21,15 @@ const BEYOND: f64 = 0.15;
 #[serde(deny_unknown_fields)]
 pub struct StridePrior {
     pub gait: [GoalRange; GAIT_DIM],
-    /// `n x (7 x 40)`: the columns of one feature after the other. In SI units; positions and yaw are deviations from steady motion
-    /// along x, roll, pitch and height are not.
+    /// `n x (7 x 40)`: the columns of one feature after the other, in SI units. Positions and yaw are deviations from
+    /// steady motion along x; roll, pitch and height are absolute.
     #[serde(with = "listed")]
     pub nodes: DMatrix<f64>,
 }
 
 impl StridePrior {
-    /// Least and most that a number of a gait is planned for: 15 % of the recorded range beyond it. Velocities to the left and of
-    /// yaw are used with both signs, and reach as far to the right.
+    /// Range in which a number of a gait may be planned: the recorded range, extended by 15 % of it at both ends.
+    /// Velocities to the left and of yaw have a symmetric range, because they are used with both signs.
     pub fn reach(&self, number: usize) -> [f64; 2] {
         let GoalRange { least, most, .. } = self.gait[number];
         let margin = BEYOND * (most - least);
@@ -39,8 +41,8 @@ impl StridePrior {
         }
     }
 
-    /// Both halves of a stride, `2 (n - 1) x 40`, joined where they meet: the second is the mirror image of the gait turning
-    /// the other way.
+    /// Both halves of a stride, `2 (n - 1) x 40`, joined where they meet. The second is the mirror image of the gait
+    /// that turns the other way.
     pub fn stride(&self, robot: &Robot, gait: &[f64; GAIT_DIM]) -> DMatrix<f64> {
         let [forward, sideways, yaw_rate, rest @ ..] = *gait;
         let [frequency, duty, height] = rest;

@@ -171,7 +171,7 @@ impl Places<'_> {
         let is_fine = low.abs().max(high.abs()) <= LARGEST_ANGLE_RAD;
         let found = format!("{} to {} {unit}", given[0], given[1]);
         let expected = match self.kind {
-            "toml" => "at most two turns either way; limits_deg takes degrees",
+            "toml" => "at most two turns either way; limits_deg is in degrees",
             _ => {
                 "at most two turns either way: rad, not degrees; type=\"continuous\" for a joint without bounds"
             }
@@ -228,7 +228,7 @@ impl Places<'_> {
         let is_fine = sign.abs() == 1.0 && offset_rad.is_finite();
         let found = format!("sign {sign} and offset_rad {offset_rad}");
         self.check(is_fine, part, found, "sign 1 or -1, offset_rad finite")?;
-        // What is a unit vector already stays as it is, to the last bit.
+        // A vector that is already a unit vector stays unchanged, to the last bit.
         let unit = match (norm - 1.0).abs() < 1e-12 {
             true => vector,
             false => vector / norm,
@@ -377,8 +377,8 @@ pub fn leg_moments(mut values: BTreeMap<String, f64>) -> Result<LegMoments> {
     }
 }
 
-/// Reads the tables `[actuators]` and, if there is one, `[legs]` of a TOML file, such as one of `romc identify`, for a
-/// robot if one is known.
+/// Reads the tables `[actuators]` and, if there is one, `[legs]` of a TOML file, such as one of `romc identify`.
+/// `robot` is the robot of the actuators, if known.
 pub fn read_actuators(path: &Path, robot: Option<&Robot>) -> Result<Actuators> {
     let file = path.display().to_string();
     let File {

@@ -1,9 +1,9 @@
-//! Robots from files: TOML, URDF, the object in a model file; those that romc brings; and tables of joint losses.
+//! Robots from files: TOML, URDF, the object in a model file, the built-in robots; and tables of joint losses.
 //!
-//! Enters: a name, or the path or text of a file. Leaves: a checked [`Robot`] with its legs in
-//! romc's order, or file, place, what was found and what was expected. Legs are matched by where their first joints
-//! stand, joints by their order from the trunk. Read `identity.rs` first, the grammar, which doubts numbers; `legs.rs`
-//! makes a robot of it, `urdf` finds the legs of a tree. `docs/robots.md` describes the file.
+//! In: a name, or the path or text of a file. Out: a checked [`Robot`] with its legs in romc's order, or an error with
+//! file, place, the text found and the text expected. Legs are matched by the positions of their first joints, joints
+//! by their order from the trunk. Read `identity.rs` first, the grammar, which also checks plausibility. `legs.rs`
+//! makes a robot of it, `urdf` finds the legs of a tree. `docs/reference/robots.md` describes the file.
 //!
 //! ```
 //! use romc::robot::{Leg, Robot};

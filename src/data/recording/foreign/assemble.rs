@@ -75,7 +75,7 @@ struct Assembly<'a> {
 impl Assembly<'_> {
     fn required(&mut self, quantity: Quantity) -> &mut Signal {
         let signal = self.signals.get_mut(&quantity);
-        signal.expect("a map has what is required")
+        signal.expect("a map has all required quantities")
     }
 
     fn frame(&self, quantity: Quantity) -> Option<Frame> {
@@ -399,7 +399,7 @@ fn slopes_of(own_s: &[f64], values: &DMatrix<f64>) -> DMatrix<f64> {
     slopes
 }
 
-/// By what values at the times are multiplied in the derivative of the polynomial through them, at one of the times.
+/// Factors of the values at the times in the derivative of the polynomial through them, at one of the times.
 fn slope_weights(times: &[f64], at: usize) -> [f64; STENCIL] {
     let others = |j: usize| (0..times.len()).filter(move |k| *k != j);
     std::array::from_fn(|j| {

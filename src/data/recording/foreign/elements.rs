@@ -1,5 +1,5 @@
-//! The quantities of a recording, the names of their elements in romc's order, and units with their factors to SI;
-//! quaternions to roll, pitch and yaw, angular velocities to the rates of these angles.
+//! The quantities of a recording, the names of their elements in romc's order, and units with their factors to SI. Also
+//! converts quaternions to roll, pitch and yaw, and angular velocities to the rates of these angles.
 
 use std::f64::consts::{PI, TAU};
 
@@ -44,7 +44,7 @@ impl Quantity {
         (Self::AngularAcceleration, Self::AngularVelocity),
     ];
 
-    /// Its table in a map, what its units measure, the recording's columns, and the first of them.
+    /// Its table in a map, the dimension of its units, the recording's columns, and the first of them.
     fn facts(self) -> (&'static str, Dimension, fn(usize) -> Column, usize) {
         use Column::{Acceleration, Foot, Position, Velocity};
         use Dimension::{Angle, Force, Length, Torque};
@@ -140,7 +140,7 @@ pub(super) fn named(word: &str, elements: &[&str]) -> Vec<usize> {
     letters.unwrap_or_default() // none: the caller names the word and the elements
 }
 
-/// What a unit measures; rates and accelerations are the same per s and s^2.
+/// The dimension of a unit; rates and accelerations have the same per s and s^2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Dimension {
     Angle,
@@ -198,7 +198,7 @@ impl Dimension {
     }
 }
 
-const UPRIGHT: f64 = 1e-6; // cosine of the pitch below which roll and yaw cannot be told apart
+const UPRIGHT: f64 = 1e-6; // cosine of the pitch below which roll and yaw cannot be distinguished
 
 /// Roll, pitch and yaw of quaternions (w, x, y, z), R = Rz Ry Rx; the length of a quaternion does not matter.
 pub(crate) fn angles_of_quaternions(quaternions: &DMatrix<f64>) -> DMatrix<f64> {
@@ -215,7 +215,7 @@ pub(crate) fn angles_of_quaternions(quaternions: &DMatrix<f64>) -> DMatrix<f64> 
     out
 }
 
-/// Takes whole turns off rows of angles where they jump by more than half a turn; whether any did.
+/// Subtracts whole turns from rows of angles where they jump by more than half a turn; returns whether any did.
 pub(super) fn unwrap(angles: &mut DMatrix<f64>) -> bool {
     let mut any = false;
     for mut row in angles.row_iter_mut() {

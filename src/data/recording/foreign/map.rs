@@ -1,4 +1,4 @@
-//! The map of a log: which column is what, in which unit, sign and order; a TOML file, described by `docs/logs.md`.
+//! The map of a log: the columns of each quantity with unit, sign and order; a TOML file, described by `docs/reference/column-maps.md`.
 //!
 //! ```toml
 //! [time]
@@ -29,7 +29,7 @@ pub struct ColumnMap {
     pub(super) file: String, // that the map was read from, for messages
 }
 
-/// How text files are laid out; what is absent is found from the file.
+/// The layout of text files; absent entries are determined from the file.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct TextFormat {
@@ -152,7 +152,7 @@ pub(super) enum Origin {
 }
 
 impl ColumnMap {
-    /// Reads a map; errors name line or key, and what was expected.
+    /// Reads a map; errors have the line or key, and the expected text.
     pub fn read(path: &Path) -> Outcome<Self> {
         let text = read_toml(path).map_err(|source| io_fault("read", source).of(path))?;
         Self::parse(&path.display().to_string(), &text)
@@ -216,7 +216,7 @@ impl Table {
         entries.flat_map(written_out).collect()
     }
 
-    /// A key that does not apply to the table of this quantity, and what may be there.
+    /// A key that does not apply to the table of this quantity, and the accepted value.
     fn misplaced(&self, quantity: Quantity) -> Option<(&'static str, &'static str)> {
         let (frame, threshold, release) = (self.frame, self.threshold, self.release);
         let angular = quantity == Quantity::AngularVelocity;
@@ -230,7 +230,7 @@ impl Table {
             ("frame", frame.is_some() && !of_rate, no_frame),
             ("frame", turned, "`world` or `body`"),
             ("origin", shifted, "none: only `body.position` has one"),
-            ("release", alone, "a `threshold` beside it"),
+            ("release", alone, "together with a `threshold`"),
             ("threshold", forceless, "none: only `feet` has one"),
             ("release", release > threshold, "at most the `threshold`"),
         ];

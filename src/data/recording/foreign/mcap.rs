@@ -1,6 +1,6 @@
 //! MCAP files as logs, one per topic and set of names; the only file that reads with the `mcap` crate. Records are read
-//! one by one and chunks unpacked one at a time. A file that ends early gives what its whole records and chunks hold.
-//! Folders of ROS 2 bags have the MCAP files that one recording was split into.
+//! one by one and chunks unpacked one at a time. Of a file that ends early, all complete records and chunks are used.
+//! Folders of ROS 2 bags contain the MCAP files of one recording that was split.
 
 use std::fs::{self, File};
 use std::io::{BufReader, Read};
@@ -250,7 +250,7 @@ fn parsed(kind: u8, body: &[u8]) -> Result<Option<Record<'_>>, String> {
     Ok(None)
 }
 
-/// Adds what a record says of topics; indices, statistics and attachments say nothing.
+/// Adds the definitions and messages of a record to the topics; indices, statistics and attachments are ignored.
 fn add(topics: &mut Topics, record: Record<'_>) -> Result<(), String> {
     match record {
         Record::Schema { header, data } => topics.schema(header, data.into_owned()),

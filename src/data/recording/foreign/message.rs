@@ -186,7 +186,7 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    /// Behind CDR's header, which tells byte order and alignment.
+    /// Behind CDR's header, which states byte order and alignment.
     fn new(layout: Layout, bytes: &'a [u8], named: bool) -> Result<Self, String> {
         let (bytes, big_endian, align) = match (layout, bytes) {
             (Layout::Ros1, bytes) => (bytes, false, 1),

@@ -1,7 +1,7 @@
-//! Logs of other programs: columns and topics of any name, unit, order and clock become a recording.
-//! `map` says what stands where, `elements` has the words in it; `text` reads text files, `mcap` MCAP files and folders
-//! of them by the definitions of their messages (`message`), one table per topic and set of names (`topics`); `signal`
-//! takes a quantity from a log; `assemble` brings all to one clock and makes segments; `guess` writes a first map.
+//! Logs of other programs: columns and topics of any name, unit, order and clock become a recording. `map` assigns
+//! columns to quantities, `elements` has the words in it. `text` reads text files, `mcap` MCAP files and folders of
+//! them by the definitions of their messages (`message`), one table per topic and set of names (`topics`). `signal`
+//! extracts a quantity from a log; `assemble` converts all to one clock and makes segments; `guess` writes a first map.
 
 mod assemble;
 mod elements;

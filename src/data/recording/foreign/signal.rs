@@ -1,4 +1,5 @@
-//! A log as it was read: named columns of numbers; and one quantity taken from it, in SI units and romc's order.
+//! A log as it was read, which consists of named columns of numbers; and one quantity extracted from it, in SI units
+//! and romc's order.
 
 use super::map::{Factors, List, Name, Table};
 use super::*;

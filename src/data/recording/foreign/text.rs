@@ -5,8 +5,8 @@ use super::*;
 
 const LARGE: f64 = 1e8; // numbers from which a column is kept as times: beyond, one number does not hold a microsecond
 
-/// Reads the files of a recording: `path` itself, or those that the map names, in the folder `path` or beside it; `{}`
-/// stands for the name of `path` without its ending.
+/// Reads the files of a recording: `path` itself and those that the map names, in the folder `path` or in the same
+/// folder. `{}` stands for the name of `path` without its ending.
 pub(crate) fn read_texts(path: &Path, map: &ColumnMap) -> Outcome<Vec<Log>> {
     let (named, is_folder) = (map.files(), path.is_dir());
     if is_folder && named.is_empty() {
@@ -17,7 +17,7 @@ pub(crate) fn read_texts(path: &Path, map: &ColumnMap) -> Outcome<Vec<Log>> {
     if !is_folder {
         logs.push(read_text(path, &map.text)?);
     }
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy(); // what has no name cannot be opened
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy(); // a path without a name cannot be opened
     for name in named {
         let file = match is_folder {
             true => path.join(name),

@@ -1,6 +1,6 @@
-//! Topics of an MCAP log as tables: numbers by the names that each message gives them, rows in order of time. Messages
-//! whose lists have other names or lengths belong to another table of the topic. Rows are sorted by the time of
-//! recording, late stamps into their place, and exact repeats are dropped; a note says so.
+//! Topics of an MCAP log as tables: numbers by the names in each message, rows in order of time. Messages whose lists
+//! have other names or lengths belong to another table of the topic. Rows are sorted by the time of recording, late
+//! stamps are moved to their place, and exact repeats are dropped; a note reports it.
 
 use ::mcap::records::{Channel as Declared, SchemaHeader};
 

@@ -1,11 +1,11 @@
-//! Heights of the feet: while only some are on the ground, those in the air are higher, which tells which column of
-//! contact belongs to which foot; those on the ground are at height zero.
+//! Heights of the feet: while only some are on the ground, those in the air are higher, which assigns the columns of
+//! contact to the feet. Feet on the ground are at height zero.
 
 use super::stance::orders;
 use super::*;
 
-/// By how much feet in the air have to be higher in sum in another order, m, and as a share of that sum: in right
-/// recordings single samples of a foot that rolls off or touches down can favour another order by 8 mm in sum.
+/// Least gain in the summed height of feet in the air with another order, m, and as a share of that sum. In valid
+/// recordings, single samples of a foot that rolls off or touches down can favour another order by 8 mm in sum.
 const LEAST_GAIN: (f64, f64) = (9e-3, 0.3);
 const FLOOR_M: f64 = 0.1; // height of the feet that are on the ground, m
 

@@ -1,5 +1,5 @@
-//! Places of the feet in the world, and how well those on the ground stay there; forces against weight and
-//! acceleration, falling in flight, hips' torques against the side they hold.
+//! Places of the feet in the world, and how well those on the ground stay there. Also forces compared with weight and
+//! acceleration, falling in flight, and hips' torques compared with the side of their feet.
 
 use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 use serde::Serializer;
@@ -13,7 +13,7 @@ type State = [f64; STATE_DIM];
 const LEAST_STANCE_S: f64 = 0.05; // shortest stance that counts, s
 const EDGE_S: f64 = 0.02; // uncounted time at both ends of a stance, touchdown and lift-off; at most an eighth of it
 const FOOT_RADIUS_M: f64 = 0.022; // of the sphere that a foot rolls on: 0.02 to 0.023 on the robots that romc knows
-const LEAST_SAMPLES: usize = 50; // fewest samples of feet on the ground that say anything
+const LEAST_SAMPLES: usize = 50; // fewest samples of feet on the ground for a metric
 
 /// A way in which columns are easily recorded: words, body x and y exchanged, other signs, order of the quaternion.
 pub(super) type Reading = (&'static str, bool, &'static [usize], Option<[usize; 4]>);
@@ -101,7 +101,8 @@ pub(super) fn orders() -> Vec<[Leg; FOOT_DIM]> {
         .collect()
 }
 
-/// Place of a leg's foot in the world, m, in a state `x`; `rolled` without what the foot's sphere has rolled.
+/// Place of a leg's foot in the world, m, in a state `x`; with `rolled`, without the distance that the foot's sphere
+/// has rolled.
 pub(crate) fn foot_place(robot: &Robot, leg: Leg, x: &State, rolled: bool) -> Vector3<f64> {
     let place = robot.foot_in_world(leg, x);
     if !rolled {
@@ -237,7 +238,7 @@ pub(crate) fn stances(segment: &Segment) -> Vec<(Leg, Range<usize>)> {
 const LEAST_S: f64 = 0.04; // shortest flight, and shortest time on the ground in all, that counts, s
 const LEAST_FORCE: f64 = 0.02; // of a foot whose hip's torque is compared with it, as a share of the weight
 
-/// What forces and accelerations of a recording come to.
+/// Metrics of forces and accelerations of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Balance {
     /// Mean vertical acceleration in flight, upwards, m/s^2.
@@ -245,7 +246,7 @@ pub struct Balance {
     /// The same by the heights alone, the median over the flights.
     #[serde(skip)]
     pub fall_by_height_m_s2: Option<f64>,
-    /// Impulse of the feet over what the robot's weight and change of velocity need.
+    /// Impulse of the feet over the impulse for the robot's weight and change of velocity.
     pub weight_share: Option<f64>,
     /// Slope of each hip's torque over its lever times the force along the leg; 1 for a force in the leg's plane.
     pub hip_share: [Option<f64>; FOOT_DIM],
@@ -334,12 +335,12 @@ impl Sums {
     }
 }
 
-const CARRYING_S: f64 = 0.04; // window over which forces are compared with what the motion needs, s
+const CARRYING_S: f64 = 0.04; // window over which forces are compared with the required ones, s
 const CARRIED: f64 = 0.25; // share of it below which torques do not carry the robot
 const NEEDED: f64 = 1.0; // share of the weight from which a window needs forces
 
-/// Times, s, of a segment in which feet are on the ground and forces by the torques are less than [`CARRIED`] of what
-/// weight and change of velocity need.
+/// Times, s, of a segment in which feet are on the ground and forces by the torques are less than [`CARRIED`] of the
+/// force for weight and change of velocity.
 pub(super) fn uncarried(segment: &Segment, robot: &Robot) -> Vec<Range<f64>> {
     let (time_s, n) = (&segment.time_s, segment.len());
     let (weight, mass) = (weight_n(robot.mass_kg()), robot.mass_kg());

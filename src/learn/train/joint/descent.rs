@@ -93,7 +93,7 @@ pub(super) fn descend(
     mean
 }
 
-/// Adam (Kingma and Ba 2015) on one block of numbers; what thresholding drops once stays zero.
+/// Adam (Kingma and Ba 2015) on one block of numbers; coefficients dropped by thresholding stay zero.
 struct Adam {
     learning_rate: f64,
     mean: Vec<f64>,

@@ -1,7 +1,8 @@
 //! The losses (16) to (20) with the lift loss and the window (41) on batches of samples, and their exact gradient.
 //!
-//! With the encoder's Jacobian `J` at each sample: `z = phi(x)`, `dz = J dx`, `ddz = J ddx + (dJ/dt) dx`, `u_lat =
-//! pinv(J^T) u`; the decoder takes `(z, dz, Theta Xi)` to the decoded position and acceleration the same way.
+//! With the encoder's Jacobian `J` at each sample: `z = phi(x)`, `dz = J dx`, `ddz = J ddx + (dJ/dt) dx`,
+//! `u_lat = pinv(J^T) u`. In the same way the decoder maps `(z, dz, Theta Xi)` to the decoded position and
+//! acceleration.
 
 use super::network::{Jacobians, Tape, add_transposed};
 use super::parameters::{Frame, InputProjections};
@@ -59,7 +60,7 @@ pub(super) struct Encoded {
     theta: DMatrix<f64>,
 }
 
-/// What stays of a batch while the encoder does.
+/// Quantities of a batch that stay constant while the encoder does.
 pub(super) enum Known {
     Encoded(Encoded),
     Quadratic(Quadratic),
@@ -193,8 +194,8 @@ impl<'a> JointLoss<'a> {
         l1_subgradient(xi, l1_scale, &mut self.gradient.xi[phase]);
     }
 
-    /// The losses on a batch; the gradient of their weighted sum is kept in [`Self::gradient`]. If something is known
-    /// of the batch, the gradient is that of what is moved, and losses may be left out.
+    /// The losses on a batch; the gradient of their weighted sum is stored in [`Self::gradient`]. If `known` is given,
+    /// the gradient is that of the `moved` parameters only, and losses may be left out.
     pub(super) fn evaluate(
         &mut self,
         parameters: &Parameters,
@@ -322,8 +323,8 @@ impl<'a> JointLoss<'a> {
         (bptt, onto_variables)
     }
 
-    /// Adds what the adjoints of `z`, `dz`, `ddz` (`3n x d`) and of the variables (`n x 3d`), and the weight of the
-    /// energy carried, mean for the encoder.
+    /// Adds the gradient by the encoder, from the adjoints of `z`, `dz`, `ddz` (`3n x d`) and of the variables
+    /// (`n x 3d`), and the weight of the energy carried.
     fn encoder_adjoint(
         &mut self,
         parameters: &Parameters,

@@ -1,7 +1,7 @@
 //! Networks on batches of samples, forwards and backwards, with their time derivatives and Jacobians. Samples are rows.
 //! A layer maps `y` to `phi(a)`, `a = y W + b`, and its time derivatives to `phi' da` and `phi'' da^2 + phi' dda`. The
-//! three stand below one another (a *stack* of 3 n rows), so that a layer is one product; rows of the Jacobian, one for
-//! each output, are stacked the same way. Of elu at zero derivatives are those of the negative side.
+//! three are stacked below one another (a *stack* of 3 n rows), so that a layer is one product. Rows of the Jacobian,
+//! one for each output, are stacked the same way. Derivatives of elu at zero are those of the negative side.
 
 use super::*;
 use crate::train::features::vectorised;
@@ -110,8 +110,8 @@ impl Network {
         y
     }
 
-    /// Adds to `gradient` the share of the layers, given the adjoint of the result of [`Self::forward`] and, of
-    /// [`Self::jacobian_adjoint`], those of every `a`; returns the adjoint of the first layer's `a`.
+    /// Adds the layers' share to `gradient`, given the adjoint of the result of [`Self::forward`] and those of every
+    /// `a` from [`Self::jacobian_adjoint`]. Returns the adjoint of the first layer's `a`.
     pub(super) fn backward(
         &self,
         (tape, entering): (&Tape, &DMatrix<f64>),

@@ -1,5 +1,5 @@
-//! What Adam moves, the fixed units around the maps, and the maps of a model that these and a latent basis are folded
-//! into; latent inputs `u_lat = (J J^T)^-1 J u` of a batch, forwards and backwards.
+//! Parameters of Adam, the fixed units around the maps, and the maps of a model into which these and a latent basis are
+//! folded. Also latent inputs `u_lat = (J J^T)^-1 J u` of a batch, forwards and backwards.
 
 use super::network::Network;
 use super::*;
@@ -56,7 +56,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// `x`, `dx` and `ddx` of samples in rows, stacked, as the encoder takes them.
+    /// `x`, `dx` and `ddx` of samples in rows, stacked, as input of the encoder.
     pub(super) fn enter(&self, blocks: [&DMatrix<f64>; 3]) -> DMatrix<f64> {
         let n = blocks[0].nrows();
         let mut stack = DMatrix::zeros(3 * n, blocks[0].ncols());

@@ -90,7 +90,16 @@ impl Trainer<'_> {
     fn run_seeds(&self, monitor: &mut Monitor<'_>) -> Vec<Run> {
         let options = &self.task.options.joint;
         let (seeds, cancel) = (self.task.options.seeds(), monitor.cancel);
-        monitor.stage("training encoder, decoder and dynamics");
+        let steps = if self.is_published() {
+            2 + self.task.training.phases.patterns.len()
+        } else {
+            1
+        };
+        let epochs = steps * (options.schedule.epochs + options.schedule.refinement);
+        monitor.stage(
+            "training encoder, decoder and dynamics",
+            seeds.len() * epochs,
+        );
         let mut runs = Vec::new();
         for group in seeds.chunks(options.threads.max(1)) {
             if monitor.cancelled() {
@@ -104,7 +113,10 @@ impl Trainer<'_> {
                 });
                 let workers: Vec<_> = started.collect();
                 drop(sender);
-                receiver.iter().for_each(|text| monitor.done(text));
+                receiver.iter().for_each(|text| match text {
+                    Some(text) => monitor.done(text),
+                    None => monitor.step(),
+                });
                 for worker in workers {
                     runs.push(worker.join().expect("a seed does not panic"));
                 }
@@ -113,7 +125,7 @@ impl Trainer<'_> {
         runs
     }
 
-    fn run_seed(&self, seed: u64, cancel: &AtomicBool, news: &Sender<String>) -> Run {
+    fn run_seed(&self, seed: u64, cancel: &AtomicBool, news: &Sender<Option<String>>) -> Run {
         let options = &self.task.options.joint;
         let (schedule, published) = (&options.schedule, self.is_published());
         let weights = LossWeights {
@@ -124,16 +136,16 @@ impl Trainer<'_> {
         let mut loss = self.loss(weights, &parameters);
         let mut listener = |epoch: usize, losses: &Losses, active: usize| {
             // Nobody listens any more if the training is being dropped; that ends soon by itself.
-            let _ = news.send(format!(
+            let _ = news.send(Some(format!(
                 "seed {seed} epoch {epoch}: loss {:.3e}, decoder {:.3e}, {active} terms",
                 losses.total(&weights),
                 losses.decoder
-            ));
+            )));
             !cancel.load(Ordering::Relaxed)
         };
         let all: Vec<&Batch> = self.batches.iter().collect();
         let of_phase = |phase: usize| all.iter().copied().filter(move |b| b.phase == phase);
-        // The published first step sees contact only. A network says nothing about states that it was not trained on.
+        // The published first step uses contact only. A network is undefined at states on which it was not trained.
         let first = match self.is_linear() || published {
             true => of_phase(0).collect(),
             false => all.clone(),
@@ -146,7 +158,10 @@ impl Trainer<'_> {
         };
         let losses = step(&mut parameters, Moved::All, &first, &mut listener);
         if published {
-            let mut quiet = |_: usize, _: &Losses, _: usize| !cancel.load(Ordering::Relaxed);
+            let mut quiet = |_: usize, _: &Losses, _: usize| {
+                let _ = news.send(None);
+                !cancel.load(Ordering::Relaxed)
+            };
             step(&mut parameters, Moved::Decoder, &all, &mut quiet);
             for phase in 0..parameters.xi.len() {
                 let own: Vec<&Batch> = of_phase(phase).collect();
@@ -254,7 +269,7 @@ impl Trainer<'_> {
         let gram = x.column_iter().fold(DMatrix::zeros(d, d), |sum, x| {
             let jacobian = encoder
                 .jacobian(&x.into_owned())
-                .expect("takes the robot's states");
+                .expect("accepts the robot's states");
             sum + &jacobian * jacobian.transpose()
         }) / x.ncols().max(1) as f64;
         // A basis without full rank is left as it is; the regression then reports that no model is stable.

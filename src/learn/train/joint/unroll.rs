@@ -19,7 +19,7 @@ pub struct Unroll {
     pub window: usize,
     /// Samples per step: 5 at 500 Hz are the published 10 ms.
     pub stride: usize,
-    /// Weight of a prediction against the one a step earlier, above 0 and at most 1.
+    /// Weight of a prediction relative to that one step earlier, above 0 and at most 1.
     pub decay: f64,
     pub integrator: Integrator,
 }

@@ -1,7 +1,7 @@
-//! Parts of jumps at equal shares of their durations, and how accelerations change about a trajectory of the prior.
-//! Over one interval between nodes of a jump, with `delta` the difference to the prior at the jump's own goal and a bar
-//! the mean of both ends: `delta (dz_(k+1) - dz_k) / h = Xi^T (bar delta z, bar delta dz, bar delta u_lat)`, the very
-//! equation that a plan is made of. Shifting the robot forwards changes nothing: that direction of `delta z` is left
+//! Parts of jumps at equal shares of their durations, and how accelerations change about a trajectory of the prior. One
+//! interval between nodes of a jump has the equation `delta (dz_(k+1) - dz_k) / h = Xi^T (bar delta z, bar delta dz,
+//! bar delta u_lat)`. `delta` is the difference to the prior at the jump's own goal and a bar is the mean of both ends.
+//! Plans use the same equation. Shifting the robot forwards changes nothing, so that direction of `delta z` is left
 //! out.
 
 use super::*;
@@ -90,7 +90,7 @@ pub(super) fn cut(training: &Dataset, jump: &Jump) -> Option<Cut> {
     let landed_s = jump.time_s[last] - jump.time_s[in_air.end.min(last)];
     if landed_s < LEAST_LANDING_S || last < in_air.end + LEAST_SAMPLES {
         borders.push(in_air.end - 1);
-        // A recording that ends on the way up says nothing of its apex.
+        // A recording that ends on the way up does not contain its apex.
         return finished(jump, kind, borders).filter(|_| !rising(in_air.end - 1));
     }
     let length = |phase: &usize| -> usize {
@@ -126,7 +126,7 @@ pub(super) fn of_commonest_kind(cuts: &[Option<Cut>]) -> Vec<(usize, &Cut)> {
     let all = cuts.iter().enumerate();
     let mut all: Vec<_> = (all.filter_map(|(jump, cut)| Some((jump, cut.as_ref()?)))).collect();
     let count = |kind: &[Landmark]| all.iter().filter(|(_, cut)| cut.kind == kind).count();
-    // `max_by_key` takes the last of equals: reversed, the first is taken.
+    // `max_by_key` returns the last of equals: reversed, it returns the first.
     let commonest = all.iter().rev().max_by_key(|(_, cut)| count(&cut.kind));
     let kind = commonest.map(|(_, cut)| &cut.kind);
     all.retain(|(_, cut)| Some(&cut.kind) == kind);

@@ -1,6 +1,6 @@
-//! Landmarks, prior and deviations of jumps: the training jumps and an encoder in; a [`JumpPrior`] out, or none if
-//! fewer than [`LEAST_JUMPS`] of them are of one kind. `landmarks` cuts jumps into parts and fits what depends on their
-//! goals.
+//! Landmarks, prior and deviations of jumps. In: the training jumps and an encoder. Out: a [`JumpPrior`], or none if
+//! fewer than [`LEAST_JUMPS`] of them are of one kind. `landmarks` divides jumps into parts and fits their dependence
+//! on goals.
 
 mod landmarks;
 
@@ -12,7 +12,7 @@ use landmarks::{Cut, Fit, GoalRegression, PartNodes, intervals, of_commonest_kin
 
 pub(super) const LEAST_JUMPS: usize = 6; // of one kind, to show how jumps depend on their goal
 const STEP: f64 = 1e-3; // of differences, scaled units
-const DIGITS: usize = 6; // significant, of what is kept: beyond those of any recording
+const DIGITS: usize = 6; // significant, of stored numbers: more than any recording has
 
 struct Sampled {
     goal: [f64; GOAL_DIM],
@@ -143,8 +143,8 @@ fn goal_of(training: &Dataset, jump: usize, cut: &Cut) -> [f64; GOAL_DIM] {
     [distance, row.max() - row[0], row[0]].map(rounded)
 }
 
-/// A part of the prior, and how well deviations from it are explained, each jump left out of prior and fit in turn, but
-/// not of `known`, the first columns of Xi of deviations, `translation` is the change of `z` by a shift forwards.
+/// A part of the prior, and how well deviations from it are explained. Each jump is left out of prior and fit in turn,
+/// but not of `known`, the first columns of Xi of deviations. `translation` is the change of `z` by a shift forwards.
 fn part_of(
     sampled: &[Sampled],
     goal: &[GoalRange; GOAL_DIM],

@@ -22,7 +22,7 @@ pub(super) struct Legs {
 type Chain = (Vec<usize>, bool); // moving joints below a body while they are a chain; whether nothing else follows
 
 impl Legs {
-    /// Finds legs, or takes those that end at these feet.
+    /// Finds legs, or uses those that end at these feet.
     pub(crate) fn find(tree: &Tree<'_>, feet: &[(String, Vector3<f64>)]) -> Result<Self> {
         let top = top(tree);
         let body = tree.body(top);
@@ -158,7 +158,8 @@ fn found_legs(tree: &Tree<'_>, top: usize, body: &Body) -> Result<Vec<Limb>> {
     Err(tree.refused(found, expected))
 }
 
-/// The link at the foot: of those that the last joint carries, the one whose name says so, or the only one at the end.
+/// The link at the foot: among the links fixed to the last joint, the one named foot or toe, or the only one at the
+/// end.
 fn foot(tree: &Tree<'_>, joints: &[usize]) -> Result<usize> {
     let last = &tree.joints[joints[joints.len() - 1]];
     let held = tree.body(last.child).links.split_off(1);

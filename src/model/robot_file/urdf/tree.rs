@@ -102,7 +102,7 @@ impl<'x> Tree<'x> {
             .iter()
             .flat_map(|root| self.below(*root, |_| true).links);
         let below: BTreeSet<usize> = below.collect();
-        // A link has one joint above it at most, so that what no root is above is a loop.
+        // A link has at most one joint above it, so a link without a root above it is in a loop.
         if let Some(link) = (0..self.links.len()).find(|link| !below.contains(link)) {
             let found = format!("a loop of joints through {}", name(&link));
             return Err(self.links[link].element.fault("", found, "a tree"));
@@ -124,7 +124,8 @@ impl<'x> Tree<'x> {
         }
     }
 
-    /// A link and what joints that `pass` hold to it, in the order of the tree, and the other joints on these.
+    /// A link with the links that joints fix to it if they `pass`, in the order of the tree, and the other joints on
+    /// these.
     fn below(&self, link: usize, pass: impl Fn(&Joint<'_>) -> bool) -> Body {
         let (mut links, mut moving) = (vec![link], Vec::new());
         let mut open: Vec<usize> = self.links[link].below.iter().rev().copied().collect();
@@ -270,7 +271,7 @@ pub(super) fn document<'x>(file: &str, text: &'x str) -> Result<Document<'x>> {
         let place = Place::Character(at.row as usize, at.col as usize);
         RobotFileError::text(file, place, error.to_string())
     })?;
-    let mut unread_to = 0; // meshes and extensions of simulators may have signs of xacro in what romc does not read
+    let mut unread_to = 0; // parts that romc does not read, such as meshes, may have signs of xacro
     for node in document.descendants().filter(Node::is_element) {
         let name = node.tag_name();
         if UNREAD.contains(&name.name()) {

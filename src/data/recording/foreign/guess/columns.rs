@@ -41,7 +41,8 @@ pub(super) struct Clock {
     pub unit: &'static str,
 }
 
-/// The quantities that the names say, of several families the measured one that fits the others and is sampled most.
+/// The quantities found by names. Of several families it is the measured one that matches the other quantities and has
+/// the highest rate.
 pub(super) fn groups(logs: &[Log], robot: &Robot) -> Vec<Group> {
     // Rates that differ by less than a tenth are of the same class.
     let class = |rate: f64| (10.0 * rate.ln()).round() as i32;
@@ -131,7 +132,7 @@ fn complete(logs: &[Log], robot: &Robot) -> Vec<Group> {
     let mut families: Vec<Family> = Vec::new();
     for (index, log) in logs.iter().enumerate() {
         for (column, channel) in log.columns.iter().enumerate() {
-            // What a column alone does not say its topic may: `/foot_contacts` of `position[fr]`.
+            // The topic may complete a column's name: `/foot_contacts` of `position[fr]`.
             let in_topic = || read(&format!("{} {}", log.name, channel.name));
             let of_robot = of_robot(&channel.name, robot);
             let reading = of_robot.or_else(|| read(&channel.name)).or_else(in_topic);

@@ -1,4 +1,4 @@
-//! Contact from forces at the feet: what a sensor shows in the air, and from where on it bears.
+//! Contact from forces at the feet: the signal of a sensor in the air, and the threshold of contact.
 
 use super::*;
 
@@ -7,7 +7,7 @@ const DEVIATIONS: f64 = 4.0; // times the deviation of a sensor in the air that 
 const BINS: usize = 64; // bins over the range of a sensor
 const VALLEY: f64 = 0.02; // share of the samples within a bin of where two groups are divided, at most
 const APART: f64 = 0.1; // least distance of two groups, as a share of the range
-const SPREAD: f64 = 0.35; // largest spread of a sensor in the air, as a share of what loads it
+const SPREAD: f64 = 0.35; // largest spread of a sensor in the air, as a share of its median under load
 const ALIKE: f64 = 0.05; // least difference of two sensors in the air that matters, as a share of the range
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +52,7 @@ pub(super) fn force_lines(mut values: DMatrix<f64>) -> (Vec<String>, Option<Stri
         (rest, span) = (0.0, range);
         let offsets: Vec<String> = levels().map(|level| format!("{:.3}", -level)).collect();
         let offsets = offsets.join(", ");
-        let why = "what each sensor shows in the air";
+        let why = "the signal of each sensor in the air";
         lines.push(format!("offset = [{offsets}]   # {why}"));
     }
     let least = DEVIATIONS * deviation;
@@ -65,7 +65,7 @@ pub(super) fn force_lines(mut values: DMatrix<f64>) -> (Vec<String>, Option<Stri
     (lines, None)
 }
 
-/// What a sensor shows in the air: the lowest group of its values, if they fall into groups.
+/// The signal of a sensor in the air: the lowest group of its values, if they fall into groups.
 fn resting(values: impl Iterator<Item = f64>, range: f64) -> Option<Rest> {
     let mut group = sorted(values);
     let mut loaded = None;

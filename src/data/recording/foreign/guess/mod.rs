@@ -1,6 +1,6 @@
-//! A first map for an unknown log: from the names of its columns, then checked and completed by its numbers.
-//! `names` says what a name means, `columns` sorts them into quantities; `scales` finds units, signs, axes and orders:
-//! `physics` tries them on the robot's geometry and weight, `feet` divides forces; `write` prints the map.
+//! A first map for an unknown log: from the names of its columns, then checked and completed by its numbers. `names`
+//! interprets a name, `columns` sorts columns into quantities. `scales` finds units, signs, axes and orders: `physics`
+//! tries them on the robot's geometry and weight, `feet` divides forces; `write` prints the map.
 
 mod columns;
 mod feet;
@@ -31,11 +31,11 @@ pub struct Guess {
     pub text: String,
     /// Quantities that a recording needs and that were not found, by their tables.
     pub missing: Vec<&'static str>,
-    /// What the map gives when the log is read by it: samples, or why it cannot be read.
+    /// The result of reading the log with the map: the number of samples, or the error.
     pub outcome: Result<usize, String>,
-    /// Where other readings of the log fit as well, or none fits.
+    /// Notes where other interpretations of the log fit as well, or none fits.
     pub notes: Vec<String>,
-    pub(crate) open: Vec<String>, // what names and numbers do not decide, for a log that is read without asking
+    pub(crate) open: Vec<String>, // questions that names and numbers leave open, for a log that is read without a map
 }
 
 /// Guesses the map of a text or MCAP file.

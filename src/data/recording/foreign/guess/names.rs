@@ -1,4 +1,5 @@
-//! What the name of a column says: leg, joint, axis, quantity, unit. Tables have words of many loggers in lower case.
+//! Interpretation of the name of a column: leg, joint, axis, quantity, unit. Tables have words of many loggers in lower
+//! case.
 
 use super::*;
 
@@ -9,7 +10,7 @@ const LEGS: [&str; 4] = [
     "rr hr rh br rb rearright hindright backright rightrear righthind",
     "rl hl lh bl lb rearleft hindleft backleft leftrear lefthind",
 ];
-/// Words for joints, in romc's order; a bare `hip` is the first, unless `y`, `pitch` or `flexion` is beside it.
+/// Words for joints, in romc's order; a bare `hip` is the first, unless `y`, `pitch` or `flexion` also occurs.
 const JOINTS: [&str; 3] = [
     "hx haa abad abduction hipx hipaa",
     "hy hfe thigh upper flexion hipy hipfe",
@@ -30,7 +31,7 @@ const WANTED: &str = "des desired ref reference references cmd cmds command comm
      setpoints goal raw lost temperature mode covariance ff kp kd";
 const TIME: &str = "time timestamp stamp t sec secs seconds clock datetime date";
 
-/// What a name says of its column. A quaternion and angles are both orientations.
+/// The interpretation of a column's name. A quaternion and angles are both orientations.
 #[derive(Debug, Clone)]
 pub(super) struct Reading {
     pub quantity: Quantity,
@@ -278,7 +279,7 @@ fn joined_pairs(mut words: Vec<String>) -> Vec<String> {
     words
 }
 
-/// Compact names and what stands before their axis.
+/// Compact names and the word before their axis.
 const COMPACT: [(&str, &str); 5] = [
     ("v vel dp", "velocity"),
     ("w omega gyro", "omega"),
@@ -287,7 +288,7 @@ const COMPACT: [(&str, &str); 5] = [
     ("a acc", "acc"),
 ];
 
-/// Takes `vx`, `wz`, `qw`, `px`, `rollrate` apart.
+/// Splits `vx`, `wz`, `qw`, `px`, `rollrate`.
 fn parts(word: &str) -> Vec<String> {
     let pair = |one: &str, other: &str| vec![one.to_owned(), other.to_owned()];
     for angle in ["roll", "pitch", "yaw"] {

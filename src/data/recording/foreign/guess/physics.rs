@@ -1,5 +1,6 @@
-//! Units, order and signs under which feet on the ground stay in place, and signs and unit of torques under which they
-//! carry the body, tried on one recording read without scales; scales under which velocities are derivatives.
+//! Interpretations of columns, tried on one recording read without scales. Units, order and signs of positions: feet on
+//! the ground stay in place. Signs and unit of torques: they carry the body. Scales of velocities: they are
+//! derivatives.
 
 use super::*;
 use crate::recording::Segment;
@@ -16,7 +17,7 @@ const LEAST_MOTION_M: f64 = 3e-3; // least movement of feet on stiff legs that s
 const BLOCK_S: f64 = 0.08; // length of the times over which forces and changes of velocity are summed, s
 const OTHER_SIGNS: f64 = 0.5; // share of the unexplained by which other signs have to be better than one sign for all
 const UNCARRIED: f64 = 0.8; // share of weight and change of velocity that torques may leave unexplained
-const HIP_SHARE: f64 = 0.3; // slope of the hips' torques over what holds the feet on their side that decides their sign
+const HIP_SHARE: f64 = 0.3; // slope of the hips' torques over those that hold the feet on their side
 const FITS_M: f64 = 0.05; // largest movement of feet on the ground in a reading that fits, m
 
 pub(super) type NamedUnit = (&'static str, f64);
@@ -51,7 +52,7 @@ impl Reading {
         }
     }
 
-    /// Whether feet move clearly less than in a plainer one, compared with what they would on stiff legs.
+    /// Whether feet move clearly less than in a plainer interpretation, relative to their movement on stiff legs.
     pub(crate) fn beats(&self, other: &Self) -> bool {
         let figure = |reading: &Self| match reading.motion_m > LEAST_MOTION_M {
             true => reading.slip_m / reading.motion_m,
@@ -95,7 +96,8 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The best reading, the first choice of each unit and order unless another is clearly better; none without stances.
+    /// The best interpretation: the first choice of each unit and order unless another is clearly better; none without
+    /// stances.
     pub(crate) fn best(&self, units: [&[NamedUnit]; 2], orders: &[bool]) -> Option<Reading> {
         let mut all = Vec::new();
         for position in units[0] {
@@ -246,7 +248,8 @@ impl<'a> View<'a> {
         Some((torque, units.into_iter().min_by(nearest)?))
     }
 
-    /// Over times with feet on the ground, impulses of flexions and knees, and what weight and change of velocity need.
+    /// Over times with feet on the ground, impulses of flexions and knees, and the impulse for weight and change of
+    /// velocity.
     fn blocks(&self, reading: &Reading) -> Vec<([Vector3<f64>; 2], Vector3<f64>)> {
         let mut out = Vec::new();
         let forwards_and_up = |v: Vector3<f64>| Vector3::new(v.x, 0.0, v.z);
@@ -314,7 +317,7 @@ impl<'a> View<'a> {
                 };
                 let given = Vector3::new(0.0, signs[0] * tau[1], signs[1] * tau[2]);
                 let force = map.column(1) * given[1] + map.column(2) * given[2];
-                // What flexion and knee give lies in the leg's plane.
+                // The force of flexion and knee is in the leg's plane.
                 let lever = hip_torque(self.robot, *leg, &joints_of(*leg, &x), &force);
                 *product += tau[0] * lever;
                 *square += lever * lever;

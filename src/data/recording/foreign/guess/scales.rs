@@ -1,4 +1,4 @@
-//! Units, signs, axes and orders of the guessed map: by names, by derivatives, and by what the robot's geometry says.
+//! Units, signs, axes and orders of the guessed map: by names, by derivatives, and by the robot's geometry.
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;

@@ -1,4 +1,4 @@
-//! The guessed map as text, each line with what it rests on.
+//! The guessed map as text, each line with its evidence.
 
 use super::columns::{Clock, clock, groups};
 use super::scales::order_line;
@@ -158,7 +158,7 @@ impl Source<'_> {
         lines
     }
 
-    /// Whether an acceleration is the derivative of its velocity, not what an IMU feels.
+    /// Whether an acceleration is the derivative of its velocity, not the specific force that an IMU measures.
     fn is_sound(&self, group: &Group, scales: &Lines) -> bool {
         let mut accelerations = Quantity::ACCELERATIONS.into_iter();
         let Some((_, velocity)) = accelerations.find(|(own, _)| *own == group.quantity) else {
