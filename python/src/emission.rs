@@ -13,7 +13,9 @@ use romc::limits::table;
 use romc::model::CandidateTerm;
 use romc::typeset::latex::tex_cases;
 use romc::typeset::words;
-use romc::typeset::{Decimal, NumberStyle, PrintOptions, Rounding, SymbolTable, Typeset};
+use romc::typeset::{
+    Decimal, NumberStyle, PrintOptions, Rounding, SymbolTable, TextOptions, Typeset,
+};
 
 use crate::errors::{choice, count_within, python_error, within};
 use crate::model::Model;
@@ -36,7 +38,8 @@ pub struct EmitArguments {
     /// `VARIABLE=NAME` each.
     rename: Vec<String>,
     precision: String,
-    units: String,
+    /// Physical where the model has physical units, if not given.
+    units: Option<String>,
     sincos: String,
 }
 
@@ -49,7 +52,13 @@ struct Emission {
 
 impl EmitArguments {
     fn emission(&self, model: &Model, py: Python<'_>) -> PyResult<Emission> {
-        let units: UnitsChoice = choice(py, "units", &self.units)?;
+        let units = match &self.units {
+            Some(units) => choice(py, "units", units)?,
+            None => match Equations::of(&model.data).in_physical_units() {
+                Ok(_) => UnitsChoice::Physical,
+                Err(_) => UnitsChoice::Si,
+            },
+        };
         let symbols = SymbolTable::parse(&self.rename, model.data.latent_dim());
         let symbols = symbols.map_err(|error| python_error(py, error))?;
         let form = self.form.as_deref().map(|name| choice(py, "form", name));
@@ -176,6 +185,23 @@ pub fn equations(
         Ok((phases.collect(), rounding))
     });
     made.map_err(|error| python_error(py, error))
+}
+
+/// The equations as text of at most 80 columns, with the quantities of the latent coordinates.
+#[pyfunction]
+pub fn equations_text(py: Python<'_>, model: &Model, arguments: EmitArguments) -> PyResult<String> {
+    let emission = arguments.emission(model, py)?;
+    let text = py.detach(|| -> Result<_, Error> {
+        let equations = emission.equations(model)?;
+        let print = &emission.options.print;
+        let options = TextOptions {
+            rounding: Some(print.rounding),
+            symbols: print.symbols.clone(),
+            columns: None,
+        };
+        Ok(romc::typeset::equations_text(&equations, &options))
+    });
+    text.map_err(|error| python_error(py, error))
 }
 
 /// Writes files into a folder, all or none; returns their paths.

@@ -12,6 +12,7 @@ use romc::artifact::ArtifactError;
 use romc::deploy::EmitError;
 use romc::evaluate::EvaluateError;
 use romc::files::{Fault as FileFault, Place};
+use romc::identify::IdentifyError;
 use romc::limits::{OutOfRange, Range};
 use romc::lower::LowerError;
 use romc::model::ModelError;
@@ -21,6 +22,7 @@ use romc::recording::RecordingError;
 use romc::robot::WrenchFrame;
 use romc::sim::SimError;
 use romc::simplify::SimplifyError;
+use romc::train::TrainError;
 
 /// The class of an error in Python.
 #[derive(Clone, Copy)]
@@ -140,6 +142,25 @@ impl Fault {
         }
     }
 
+    fn of_train(error: &TrainError) -> Self {
+        match error {
+            TrainError::Recording(error) => Fault::of_recording(error),
+            TrainError::Model(error) => Fault::of_model(error),
+            TrainError::TooFewSamples { path, row, .. } => Fault {
+                row: Some(*row),
+                ..Fault::of(Class::Recording).in_file(&path.to_string_lossy())
+            },
+            TrainError::TermValue { path, sample, .. } => Fault {
+                row: Some(*sample),
+                ..Fault::of(Class::Recording).in_file(&path.to_string_lossy())
+            },
+            TrainError::NoRecording | TrainError::PhaseSamples { .. } => {
+                Fault::of(Class::Recording)
+            }
+            _ => Fault::of(Class::Other),
+        }
+    }
+
     fn of_lower(error: &LowerError) -> Self {
         match error {
             LowerError::Model(error) => Fault::of_model(error),
@@ -187,6 +208,11 @@ impl Fault {
             }
             Error::RobotFile(error) => Fault::of(Class::Other).in_file(&error.file),
             Error::Sim(error) => Fault::of_sim(error),
+            Error::Train(error) => Fault::of_train(error),
+            Error::Identify(error) => match error {
+                IdentifyError::Recording(error) => Fault::of_recording(error),
+                _ => Fault::of(Class::Recording),
+            },
             Error::Lower(error) => Fault::of_lower(error),
             Error::Mpc(error) => Fault::of_mpc(error),
             Error::Evaluate(error) => match error {
@@ -287,6 +313,11 @@ pub fn bad_reference(py: Python<'_>, message: &str, array: &str) -> PyErr {
         ..Fault::of(Class::Recording)
     };
     fault.raise(py, message)
+}
+
+/// A `RecordingError` of a recording as a whole.
+pub fn recording_error(py: Python<'_>, message: &str) -> PyErr {
+    Fault::of(Class::Recording).raise(py, message)
 }
 
 /// An option with a value that it cannot have.

@@ -14,7 +14,7 @@ use romc::recording::{
     read_from_bytes, write_as,
 };
 use romc::recording::{Notation, write_to};
-use romc::robot::{ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, STATE_DIM};
+use romc::robot::{ContactFlags, FOOT_DIM, InputRule, JOINT_DIM, Robot, STATE_DIM};
 use romc::robot_file::find;
 
 use crate::arrays::{into_rows, rows, tuples, values};
@@ -188,6 +188,24 @@ impl Columns {
     }
 }
 
+/// The robot of recordings, which the reader of a file may need: its name, or a model's.
+#[derive(FromPyObject)]
+pub enum RobotOf<'py> {
+    #[pyo3(transparent)]
+    Name(String),
+    #[pyo3(transparent)]
+    Model(PyRef<'py, Model>),
+}
+
+impl RobotOf<'_> {
+    fn robot(&self) -> Result<Option<&'static Robot>, Error> {
+        match self {
+            RobotOf::Name(name) => Ok(Some(find(name)?)),
+            RobotOf::Model(model) => Ok(model.data.robot().ok()),
+        }
+    }
+}
+
 /// Reads files, one reader for all; returns the recordings, and in words what was done besides reading.
 #[pyfunction]
 pub fn read(
@@ -195,11 +213,18 @@ pub fn read(
     paths: Vec<PathBuf>,
     columns: Option<Columns>,
     clock: &str,
+    robot: Option<RobotOf<'_>>,
 ) -> PyResult<(Vec<Recording>, Vec<String>)> {
     let clocks: Clocks = choice(py, "clock", clock)?;
+    let robot = robot.map(|robot| robot.robot()).transpose();
+    let robot = robot.map_err(|error| python_error(py, error))?.flatten();
     let read = py.detach(|| -> Result<_, RecordingError> {
         let map = columns.as_ref().map(Columns::map).transpose()?;
         let reader = Reader::new(map, clocks);
+        let reader = match robot {
+            Some(robot) => reader.for_robot(robot),
+            None => reader,
+        };
         let mut notes = ReadingNotes::default();
         let readings = paths.iter().map(|path| {
             let reading = reader.read(path)?;

@@ -31,6 +31,7 @@ def test_files_have_the_bytes_of_the_command_line(name, command_line, tmp_path):
         ({"precision": "f32", "sincos": "library"}, ["--precision", "f32", "--sincos", "library"]),
         ({"units": "scaled", "digits": 3}, ["--units", "scaled", "--digits", "3"]),
         ({"units": "physical", "significant": 4}, ["--units", "physical", "--significant", "4"]),
+        ({"units": "physical"}, ["--units", "physical"]),
         ({"form": "align", "width": 22, "siunitx": True}, ["--form", "align", "--width", "22", "--siunitx"]),
         ({"rename": {"z1": "x"}, "as_learned": True}, ["--rename", "z1=x", "--as-learned"]),
     ],
@@ -48,12 +49,41 @@ def test_controller_is_a_target(model, tmp_path):
 
 
 def test_latex_is_the_file_for_papers(model, tmp_path):
-    equations = model.equations(significant=3)
+    equations = model.equations(significant=3, units="si")
     [path] = [path for path in model.compile("latex", tmp_path, significant=3) if path.name == "go1_d4.tex"]
     assert equations.latex() == path.read_text()
-    assert "ddz1 = -0.596*dz1 - 0.581*dz2 + 1.53*u1\n" in str(equations)
     assert equations.terms("contact")[0][2] == (pytest.approx(1.532, abs=1e-3), "u1")
     assert equations.markdown().startswith("<!-- romc")
+
+
+def test_print_shows_equations_in_physical_units(model, command_line):
+    [contact, flight] = str(model.equations()).split("\n\n")[1:]
+    assert contact.startswith("contact (at least one foot on the ground)\n")
+    [u1] = [xi for xi, term in model.equations().terms("contact")[0] if term == "u1"]
+    # A force of 1 N accelerates the centre of mass by 1/mass: 13.0 kg.
+    assert u1 == pytest.approx(1 / 13.0, abs=1e-3)
+    assert f" {u1:.3g} u1" in contact.splitlines()[1]
+    assert flight.splitlines()[2] == "  ddz2 = -9.81"
+    head, rest = str(model).split("\n\n", 1)
+    assert head == "go1-d4: 4 latent coordinates of the robot go1, phases contact, flight"
+    assert rest == str(model.equations())
+    assert "z2  centre of mass upwards, m; input u2 in N\n" in rest
+    assert max(map(len, str(model).splitlines())) <= 80
+    # The same text as the command line's.
+    assert rest in command_line.run("inspect", MODELS / "go1-d4.json").stdout
+
+
+def test_digits_names_and_units_reach_the_text(model):
+    assert "ddz1 = -0.596 dz1 - 0.581 dz2 + 1.53 u1\n" in str(model.equations(significant=3, units="si"))
+    assert "ddz1 = -0.6 dz1 - 0.6 dz2 + 2 u1\n" in str(model.equations(significant=1, units="si"))
+    assert "-9.532 " in str(model.equations(significant=4))
+    renamed = str(model.equations(rename={"z1": "x"}))
+    assert renamed.startswith("x   centre of mass forwards, m") and "ddx" in renamed
+    latent_only = romc.Model.load(MODELS / "paper-2d.json")
+    assert str(latent_only).startswith("paper-2d: 2 latent coordinates, phases contact, flight\n\ncontact (")
+    assert str(latent_only.equations()) == str(latent_only.equations(units="si"))
+    with pytest.raises(romc.RomcError, match='units: found "cm", expected one of si, scaled, physical'):
+        model.equations(units="cm")
 
 
 def test_notebook_formula_has_every_phase():
@@ -72,7 +102,7 @@ def test_notebook_formula_has_every_phase():
 @pytest.mark.parametrize("name", ["go1-d4", "go1-d6", "paper-2d"])
 def test_text_says_the_same_as_the_model(name, command_line, tmp_path):
     path = MODELS / f"{name}.json"
-    (tmp_path / "equations.txt").write_text(str(romc.Model.load(path).equations()))
+    (tmp_path / "equations.txt").write_text(romc.Model.load(path).equations(units="si").to_text())
     answer = command_line.json("check", path, "equations.txt")
     assert answer["equal"], answer
 

@@ -178,7 +178,7 @@ def test_faults_of_a_file_name_tensor_and_index(tmp_path):
         romc.Model.load(path)
     assert (caught.value.tensor, caught.value.row, caught.value.column) == ("encoder.weights", 3, 2)
     assert caught.value.file == str(path)
-    with pytest.raises(romc.ModelError, match="cannot read"):
+    with pytest.raises(romc.ModelError, match="none.json: no such file and no model of the package"):
         romc.Model.load(tmp_path / "none.json")
 
 

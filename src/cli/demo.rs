@@ -7,7 +7,8 @@ const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4
 const JUMP_1: &[u8] = include_bytes!("../../examples/recordings/go1/test_01.csv.gz");
 const JUMP_2: &[u8] = include_bytes!("../../examples/recordings/go1/test_02.csv.gz");
 const JUMP_3: &[u8] = include_bytes!("../../examples/recordings/go1/test_03.csv.gz");
-const JUMPS: [(&str, &[u8]); 3] = [
+/// Names and files of jumps that no shipped model was trained on.
+pub static JUMPS: [(&str, &[u8]); 3] = [
     ("test_01", JUMP_1),
     ("test_02", JUMP_2),
     ("test_03", JUMP_3),

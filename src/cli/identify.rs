@@ -25,7 +25,8 @@ pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer> {
     Ok(Answer::new(text, report(&found, arguments)))
 }
 
-fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
+/// Tables of what was found in so many recordings.
+pub fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     let error = &found.standard_error;
     let delays = [found.delay_s, error.delay_s].map(|delay| 1e3 * delay);
     let body = [

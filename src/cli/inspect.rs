@@ -20,7 +20,7 @@ pub(super) fn run(arguments: &InspectArguments) -> Result<Answer> {
         let ending = path.extension().and_then(|ending| ending.to_str());
         let has_ending = ending.is_some_and(|end| OF_MODELS.split(' ').any(|of| of == end));
         let Answer { text, json, .. } = match has_ending || artifact::is_standard_input(path) {
-            true => describe_model(path, &artifact::read(path)?),
+            true => describe_model(path, &arguments.reading.model(path)?),
             false => describe_recording(&reader.read(path)?, robot)?,
         };
         texts.push(text);

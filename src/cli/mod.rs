@@ -12,6 +12,7 @@ mod demo;
 #[cfg(test)]
 #[path = "../../tests/cli/flags.rs"]
 mod flags;
+mod host;
 mod identify;
 mod import;
 mod inspect;
@@ -31,6 +32,9 @@ mod train;
 mod train_settings;
 
 pub use args::compile::UnitsChoice;
+pub use demo::JUMPS as SHIPPED_JUMPS;
+pub use host::{Host, HostAnswer, HostError, run_in};
+pub use identify::text as identification_text;
 pub use import::{Compared, import_compared};
 pub use mpc::JudgedRuns;
 

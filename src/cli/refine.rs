@@ -12,13 +12,18 @@ use crate::train::{Origin, Refined, refine_from};
 
 pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer> {
     let settings = own_settings(arguments, from)?;
-    Inputs::reading(&arguments.reading)
+    let reading = &arguments.reading;
+    Inputs::reading(reading)
         .and([from])
         .and(&arguments.recordings)
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
-        .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
-    let model = artifact::read(from)?;
+        .check_output(
+            reading.file_of_model(&arguments.output),
+            Format::MODEL,
+            arguments.force,
+        )?;
+    let model = reading.model(from)?;
     let robot = match &settings.robot {
         Some(name) => chosen(name)?,
         None => model.robot()?,
@@ -66,7 +71,7 @@ pub(super) fn run(arguments: &TrainArguments, from: &Path) -> Result<Answer> {
     let mut refined = refine_from(&model, training, robot, actuators, &origin)?;
     let name = named(arguments.name.as_deref(), &arguments.output);
     refined.model = refined.model.into_builder().name(name).build()?;
-    artifact::write(&arguments.output, &refined.model, arguments.force)?;
+    reading.write_model(&arguments.output, &refined.model, arguments.force)?;
     Ok(answer(arguments, from, &refined))
 }
 

@@ -45,7 +45,7 @@ fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer>
         .and(&arguments.plan)
         .into_folder(arguments.figures.as_deref())?;
     inputs.check_output(Some(&arguments.output), Format::PAGE, arguments.force)?;
-    let model = artifact::read(model_path)?;
+    let model = arguments.reading.model(model_path)?;
     let recordings = read_for(&model, &arguments.recordings, &arguments.reading)?;
     note_turns(motions(&recordings), CUT);
     note_late_restarts(&recordings, arguments.restart_every);

@@ -140,7 +140,7 @@ impl<'a> Inputs<'a> {
         let figures = figures()?;
         let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
         let written = self.write_folder(folder, &files, overwrite)?;
-        answer.text += &format!("{} figures: {}\n", figures.len(), folder.display());
+        answer.text += &format!("{}: {}\n", counted(figures.len(), "figure"), folder.display());
         answer.json["figures"] = names(&written).into();
         Ok(())
     }
@@ -178,7 +178,8 @@ pub(super) fn reader(
     robot: Option<&'static Robot>,
 ) -> Result<Reader> {
     let map = arguments.columns.as_deref().map(ColumnMap::read);
-    let reader = Reader::new(map.transpose()?, arguments.clock.unwrap_or(clocks));
+    let reader = Reader::new(map.transpose()?, arguments.clock.unwrap_or(clocks))
+        .with_held(arguments.recordings());
     Ok(match robot {
         Some(robot) => reader.for_robot(robot),
         None => reader,
@@ -254,7 +255,14 @@ pub(super) fn read_with(reader: &Reader, paths: &[PathBuf]) -> Result<Vec<Record
 }
 
 pub(super) fn note(text: &str) {
-    eprintln!("{} {}", console::style("note:").for_stderr().cyan(), printable(text));
+    if host::keep_note(text) {
+        return;
+    }
+    eprintln!(
+        "{} {}",
+        console::style("note:").for_stderr().cyan(),
+        printable(text)
+    );
 }
 
 pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {

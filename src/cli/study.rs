@@ -1,5 +1,7 @@
 //! `romc study`: trainings over latent dimensions and seeds, joined and summarised.
 
+use std::sync::atomic::AtomicBool;
+
 use super::*;
 use crate::study::{self, Outcome, Plan};
 
@@ -68,7 +70,9 @@ fn trained(arguments: &StudyArguments) -> Result<Store> {
     let bar = progress_bar("training models", own.len());
     let finished = |_| bar.inc(1);
     let sets = [training, validation];
-    study::run(&store, shard, sets, robot, &base, &finished)?;
+    let never = AtomicBool::new(false);
+    let stop = (arguments.reading.host.as_ref()).map_or(&never, |host| &host.stop);
+    study::run(&store, shard, sets, robot, &base, (&finished, stop))?;
     bar.finish_and_clear();
     Ok(store)
 }

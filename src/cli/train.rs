@@ -6,14 +6,19 @@ use super::*;
 
 pub(super) fn run(arguments: &TrainArguments) -> Result<Answer> {
     let settings = TrainSettings::effective(arguments)?;
-    Inputs::reading(&arguments.reading)
+    let reading = &arguments.reading;
+    Inputs::reading(reading)
         .and(&arguments.recordings)
         .and(&arguments.validation)
         .and(&arguments.test)
         .and(&arguments.config)
         .and_robot(settings.robot.as_deref())
         .and(&settings.actuators)
-        .check_output(Some(&arguments.output), Format::MODEL, arguments.force)?;
+        .check_output(
+            reading.file_of_model(&arguments.output),
+            Format::MODEL,
+            arguments.force,
+        )?;
     let latent_dim = settings.latent_dim.expect("clap or the file's check asks");
     let (method, robot) = (settings.method(), settings.robot()?);
     let name = named(arguments.name.as_deref(), &arguments.output);
@@ -41,14 +46,18 @@ pub(super) fn run(arguments: &TrainArguments) -> Result<Answer> {
         }
         Progress::Step => bar.inc(1),
     };
-    let mut monitor = Monitor::new(&mut listener, stop_on_interrupt());
+    let stop = match &reading.host {
+        Some(host) => &host.stop,
+        None => stop_on_interrupt(),
+    };
+    let mut monitor = Monitor::new(&mut listener, stop);
     let mut trained = method.learn(sets, robot, &options, &origin, &mut monitor)?;
     bar.finish_and_clear();
-    let is_interrupted = INTERRUPTED.load(Ordering::Relaxed);
+    let is_interrupted = stop.load(Ordering::Relaxed);
     if is_interrupted {
         trained = marked_as_interrupted(trained);
     }
-    artifact::write(&arguments.output, &trained.model, arguments.force)?;
+    reading.write_model(&arguments.output, &trained.model, arguments.force)?;
     let tested = (!test.is_empty()).then(|| assess(&trained.model, test));
     let tested = tested.transpose()?;
     let mut answer = answer(arguments, &trained, tested.as_ref());

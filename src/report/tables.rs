@@ -329,7 +329,8 @@ pub(crate) fn verdict_table(verdict: &Verdict) -> Table {
         .table()
 }
 
-pub(crate) fn verdict_lines(verdict: &Verdict) -> String {
+/// The verdict in one line, then a line for each of its rows that is not passed.
+pub fn verdict_lines(verdict: &Verdict) -> String {
     let failed = verdict.rows.iter().filter(|row| row.passed == Some(false));
     let lines = failed.map(|row| match row.counts {
         true => format!("FAILED {}: {}\n", row.of, row.words()),

@@ -11,14 +11,14 @@ use crate::train::{Method, Monitor, Origin, Recordings, TrainError, TrainOptions
 
 /// Trains the cells of a shard that the store misses. Seeds of the joint method are random starts; the closed form
 /// finds the same model from every start, so that its seeds leave out jumps. Where the mask leaves fewer coordinates
-/// than the latent space has, it is lifted.
+/// than the latent space has, it is lifted. No cell begins once `stop` is true.
 pub(crate) fn run(
     store: &Store,
     shard: Shard,
     [training, validation]: [&[Recording]; 2],
     robot: &'static Robot,
     options: &TrainOptions,
-    finished: &(dyn Fn(CellId) + Sync),
+    (finished, stop): (&(dyn Fn(CellId) + Sync), &AtomicBool),
 ) -> Result<()> {
     let missing = store.missing();
     let mut todo = shard.of(&store.plan.cells());
@@ -26,7 +26,9 @@ pub(crate) fn run(
     let method = store.plan.method;
     let next = AtomicUsize::new(0);
     let worker = || {
-        while let Some(&id) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
+        while !stop.load(Ordering::Relaxed)
+            && let Some(&id) = todo.get(next.fetch_add(1, Ordering::Relaxed))
+        {
             let outcome = train(id, [training, validation], robot, options.clone(), method);
             let kept = store.put(&Cell { id, outcome });
             finished(id);

@@ -239,7 +239,10 @@ fn parts_that_are_left_out_are_not_in_the_model() {
 #[test]
 fn every_part_has_a_row_in_the_table_of_its_effect() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let files = ["benches/learning/whole_body.py", "docs/evaluation/training-choices.md"];
+    let files = [
+        "benches/learning/whole_body.py",
+        "docs/evaluation/training-choices.md",
+    ];
     let texts = files.map(|file| std::fs::read_to_string(root.join(file)).expect("a text"));
     for part in RecipePart::value_variants() {
         let part = part.to_possible_value().expect("none is hidden");

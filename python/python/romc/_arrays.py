@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Optional, Type
+from typing import Any, Optional, Tuple, Type
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,3 +62,13 @@ def flags(name: str, value: Any, ndim: int) -> Flags:
 def _refused(error: Type[RomcError], name: str, message: str) -> RomcError:
     place = {"column": name} if error is RecordingError else {"tensor": name}
     return error(f"`{name}`: {message}", **place)  # type: ignore[arg-type]
+
+
+def rowwise(function: Any, *arguments: Tuple[str, Any]) -> Floats:
+    """A function of rows, also of single ones."""
+    arrays = [(name, floats(name, value)) for name, value in arguments]
+    if all(array.ndim == 1 for _, array in arrays):
+        of_one: Floats = function(*(np.ascontiguousarray(array)[None] for _, array in arrays))[0]
+        return of_one
+    of_all: Floats = function(*(rows(name, array) for name, array in arrays))
+    return of_all

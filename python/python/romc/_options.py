@@ -30,3 +30,67 @@ class ImportOptions(TypedDict, total=False):
     sample_time: float
     name: str
     description: str
+
+
+class TrainOptions(TypedDict, total=False):
+    """Options of `romc train` by their names there; `docs/reference/training-settings.md` and `romc train --help` have each."""
+
+    split: Sequence[int]
+    config: PathLike
+    method: str
+    robot: PathLike
+    paper: bool
+    seed: int
+    seeds: int
+    epochs: int
+    encoder_layers: Union[str, Sequence[int]]
+    decoder_layers: Union[str, Sequence[int]]
+    activation: str
+    lift_weight: float
+    body_weight: float
+    bptt_weight: float
+    bptt_window: int
+    bptt_stride: int
+    bptt_decay: float
+    bptt_integrator: str
+    slack: float
+    refinements: int
+    growth: float
+    degree: int
+    trigonometric: bool
+    terms: Union[str, Sequence[str]]
+    actuators: PathLike
+    wrench_frame: str
+    phases: Union[str, Phases]
+    leave_out_implausible: bool
+    accelerations: str
+    smooth: Union[str, Sequence[int]]
+    smooth_rows: str
+    moving_average: int
+    mask_std: float
+    mask_input_share: float
+    coordinates: str
+    body: Union[str, Sequence[str]]
+    body_equations: str
+    mirror_images: str
+    leave_out: Union[str, Sequence[str]]
+    no_rotation: bool
+    state_scaling: float
+    torque_scaling: float
+    force_scaling: float
+    moment_scaling: float
+    columns: PathLike
+    clock: str
+
+
+class StudyOptions(TypedDict, total=False):
+    """Options of `romc study` by their names there; `romc study --help` has each."""
+
+    method: str
+    paper: bool
+    robot: PathLike
+    config: PathLike
+    lambda_: float
+    shard: str
+    columns: PathLike
+    clock: str

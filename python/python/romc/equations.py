@@ -14,8 +14,7 @@ _Printed = List[Tuple[float, str, str]]
 class Equations:
     """The latent accelerations of each phase, in their shortest equal form.
 
-    In a notebook they show as formulas; `str` gives them as text that `romc import` reads, with all
-    digits unless `digits` or `significant` is given.
+    In a notebook they show as formulas, `print` shows them as text with the quantities of the latent coordinates.
     """
 
     def __init__(self, model: "_romc.Model", arguments: Dict[str, object]) -> None:
@@ -51,6 +50,10 @@ class Equations:
         return _romc.emit(self._model, ["markdown"], self._arguments)[0][1]
 
     def __str__(self) -> str:
+        return _romc.equations_text(self._model, self._arguments)
+
+    def to_text(self) -> str:
+        """Text that `romc import` and `romc check` read, with all digits unless `digits` or `significant` is given."""
         lines = []
         for phase in self._phases:
             lines.append(f"[{phase['name']}]")

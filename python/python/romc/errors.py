@@ -7,18 +7,35 @@ import sys
 import warnings
 from typing import Optional, Union
 
-_OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: ([\w.,=-]*\w))?")
+# Words of messages after an option that are not its value.
+_PROSE = (
+    "alone|and|are|as|decide|depends|describes|does|has|is|leaves|names|only|or|part|replaces|says|takes|to|with|without"
+)
+_OPTION = re.compile(rf"--([a-z]+(?:-[a-z]+)*)(?: (?!(?:{_PROSE})\b)([\w.,=-]*\w))?")
 
 # Options that take no value.
-_FLAGS = {"as_learned", "exact", "force", "leave_out_implausible", "paper", "siunitx", "unchecked"}
+_FLAGS = {
+    "as_learned",
+    "exact",
+    "force",
+    "leave_out_implausible",
+    "no_rotation",
+    "paper",
+    "siunitx",
+    "trigonometric",
+    "unchecked",
+}
 
 
-def _in_python(message: str) -> str:
+def in_python(message: str) -> str:
     """The message with options of the command line as keyword arguments: `--xi-layout X` as `xi_layout="X"`."""
 
+    def named(match: re.Match[str]) -> str:
+        name = match.group(1).replace("-", "_")
+        return {"from": "from_", "lambda": "lambda_", "phase": "phases"}.get(name, name)
+
     def argument(match: re.Match[str]) -> str:
-        name, value = match.group(1).replace("-", "_"), match.group(2)
-        name = {"phase": "phases"}.get(name, name)
+        name, value = named(match), match.group(2)
         if name in _FLAGS:
             following = "" if value is None else f" {value}"
             return f"{name}=True{following}"
@@ -33,6 +50,9 @@ def _in_python(message: str) -> str:
     message = message.replace("--unchecked writes", "unchecked=True takes")
     message = message.replace("--library FILE with the list of terms", "library=[...], the list of terms")
     message = re.sub(r"a tensor (mean|std)\.state", r"\1=", message)
+    # The command line's parser: invalid value 'x' for '--latent-dim <D>', then its possible values.
+    message = re.sub(r"'--([a-z-]+)(?: <[^>]*>)?(?:\.\.\.)?'", named, message)
+    message = re.sub(r"\n +\[possible values: ([^\]]*)\]", r": expected one of \1", message)
     # Indented lines are to be typed as they are.
     lines = message.splitlines()
     return "\n".join(line if line.startswith("    ") else _OPTION.sub(argument, line) for line in lines)
@@ -63,7 +83,7 @@ class RomcError(ValueError):
         row: Optional[int] = None,
         column: Optional[Union[int, str]] = None,
     ) -> None:
-        super().__init__(_in_python(message))
+        super().__init__(in_python(message))
         self.file = file
         self.tensor = tensor
         self.row = row
@@ -88,4 +108,4 @@ def warn(message: str) -> None:
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "romc":
         frame, level = frame.f_back, level + 1
-    warnings.warn(_in_python(message), RomcWarning, stacklevel=level)
+    warnings.warn(in_python(message), RomcWarning, stacklevel=level)

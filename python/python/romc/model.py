@@ -4,46 +4,69 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from romc import _romc, _sources
-from romc._arrays import Floats, floats, rows
-from romc._options import Factors, Phases
+from romc._arrays import Floats, floats, rowwise
+from romc._command import Arguments
+from romc._import import LibraryLike, imported
 from romc.equations import Equations
-from romc.errors import ModelError, warn
-from romc.library import Library
+from romc.errors import ModelError
 from romc.plan import Plan
-from romc.recording import PathLike, Recording, Recordings, Segment, natives, read
-from romc.simulation import Simulation
+from romc.recording import PathLike, Recording, Recordings, Segment, listed, natives, read
+from romc.simulation import Score, Simulation
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from romc._options import ImportOptions
 
-LibraryLike = Union[Library, str, Sequence[str]]
+MODELS: Tuple[str, ...] = tuple(_romc.shipped_models())
+"""Names of the models that are part of the package, for `Model.load`."""
 
 
 class Model:
     """A checked model: encoder and decoder between the robot's 18 coordinates and d latent ones, and per phase
     accelerations `ddz = Xi^T Theta(z, dz, u)` over a library of candidate terms.
 
-    Make one with `load`, `from_arrays`, `from_torch`, `from_pysindy`, or `romc train` on the command line.
+    Make one with `romc.train`, `load`, `from_arrays`, `from_torch` or `from_pysindy`. `print` shows its equations in m,
+    rad and N.
     """
 
-    def __init__(self, native: "_romc.Model", *, exact: bool = False) -> None:
+    training: Optional[Dict[str, Any]]
+    """The object of `romc train --json` for a model of `romc.train`: `report` with metrics by set, `test`, `notes`; `None`
+    for others."""
+
+    def __init__(
+        self, native: "_romc.Model", *, exact: bool = False, training: Optional[Dict[str, Any]] = None
+    ) -> None:
         self._native = native
         # Coefficients whose digits simplification has chosen are printed in full.
         self._exact = exact
+        self.training = training
 
     @classmethod
     def load(cls, path: PathLike) -> "Model":
-        """Reads a model file. Raises `ModelError` with the tensor, row and column that are wrong."""
-        return cls(_romc.Model.load(os.fspath(path)))
+        """Reads a model file, or a model of the package by its name in `romc.MODELS`, such as `"go1-d4"`.
+
+        Raises `ModelError` with the tensor, row and column that are wrong.
+        """
+        name = os.fspath(path)
+        if name == "-" or os.path.exists(name):
+            return cls(_romc.Model.load(name))
+        shipped = _romc.shipped_model(name)
+        if shipped is None:
+            expected = f'a file such as "my-model.json", or one of {", ".join(MODELS)}'
+            raise ModelError(f"{name}: no such file and no model of the package; expected {expected}", file=name)
+        return cls(shipped)
+
+    @classmethod
+    def from_dict(cls, document: Mapping[str, Any], name: str = "document") -> "Model":
+        """The model of a model file's object, as `to_dict` gives it; `name` stands for the file in errors."""
+        return cls(_romc.Model.from_text(name, json.dumps(document)))
 
     @classmethod
     def from_arrays(
@@ -93,7 +116,7 @@ class Model:
         tensors.update(_sources.phase_tensors("xi", xi))
         tensors.update(_sources.phase_tensors("mask", mask))
         parts = {"activation": activation, "weights": weights, "latent_dim": latent_dim}
-        return cls._imported("Model.from_arrays", tensors, library, parts, **options)
+        return cls(imported("Model.from_arrays", tensors, library, parts, **options))
 
     @classmethod
     def from_torch(
@@ -121,7 +144,7 @@ class Model:
             "weights": "column",
             "map": [f"{part}={tensor}" for part, tensor in (map or {}).items()],
         }
-        return cls._imported("Model.from_torch", tensors, library, parts, **options)
+        return cls(imported("Model.from_torch", tensors, library, parts, **options))
 
     @classmethod
     def from_pysindy(
@@ -152,75 +175,6 @@ class Model:
             weights=weights,
             **options,
         )
-
-    @classmethod
-    def _imported(
-        cls,
-        source: str,
-        tensors: Dict[str, Floats],
-        library: Optional[LibraryLike],
-        parts: Mapping[str, object],
-        *,
-        robot: Optional[PathLike] = None,
-        scaling: Optional[Factors] = None,
-        input_scaling: Optional[Factors] = None,
-        mean: Any = None,
-        std: Any = None,
-        order: Optional[str] = None,
-        phases: Optional[Phases] = None,
-        xi_layout: Optional[str] = None,
-        library_order: Optional[str] = None,
-        wrench_frame: str = "body",
-        actuators: Union[PathLike, Mapping[str, Union[Sequence[float], Mapping[str, float]]], None] = None,
-        inputs_from: Optional[Recordings] = None,
-        unchecked: bool = False,
-        sample_time: Optional[float] = None,
-        name: str = "model",
-        description: str = "",
-    ) -> "Model":
-        for key, value in (("mean.state", mean), ("std.state", std)):
-            if value is not None:
-                tensors[key] = floats(key, value)
-        # Equations alone have no robot coordinates to scale, and tensors may have the factors.
-        has_map = any(re.search(r"(^|[./])(en|de)coder([._/]|$)", key) for key in tensors)
-        has_factors = any(re.search(r"(^|[./])(scaling|std)[._](state|input)$", key) for key in tensors)
-        if scaling is None and has_map and not has_factors:
-            scaling = 1.0
-        if isinstance(library, Library) and library.order is not None:
-            if library_order not in (None, library.order):
-                found = f"{library_order!r} and Library(order={library.order!r})"
-                raise ModelError(f"library_order: found {found}, expected one order")
-            library_order = library.order
-        shorthand = library.shorthand() if isinstance(library, Library) else library
-        if isinstance(shorthand, str) and ";" in shorthand:
-            shorthand = [term.strip() for term in shorthand.split(";")]
-        terms = None if shorthand is None or isinstance(shorthand, str) else [str(term) for term in shorthand]
-        rules = {phase: feet if isinstance(feet, str) else ",".join(feet) for phase, feet in (phases or {}).items()}
-        arguments: Dict[str, object] = {
-            **dict.fromkeys(("activation", "weights", "latent_dim")),
-            "map": [],
-            **parts,
-            "library": shorthand if terms is None else None,
-            "terms": terms,
-            "scaling": _factors("scaling", scaling),
-            "input_scaling": _factors("input_scaling", input_scaling),
-            "phases": [f"{phase}={feet}" for phase, feet in rules.items()],
-            "xi_layout": xi_layout,
-            "library_order": library_order,
-            "robot": None if robot is None else os.fspath(robot),
-            "order": order,
-            "wrench_frame": wrench_frame,
-            "actuators": os.fspath(actuators) if isinstance(actuators, os.PathLike) else actuators,
-            "sample_time": sample_time,
-            "unchecked": unchecked,
-            "name": name,
-            "description": description,
-        }
-        recordings = [] if inputs_from is None else natives(inputs_from)
-        native, fault = _romc.import_tensors(source, list(tensors.items()), arguments, recordings)
-        if fault is not None:
-            warn(fault)
-        return cls(native)
 
     def save(self, path: PathLike, *, force: bool = False) -> None:
         """Writes a model file; replaces a different one only if forced."""
@@ -269,27 +223,27 @@ class Model:
 
     def encode(self, x: Any) -> Floats:
         """Latent positions `(n, d)` of states `(n, 18)` in SI units; of one state `(18,)`, `(d,)`."""
-        return _rowwise(self._native.encode, ("x", x))
+        return rowwise(self._native.encode, ("x", x))
 
     def decode(self, z: Any) -> Floats:
         """States `(n, 18)` in SI units of latent positions `(n, d)`."""
-        return _rowwise(self._native.decode, ("z", z))
+        return rowwise(self._native.decode, ("z", z))
 
     def encode_velocity(self, dx: Any, x: Any = None) -> Floats:
         """Latent velocities `(n, d)` of velocities `(n, 18)`; a nonlinear encoder needs the states `x` too."""
-        return _rowwise(self._native.encode_velocity, ("x", self._state(x, dx)), ("dx", dx))
+        return rowwise(self._native.encode_velocity, ("x", self._state(x, dx)), ("dx", dx))
 
     def project_input(self, u: Any, x: Any = None) -> Floats:
         """Latent inputs `(n, d)` of inputs `(n, 18)` (N m, N); a nonlinear encoder needs the states `x` too."""
-        return _rowwise(self._native.project_input, ("x", self._state(x, u)), ("u", u))
+        return rowwise(self._native.project_input, ("x", self._state(x, u)), ("u", u))
 
     def lift_input(self, u_lat: Any, x: Any = None) -> Floats:
         """Inputs `(n, 18)` (N m, N) of latent inputs `(n, d)`; a nonlinear encoder needs the states `x` too."""
-        return _rowwise(self._native.lift_input, ("x", self._state(x, u_lat)), ("u_lat", u_lat))
+        return rowwise(self._native.lift_input, ("x", self._state(x, u_lat)), ("u_lat", u_lat))
 
     def acceleration(self, phase: str, z: Any, dz: Any, u_lat: Any) -> Floats:
         """Latent accelerations `ddz` of a phase, `(n, d)`, at points of three arrays `(n, d)`, in scaled units."""
-        return _rowwise(
+        return rowwise(
             lambda *points: self._native.acceleration(phase, *points), ("z", z), ("dz", dz), ("u_lat", u_lat)
         )
 
@@ -310,14 +264,14 @@ class Model:
         width: Optional[float] = None,
         rename: Optional[Mapping[str, str]] = None,
         siunitx: bool = False,
-        units: str = "si",
+        units: Optional[str] = None,
         as_learned: bool = False,
     ) -> Equations:
-        """The latent accelerations of each phase; formulas in a notebook, `.latex()` for a paper.
+        """The latent accelerations of each phase; formulas in a notebook, text by `print`, `.latex()` for a paper.
 
         `digits` decimals or `significant` digits of coefficients; `form` is `cases` or `align`, `width` the longest
-        line in em; `rename` has other names for variables, `{"z1": "x"}`; `units="physical"` takes the scale factors
-        out; `as_learned` keeps coefficients times terms as the model has them. As in `romc compile`.
+        line in em; `rename` has other names for variables, `{"z1": "x"}`; `units` is `"physical"` (m, rad, N: the
+        default of a model that has such units) or `"si"` (the latent coordinates as the model scales them); `as_learned` keeps coefficients times terms as the model has them. As in `romc compile`.
         """
         arguments = _emit_arguments(
             self,
@@ -387,16 +341,69 @@ class Model:
         `tolerance`: a number in scaled units per s^2, or `"1%"` of each acceleration's root mean square.
         """
         ranges = _ranges(domain) if isinstance(domain, Mapping) else None
-        recordings = natives(domain) if not isinstance(domain, Mapping) else []
+        recordings = natives(domain, self._native) if not isinstance(domain, Mapping) else []
         text = tolerance if isinstance(tolerance, str) else repr(float(tolerance))
         native, is_changed, certificate, page = _romc.simplify(self._native, text, recordings, ranges, margin)
         return Simplified(Model(native, exact=is_changed), json.loads(certificate), page)
+
+    def predict(self, recording: Union[Recording, PathLike], horizon_s: Optional[float] = 0.1) -> Floats:
+        """Predicted states `(n, 18)` of all samples of a recording, in rad and m, under the recorded inputs.
+
+        Predictions start again from the recorded state every `horizon_s` seconds, or only at the first sample of each
+        segment if it is `None`. Rows are in the order of `recording.x`, several segments one below the other; NaN where
+        a prediction diverged.
+
+        >>> model.predict(jump, horizon_s=0.1)[:, 14] - jump.x[:, 14]      # error of the body's height, m
+        """
+        if not isinstance(recording, (str, os.PathLike, Recording)):
+            found = f"found {type(recording).__name__}, expected one recording or file"
+            raise ModelError(f"predict: {found}; for several, [model.predict(one) for one in recordings]")
+        [native] = natives(recording, self._native)
+        return _romc.predict(self._native, native, horizon_s)
+
+    def score(self, recordings: Recordings, horizon_s: float = 0.1) -> Score:
+        """The verdict on the model along recordings (or their files), which training should not have used.
+
+        A dict: uses of the model that it is fit for, those that it failed, and the rows that decide, each with its value,
+        baseline, threshold and whether it passed. `horizon_s` is the time of the short predictions, in s.
+
+        >>> model.score(jumps)["fit_for"]
+        ['0.1 s', 'whole motion', 'torques', 'control']
+        """
+        return Score(*_romc.score(self._native, natives(recordings, self._native), horizon_s))
+
+    def report(
+        self,
+        recordings: Recordings,
+        path: PathLike,
+        *,
+        restart_every: Optional[float] = None,
+        tolerance: Union[float, str, None] = None,
+        study: Optional[PathLike] = None,
+        plan: Union[Recording, PathLike, None] = None,
+        figures: Optional[PathLike] = None,
+        columns: Optional[PathLike] = None,
+        clock: Optional[str] = None,
+        force: bool = False,
+    ) -> Path:
+        """Writes the page of `romc report` on the model along recordings (or their files): equations, errors, baselines,
+        torques of the controller. Returns its path, which ends in `.html`.
+
+        `restart_every` is the time of the short predictions in s, `tolerance` that of the simplification which the page
+        lists (`"1%"` by default), `study` a folder of `romc.study`, `plan` the plan that the first jump follows, `figures`
+        a folder for each figure as SVG, PDF and CSV. `force` replaces an existing page.
+        """
+        arguments = Arguments("report").file(f"{self.name}.json").recordings(recordings)
+        arguments.recordings([] if plan is None else listed(plan), "plan")
+        arguments.options(restart_every=restart_every, tolerance=tolerance, study=study, figures=figures)
+        arguments.options(columns=columns, clock=clock, output=path, force=force).run(self._native)
+        return Path(path)
 
     def simulate(self, recordings: Recordings, *, restart_every: float = 0.1) -> Simulation:
         """Rolls the model out along recordings (or their files) under the recorded inputs: whole segments, and
         restarted from the recorded state every `restart_every` seconds. Equal to `romc simulate`.
         """
-        return Simulation(self._native, natives(recordings), restart_every)
+        return Simulation(self._native, natives(recordings, self._native), restart_every)
 
     def plan(
         self,
@@ -434,14 +441,21 @@ class Model:
     def __hash__(self) -> int:
         return hash(self.digest)
 
-    def __reduce__(self) -> Tuple[Any, Tuple[str, str, bool]]:
-        return _unpickled, (self.name, self._native.to_text(), self._exact)
+    def __reduce__(self) -> Tuple[Any, ...]:
+        return _unpickled, (self.name, self._native.to_text(), self._exact, self.training)
 
     def __repr__(self) -> str:
         summary = self._native.summary()
         parts = [f"{self.latent_dim} latent coordinates", f"phases {', '.join(self.phases)}"]
         parts += [f"{key} {summary[key]}" for key in ("encoder", "robot") if key in summary]
         return f"<Model {self.name!r}: {', '.join(parts)}>"
+
+    def __str__(self) -> str:
+        robot = self._native.summary().get("robot")
+        of_robot = "" if robot is None else f" of the robot {robot}"
+        coordinates = "1 latent coordinate" if self.latent_dim == 1 else f"{self.latent_dim} latent coordinates"
+        phases = ("phase " if len(self.phases) == 1 else "phases ") + ", ".join(self.phases)
+        return f"{self.name}: {coordinates}{of_robot}, {phases}\n\n{self.equations()}"
 
     def _repr_latex_(self) -> str:
         return self.equations()._repr_latex_()
@@ -459,22 +473,8 @@ class Simplified(NamedTuple):
     """The same as Markdown."""
 
 
-def _unpickled(name: str, text: str, exact: bool) -> Model:
-    return Model(_romc.Model.from_text(name, text), exact=exact)
-
-
-def _rowwise(function: Any, *arguments: Tuple[str, Any]) -> Floats:
-    """A function of rows, also of single ones."""
-    arrays = [(name, floats(name, value)) for name, value in arguments]
-    if all(array.ndim == 1 for _, array in arrays):
-        of_one: Floats = function(*(np.ascontiguousarray(array)[None] for _, array in arrays))[0]
-        return of_one
-    of_all: Floats = function(*(rows(name, array) for name, array in arrays))
-    return of_all
-
-
-def _factors(name: str, factors: Optional[Factors]) -> List[float]:
-    return [] if factors is None else [float(factor) for factor in np.atleast_1d(floats(name, factors))]
+def _unpickled(name: str, text: str, exact: bool, training: Optional[Dict[str, Any]]) -> Model:
+    return Model(_romc.Model.from_text(name, text), exact=exact, training=training)
 
 
 def _emit_arguments(model: Model, *, rename: Optional[Mapping[str, str]], **others: Any) -> Dict[str, object]:

@@ -180,13 +180,16 @@ class Recording:
         return self._only().inputs(model, wrench_frame)
 
     def __repr__(self) -> str:
-        return f"<Recording {self.path!r}, {len(self)} segments>"
+        segments = "1 segment" if len(self) == 1 else f"{len(self)} segments"
+        return f"<Recording {self.path!r}, {segments}>"
 
 
 Columns = Union[PathLike, Mapping[str, Any]]
 
 
-def read(path: PathLike, *, columns: Optional[Columns] = None, clock: str = "repaired") -> Recording:
+def read(
+    path: PathLike, *, columns: Optional[Columns] = None, clock: str = "repaired", robot: Optional[PathLike] = None
+) -> Recording:
     """Reads a recording: `.csv`, `.csv.gz`, `.mcap`, or another program's log by a map of its columns.
 
     - `columns`: the map (`docs/reference/column-maps.md`), a TOML file, or its tables as a dictionary,
@@ -194,9 +197,12 @@ def read(path: PathLike, *, columns: Optional[Columns] = None, clock: str = "rep
     - `clock`: as in the commands that compute, times and angular rates that disagree with the motion are mended
       (`repaired`), which a `RomcWarning` says, or kept (`recorded`).
 
+    - `robot`: as in the commands, a known robot mends places of the body that are late, and has names of joints in
+      `.mcap` files.
+
     Raises `RecordingError` with `file`, `row` (from 1, the header) and `column`.
     """
-    [recording] = _read([path], columns, clock)
+    [recording] = _read([path], columns, clock, None if robot is None else os.fspath(robot))
     return recording
 
 
@@ -209,12 +215,14 @@ def guess_columns(path: PathLike, robot: PathLike = "go1") -> str:
     return text
 
 
-def _read(paths: Iterable[PathLike], columns: Optional[Columns], clock: str) -> List[Recording]:
+def _read(
+    paths: Iterable[PathLike], columns: Optional[Columns], clock: str, robot: Union[str, "_romc.Model", None]
+) -> List[Recording]:
     if isinstance(columns, Mapping):
         given: Union[str, Path, None] = "\n".join(f"{json.dumps(key)} = {_toml(of)}" for key, of in columns.items())
     else:
         given = None if columns is None else Path(columns)
-    natives_read, notes = _romc.read([os.fspath(path) for path in paths], given, clock)
+    natives_read, notes = _romc.read([os.fspath(path) for path in paths], given, clock, robot)
     for note in notes:
         warn(note)
     return [Recording(native) for native in natives_read]
@@ -230,10 +238,42 @@ def _toml(value: Any) -> str:
 Recordings = Union[PathLike, Recording, Iterable[Union[PathLike, Recording]]]
 
 
-def natives(recordings: Recordings) -> List["_romc.Recording"]:
-    """Recordings or their files, one or several; files are read as by `read`."""
+def listed(recordings: Recordings) -> List[Union[PathLike, Recording]]:
+    """Recordings or their files, one or several, as a list."""
     if isinstance(recordings, (str, os.PathLike, Recording)):
-        recordings = [recordings]
+        return [recordings]
     entries = list(recordings)
-    from_files = iter(_read([entry for entry in entries if not isinstance(entry, Recording)], None, "repaired"))
+    for entry in entries:
+        if not isinstance(entry, (str, os.PathLike, Recording)):
+            found = f"found {type(entry).__name__}, expected paths or recordings"
+            raise RecordingError(f"recordings: {found}: romc.read(path), or Recording.from_arrays(t, x, dx, torque, feet)")
+    return entries
+
+
+def some(recordings: Recordings) -> List[Union[PathLike, Recording]]:
+    """The same, at least one."""
+    entries = listed(recordings)
+    if not entries:
+        raise RecordingError("recordings: found none, expected at least one file or `Recording`: romc.read(path)")
+    return entries
+
+
+def natives(
+    recordings: Recordings,
+    robot: Union[str, "_romc.Model", None] = None,
+    *,
+    columns: Optional[Columns] = None,
+    clock: str = "repaired",
+) -> List["_romc.Recording"]:
+    """Recordings or their files, one or several; files are read as by `read`, for a robot by its name or a model's."""
+    entries = some(recordings)
+    from_files = iter(_read([entry for entry in entries if not isinstance(entry, Recording)], columns, clock, robot))
     return [(entry if isinstance(entry, Recording) else next(from_files))._native for entry in entries]
+
+
+def recordings(name: str = "go1") -> List[Recording]:
+    """Recordings that are part of the package: `"go1"` are three jumps of a simulated Go1, about 1.3 s each at 500 Hz,
+    which no shipped model was trained on."""
+    if name != "go1":
+        raise RecordingError(f'recordings: found {name!r}, expected "go1"; romc.read(path) reads a file')
+    return [Recording(native) for native in _romc.shipped_recordings()]

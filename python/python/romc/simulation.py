@@ -44,6 +44,25 @@ class SimulatedSegment:
         return f"<SimulatedSegment of {len(self)} samples>"
 
 
+class Score(Dict[str, Any]):
+    """The verdict on a model along recordings, as every command gives it; `print` shows a line for each row.
+
+    - `fit_for`, `failed`: uses of the model, of `0.1 s` (errors of predictions over that time), `whole motion` (errors
+      from the first sample on; of walks `a stride`), `torques` (those that the controller finds itself), `control`;
+    - `rows`: the metrics that decide, a dict each: `use`, `name`, `unit`, `value`, `baseline`, `baseline_name`,
+      `threshold`, `bound` (`at most` or `at least`), `passed` (`None` if not measured) and `counts`. Errors are root
+      mean squares in m or rad, on the worst recording for torques and control;
+    - `unmeasured`: why torques and control are not judged, or `None`.
+    """
+
+    def __init__(self, verdict: str, text: str) -> None:
+        super().__init__(json.loads(verdict))
+        self._text = text
+
+    def __str__(self) -> str:
+        return self._text
+
+
 class Simulation:
     """What a model predicts along recordings.
 

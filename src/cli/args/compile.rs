@@ -12,7 +12,7 @@ const SIMPLIFICATION: &str = "Simplification";
 #[command(after_help = "Examples:\n  \
                   romc compile models/paper-2d.json --emit latex,c,rust --out-dir out/paper-2d\n  \
                   romc compile models/go1-d4.json --emit latex,c --out-dir out/short --tolerance 5% \\\n      \
-                  --domain examples/recordings/go1/train_*.csv.gz --save-model out/go1-d4-short.json")]
+                  --domain examples/recordings/go1/train_*.csv.gz --save-model go1-d4-short.json")]
 pub(crate) struct CompileArguments {
     /// Model file
     pub model: PathBuf,

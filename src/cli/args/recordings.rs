@@ -1,6 +1,9 @@
 //! Arguments of `romc inspect`, `convert`, `identify` and `robot`, and how every command reads recordings.
 
+use std::sync::Arc;
+
 use super::*;
+use crate::cli::Host;
 use crate::cli::shared::quoted;
 use crate::recording::Clocks;
 
@@ -13,6 +16,9 @@ pub(crate) struct ReadingArguments {
     #[arg(long, value_name = "repaired|recorded", hide_possible_values = true)]
     #[arg(value_enum, help = clock_help("repaired"))]
     pub clock: Option<Clocks>,
+    /// The program in which the command runs; none for the command line
+    #[arg(skip)]
+    pub host: Option<Arc<Host>>,
 }
 
 /// Help of `--clock` for a command with this default.
