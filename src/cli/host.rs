@@ -77,7 +77,7 @@ pub fn run_in(
     host: &Arc<Host>,
     arguments: impl IntoIterator<Item = OsString>,
 ) -> Result<HostAnswer, HostError> {
-    let parsed = Arguments::try_parse_from(arguments);
+    let parsed = Arguments::read(arguments);
     let mut arguments = parsed.map_err(|refusal| HostError::Usage(usage_words(&refusal)))?;
     if let Some(reading) = reading_of(&mut arguments.command) {
         reading.host = Some(Arc::clone(host));
