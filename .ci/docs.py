@@ -4,8 +4,9 @@
     .ci/docs.py generate [--romc target/release/romc]    writes docs/reference/commands.md and docs/reference/json.md
     .ci/docs.py check [--romc target/release/romc]       these are up to date, every link leads somewhere, docs/SUMMARY.md has
                                                          every page, tables of README.md fit 80 columns
-    .ci/docs.py run [--romc ...] [PAGE ...]              runs the `sh` blocks of README.md and of the pages, each page in a copy
-                                                         of the repository's examples and models
+    .ci/docs.py run [--romc ...] [PAGE ...]              runs the `sh` blocks of README.md and of the pages, but for those of
+                                                         docs/evaluation, whose commands are in docs/numbers; each
+                                                         page in a copy of the repository's examples and models
 """
 import argparse
 import json
@@ -147,7 +148,8 @@ def blocks(page):
 
 
 def run(romc, names):
-    chosen = [ROOT / name for name in names] or [ROOT / "README.md", *pages()]
+    usual = [page for page in pages() if page.parent.name != "evaluation"]
+    chosen = [ROOT / name for name in names] or [ROOT / "README.md", *usual]
     faults = []
     for page in chosen:
         script = [(line, block) for line, block in blocks(page)]

@@ -4,13 +4,13 @@
 //! cargo bench --bench structured -- FILE.bin... [--times FILE.txt]
 //! ```
 //!
-//! A file holds one closed loop of an MPC in latent coordinates, little-endian: int32 `d, N, T, 0`;
-//! float64 lift of torques and forces (`d x 18`), decoder of joints (`12 x d`) and its bias (12), lower
-//! and upper joint limits (12 each), torque limits (12), friction, weights of positions, velocities and
-//! inputs (`d` each), factor on the last state's; then for each of `T` steps `x0 (2d)`, reference
-//! `((N+1) x 2d)`, `A (N x 2d x 2d)`, `B (N x 2d x d)`, `c (N x 2d)`, a guess of states and inputs
-//! (`(N+1) x 2d`, `N x d`), the solution's (the same) and its cost. `benches/mpc_solvers/stages.py`
-//! makes such files, and runs PIQP on them next to this program.
+//! A file holds one closed loop of an MPC in latent coordinates, little-endian: int32 `d, N, T, 0`, then float64
+//! numbers. These are the lift of torques and forces (`d x 18`), the decoder of joints (`12 x d`) and its bias (12),
+//! lower and upper joint limits (12 each), torque limits (12), friction. Weights of positions, velocities and inputs
+//! (`d` each) follow, and the factor on the last state's. Then come for each of `T` steps `x0 (2d)`, reference
+//! `((N+1) x 2d)`, `A (N x 2d x 2d)`, `B (N x 2d x d)`, `c (N x 2d)`. Each step ends with a guess of states and inputs
+//! (`(N+1) x 2d`, `N x d`), the solution's (the same) and its cost. `benches/mpc_solvers/stages.py` makes such files,
+//! and runs PIQP on them next to this program.
 //!
 //! Rows that the others imply are removed first, by linear programs. Each step starts from the last
 //! step's solution, and its time includes everything that depends on the step: writing, gains, solve. A

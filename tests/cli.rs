@@ -231,15 +231,25 @@ fn report_is_one_page_without_requests_and_its_figures_are_files() {
     assert!(!html.contains("{\"path\""), "JSON in the page");
     let reasons = value["reasons"].to_string();
     assert!(
-        reasons.contains("Its training did not see it."),
+        reasons.contains("It was not used in training."),
         "{reasons}"
     );
     let uses = ["0.1 s", "whole motion", "torques", "control"];
     assert_eq!(value["verdict"]["fit_for"], serde_json::json!(uses));
+    let first_screen = html.split("<h2 id=\"equations\"").next().expect("a part");
+    let rows =
+        first_screen.matches("<span class=\"light\" aria-hidden=\"true\">✓</span> passed</td>");
+    assert_eq!(rows.count(), 4);
+    assert!(
+        !first_screen.contains("class=\"why\"></span>"),
+        "a metric or baseline without words"
+    );
+    assert!(first_screen.contains("<figure id=\"overview\">"));
     let headline = value["headline"].as_str().expect("words");
     assert!(headline.starts_with("Fit for predictions over 0.1 s"));
     assert!(html.contains(headline), "{headline}");
     for id in [
+        "overview",
         "encoder",
         "motion_1",
         "joints_1",
@@ -1346,7 +1356,7 @@ fn compile_within_zero_tolerance_emits_the_same_bytes() {
     assert!(certificate.contains("- changes: 0\n"), "{certificate}");
     // default printing rounds, and the certificate bounds what that costs
     assert!(
-        certificate.contains("## What printing adds"),
+        certificate.contains("## Error due to rounded printing"),
         "{certificate}"
     );
 }
@@ -1537,10 +1547,7 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
         (&["--tolerance", "-0.1", "--domain", ranges], "found `-0.1`"),
         (&["--tolerance", "nan", "--domain", ranges], "found `nan`"),
         (&["--margin", "-1", "--domain", ranges], "from 0 to 100"),
-        (
-            &["--margin", "0.5", "--domain", ranges],
-            "taken as they are",
-        ),
+        (&["--margin", "0.5", "--domain", ranges], "used unchanged"),
         (
             &["--tolerance", "1%", "--domain", ranges],
             "scaled units per s^2",
@@ -1664,8 +1671,8 @@ fn held_out_jumps_and_repeated_recordings_are_said() {
     };
     let page = path(&folder, "page.html");
     for (set, expected) in [
-        ("test, 1 motion: ", "Its training did not see it."),
-        ("training, ", "Its training saw it"),
+        ("test, 1 motion: ", "It was not used in training."),
+        ("training, ", "It was used in training"),
     ] {
         let assessed = judged(&[
             "report",

@@ -435,7 +435,7 @@ fn an_encoder_without_rank_is_named_where_invariance_is_asked_of_it() {
     let note = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{note}");
     assert!(
-        note.contains("invariance is not told: Jacobian of the encoder"),
+        note.contains("known physics cannot be checked: Jacobian of the encoder"),
         "{note}"
     );
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");

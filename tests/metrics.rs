@@ -88,7 +88,7 @@ fn train_simulate_report_and_mpc_print_the_same_number_for_the_same_thing() {
         romc(&page_arguments);
         let html = std::fs::read_to_string(&page).expect("a page");
         for (name, value) in [
-            ("of the plain lift, contact", number(&lift["contact"])),
+            ("of the transpose lift, contact", number(&lift["contact"])),
             (
                 "combined loss of accuracy and size",
                 number(&figures["combined_loss"]),

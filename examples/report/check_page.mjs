@@ -1,7 +1,7 @@
 // Opens a report in headless Chromium at desktop and phone width, light and dark, and fails on
-// any fault that a reader would notice: an error, a request to elsewhere, a page wider than the
-// screen or higher than seven of them, too many sheets of paper, anything that axe-core finds, an
-// animation that does not play, a button that does not copy.
+// any fault that a reader would notice: an error, a request to elsewhere, a verdict that is not on the
+// first screen or needs its colour, a page wider than the screen or higher than eight of them, too many
+// sheets of paper, anything that axe-core finds, an animation that does not play, a button that does not copy.
 //
 //   npm install && node check_page.mjs REPORT.html [SCREENSHOT_DIR [PICTURE_DIR]]
 //
@@ -23,6 +23,8 @@ if (!file) {
 }
 /** Highest page as it opens at 1280 px, and most sheets of A4. */
 const MOST_PX = 6000, MOST_SHEETS = 8;
+/** Height of the first screen by width. */
+const SCREEN_PX = { 1280: 800, 390: 844 };
 const browser = await puppeteer.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
   args: ["--no-sandbox", "--disable-gpu"],
@@ -36,15 +38,16 @@ for (const width of [1280, 390]) {
     page.on("pageerror", (error) => fault(`error: ${error.message}`));
     page.on("console", (message) => message.type() === "error" && fault(`console: ${message.text()}`));
     page.on("request", (request) => /^(file|data):/.test(request.url()) || fault(`request: ${request.url()}`));
-    await page.setViewport({ width, height: 900, isMobile: width < 600, hasTouch: width < 600 });
+    await page.setViewport({ width, height: SCREEN_PX[width], isMobile: width < 600, hasTouch: width < 600 });
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
     await page.goto(pathToFileURL(file).href);
     const [wide, height] = await page.evaluate(() => {
       const { scrollWidth, scrollHeight } = document.documentElement;
-      return [scrollWidth - window.innerWidth, scrollHeight];
+      return [scrollWidth, scrollHeight];
     });
     console.log(`${where}: ${height} px high`);
-    if (wide > 0) fault(`${wide} px wider than the screen`);
+    if (wide > width) fault(`${wide - width} px wider than the screen`);
+    await verdict(page, width, fault);
     if (width === 1280 && height > MOST_PX) fault(`${height} px high, at most ${MOST_PX}`);
     if (screenshots) await page.screenshot({ path: `${screenshots}/report-${width}-${theme}.png`, fullPage: true });
     if (pictures) await picture(page, width, theme);
@@ -77,12 +80,24 @@ faults.forEach((text) => console.error(text));
 console.log(faults.length ? `${faults.length} faults` : "no fault at 1280 and 390 px, light, dark and printed");
 process.exit(faults.length ? 1 : 0);
 
+/** The verdict is on the first screen, with the figure at desktop width; a sign and a word state each result. */
+async function verdict(page, width, fault) {
+  const { results, bottoms } = await page.evaluate(() => ({
+    results: [...document.querySelectorAll(".uses > table tbody td:last-child")].map((cell) => cell.innerText.trim()),
+    bottoms: [".uses > table", ".first > figure svg:last-of-type"].map((part) => document.querySelector(part)?.getBoundingClientRect().bottom),
+  }));
+  if (results.length !== 4) fault(`${results.length} rows in the verdict, expected 4`);
+  results.filter((text) => !/^(✓ passed|✗ failed|– not measured)$/u.test(text)).forEach((text) => fault(`a result without sign and word: ${text}`));
+  const needed = width === 1280 ? bottoms : bottoms.slice(0, 1);
+  needed.filter((bottom) => !(bottom <= SCREEN_PX[width])).forEach((bottom) => fault(`the verdict ends at ${bottom} px`));
+}
+
 /** The first screen, and the first jump on a dark one. */
 async function picture(page, width, theme) {
   const name = { "1280-light": "top", "1280-dark": "jump", "390-light": "phone" }[`${width}-${theme}`];
   if (!name) return;
   const y = name === "jump" ? await page.$eval("#jumps", (part) => part.getBoundingClientRect().top + window.scrollY) : 0;
-  const clip = { x: 0, y, width, height: width === 390 ? 844 : 1100 };
+  const clip = { x: 0, y, width, height: name === "jump" ? 1100 : SCREEN_PX[width] };
   await page.screenshot({ path: `${pictures}/report-${name}.png`, clip, captureBeyondViewport: true });
 }
 

@@ -174,7 +174,8 @@ pub fn score(
     let recordings = gather(&recordings);
     let made = py.detach(|| -> Result<_, Error> {
         let assessment = Assessment::over(&model.data, &recordings, horizon_s)?;
-        let (verdict, unmeasured) = verdict_by_default(&model.data, &recordings, &assessment);
+        let (verdict, unmeasured) =
+            verdict_by_default(&model.data, &recordings, &assessment, |_, _| {});
         let mut json = json!(verdict);
         json["unmeasured"] = json!(unmeasured.map(|reason| reason.to_string()));
         Ok((json.to_string(), verdict_text(&verdict)))

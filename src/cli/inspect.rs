@@ -92,7 +92,7 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         note(&format!("{file}: known physics cannot be checked: {error}"));
         None
     });
-    if let Some(table) = invariance.as_ref().map(invariance_table) {
+    if let Some(table) = (invariance.as_ref()).map(|of| invariance_table(model, of)) {
         let _ = writeln!(text, "{table}");
     }
     let table = phase_table(&equations, coefficients);

@@ -92,7 +92,7 @@ fn answer(
     written: &[PathBuf],
 ) -> Answer {
     let (output, verdict) = (arguments.output.display().to_string(), content.verdict);
-    let (headline, reasons) = (&made.introduction.headline, &made.introduction.sentences);
+    let (headline, reasons) = (&made.introduction.headline, made.introduction.sentences());
     let mut text = format!(
         "{headline}\n{}\n\n{}\n{output}: {} kB, {} figures\n",
         reasons.join("\n"),
@@ -146,8 +146,8 @@ pub(super) fn page_of(
     let [ladder, equations, changes] =
         simplification::ladder(content.model, content.assessment, tolerance, &progress)?;
     progress.finish_and_clear();
-    let errors = format!("Errors of each ddz within {tolerance}, scaled units per s²");
-    let bounds = format!("Every change within {tolerance}, with its bound");
+    let errors = format!("Error of each ddz within {tolerance}, scaled units per s²");
+    let bounds = format!("Every change within {tolerance}, with the bound of its error");
     let options = PageOptions {
         commands,
         simplification: vec![
@@ -165,7 +165,7 @@ pub(super) fn page_of(
     })
 }
 
-const LADDER_CAPTION: &str = "Size of the equations within each tolerance: active terms, digits of all coefficients, operations; errors as shares of the root mean square of their ddz, the largest of all equations; errors of rollouts over whole jumps and restarted";
+const LADDER_CAPTION: &str = "Equations within each tolerance: active terms, digits of all coefficients, operations; largest error as a share of the root mean square of its ddz; errors of predictions over whole motions and restarted";
 
 fn commands(arguments: &ReportArguments, model_path: &Path, has_control: bool) -> Vec<String> {
     let (model, output) = (quoted(model_path), quoted(&arguments.output));

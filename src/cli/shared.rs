@@ -140,7 +140,11 @@ impl<'a> Inputs<'a> {
         let figures = figures()?;
         let files: Vec<EmittedFile> = figures.iter().flat_map(figure_files).collect();
         let written = self.write_folder(folder, &files, overwrite)?;
-        answer.text += &format!("{}: {}\n", counted(figures.len(), "figure"), folder.display());
+        answer.text += &format!(
+            "{}: {}\n",
+            counted(figures.len(), "figure"),
+            folder.display()
+        );
         answer.json["figures"] = names(&written).into();
         Ok(())
     }

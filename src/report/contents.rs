@@ -1,7 +1,7 @@
 //! The figures of a report: from an assessment, from the controller's runs, from a study.
 
 use super::*;
-use crate::mpc::{Lift, MpcSettings};
+use crate::mpc::{Lift, MpcSettings, settings_for};
 use crate::study::{DimensionSummary, Spread, Summary};
 
 const MAX_JUMPS: usize = 3;
@@ -11,7 +11,7 @@ pub(crate) struct Content<'a> {
     pub model: &'a ReducedModel,
     pub assessment: &'a Assessment<'a>,
     pub verdict: &'a Verdict,
-    /// The controller along each recording with the plain lift; empty if it did not run.
+    /// The controller along each recording with the transpose lift; empty if it did not run.
     pub plain: &'a [NamedRun],
     pub consistent: &'a [NamedRun],
     /// Those with the model's usual lift, by which it is judged.
@@ -24,6 +24,8 @@ pub(crate) struct Content<'a> {
 
 #[derive(Default)]
 pub(crate) struct AllFigures {
+    /// Body position over the first motion.
+    pub overview: Option<Figure>,
     pub encoder: Vec<Figure>,
     pub jumps: Vec<JumpFigures>,
     pub study: Vec<Figure>,
@@ -31,7 +33,8 @@ pub(crate) struct AllFigures {
 
 pub(crate) struct JumpFigures {
     pub title: String,
-    pub body_rms_m: [Option<f64>; 2],
+    /// Root mean square errors in body x and z over the whole motion.
+    pub body_rms: [String; 2],
     pub motion: Option<(Figure, Film)>,
     pub body: Figure,
     /// Figures to fold away, each with a title.
@@ -46,7 +49,8 @@ impl AllFigures {
             let strip = jump.motion.iter().map(|(strip, _)| strip);
             strip.chain([&jump.body]).chain(folded)
         });
-        self.encoder.iter().chain(jumps).chain(&self.study)
+        let first = self.overview.iter().chain(&self.encoder);
+        first.chain(jumps).chain(&self.study)
     }
 }
 
@@ -57,17 +61,20 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures> {
         figures.encoder.push(encoder(model, assessment, run)?);
     }
     for (index, jump) in Jump::all(content)?.into_iter().take(MAX_JUMPS).enumerate() {
+        if index == 0 {
+            figures.overview = Some(jump.overview());
+        }
         let [joints, body] = jump.coordinates();
         let mut folded = vec![
             ("Latent accelerations", jump.accelerations()?),
-            ("Beside the pendulum", jump.baselines()),
+            ("Body position with baselines", jump.baselines()),
             ("Joint angles", joints),
         ];
         let path = &jump.run.segment.path;
         let is_first = (assessment.runs[..index].iter()).all(|run| run.segment.path != *path);
-        let run = content.consistent.iter().find(|(of, _)| of == path);
+        let run = content.usual.iter().find(|(of, _)| of == path);
         if let Some((_, run)) = run.filter(|_| is_first) {
-            let torques = torques(model, Lift::Consistent, run, &jump.place);
+            let torques = torques(model, settings_for(model).lift, run, &jump.place);
             let inputs = latent_inputs(model, run, &jump.place);
             folded.extend([
                 ("Joint torques of the controller", torques),
@@ -77,7 +84,7 @@ pub(crate) fn all_figures(content: &Content<'_>) -> Result<AllFigures> {
         let plan = content.plan.filter(|_| index == 0);
         figures.jumps.push(JumpFigures {
             title: jump.place.words.clone(),
-            body_rms_m: jump.body_rms_m(),
+            body_rms: jump.body_rms(),
             motion: jump.motion(plan),
             body,
             folded,
@@ -104,7 +111,7 @@ fn encoder(
         true => "Magnitudes of the encoder's weights",
         false => "Magnitudes of the encoder's Jacobian at the first sample",
     };
-    let caption = format!("{what}: how much of each coordinate a latent one takes (scaled units).");
+    let caption = format!("{what}, by coordinate and latent coordinate (scaled units).");
     let columns = (1..=d).map(|index| format!("z{}", subscript(index)));
     let map = Panel {
         title: "|weight|".to_owned(),
@@ -210,11 +217,11 @@ pub(super) fn torques(model: &ReducedModel, lift: Lift, run: &Run, place: &JumpN
         Panel::lines(format!("{}, N m", Robot::state_names()[joint]), lines)
     };
     let lift = match lift {
-        Lift::Transpose => "plain",
+        Lift::Transpose => "transpose",
         Lift::Consistent => "consistent",
     };
     let caption = format!(
-        "Joint torques along {}: recorded, and commanded by the latent controller ({lift} lift), within the robot's limits.",
+        "Joint torques along {}: recorded, and commanded by the controller ({lift} lift); limits of the robot.",
         place.words
     );
     let legend = [
@@ -233,7 +240,7 @@ pub(super) fn latent_inputs(model: &ReducedModel, run: &Run, place: &JumpName) -
         Panel::lines(title, vec![line(run, Role::Full, chosen)])
     };
     let words = &place.words;
-    let caption = format!("Latent inputs that the controller chose along {words} (scaled units).");
+    let caption = format!("Latent inputs of the controller along {words} (scaled units).");
     let panels = (0..model.latent_dim()).map(panel).collect();
     let legend = [(Role::Full, "commanded")];
     Figure::over_time(place.id("latent_inputs"), caption, panels, &legend)
@@ -256,8 +263,7 @@ fn latent_tracking(
         Panel::lines(format!("z{}", latent + 1), vec![reference, planned])
     };
     let caption = format!(
-        "Latent positions along {} (scaled units): the reference, and what each plan expects \
-         {horizon_s} s ahead, drawn where it expects it.",
+        "Latent positions along {} (scaled units): the reference, and the end of each plan, {horizon_s} s after its step.",
         place.words
     );
     let panels = (0..model.latent_dim()).map(panel).collect();

@@ -8,18 +8,35 @@ use crate::mpc::{Lift, settings_for};
 
 pub(crate) struct Introduction {
     pub headline: String,
-    pub sentences: Vec<String>,
+    pub compared: String,
+    /// Why the model fails, where that is known.
+    pub cause: Option<String>,
+    pub subject: String,
+    pub errors: String,
+    pub template: Option<String>,
+    pub commands: Option<String>,
     pub recordings: Table,
 }
 
+impl Introduction {
+    /// All but the headline.
+    pub(crate) fn sentences(&self) -> Vec<&str> {
+        let always = [&self.subject, &self.compared, &self.errors].into_iter();
+        let others = [&self.template, &self.commands, &self.cause];
+        let all = always.chain(others.into_iter().flatten());
+        all.map(String::as_str).collect()
+    }
+}
+
 pub(crate) fn introduction(content: &Content<'_>) -> Result<Introduction> {
-    let mut sentences = vec![subject(content)?, compared(content), errors(content)];
-    sentences.extend(beside_pendulum(content));
-    sentences.extend(commands(content));
-    sentences.extend(cause(content));
     Ok(Introduction {
         headline: headline(content.verdict, !content.assessment.remarks.is_empty()),
-        sentences,
+        compared: compared(content),
+        cause: cause(content),
+        subject: subject(content)?,
+        errors: errors(content.assessment),
+        template: beside_template(content.assessment),
+        commands: commands(content),
         recordings: recordings(content)?,
     })
 }
@@ -33,7 +50,7 @@ pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
     let [fit, failed] = [&verdict.fit_for, &verdict.failed]
         .map(|uses| listed(&uses.iter().map(words).collect::<Vec<_>>()));
     let judged = match (fit.as_str(), failed.as_str()) {
-        ("", "") => "Not judged: these recordings show nothing that it predicts.".to_owned(),
+        ("", "") => "Not judged: no metric could be measured along these recordings.".to_owned(),
         (fit, "") => format!("Fit for {fit}."),
         ("", failed) => format!("Not fit for {failed}."),
         (fit, failed) => format!("Fit for {fit}; not fit for {failed}."),
@@ -44,7 +61,6 @@ pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
     }
 }
 
-/// Why the model fails, where that is known.
 fn cause(content: &Content<'_>) -> Option<String> {
     let failed = &content.verdict.failed;
     let lift_r2 = content.assessment.lift.torque.r2().contact;
@@ -54,13 +70,13 @@ fn cause(content: &Content<'_>) -> Option<String> {
         .filter(|r2| *r2 < 0.5 && failed.iter().any(|of| of == "torques"))
     {
         return Some(format!(
-            "Torques fail because encoder and decoder lose them: R^2 of recorded inputs projected and lifted is {r2:.2}."
+            "Torques fail because encoder and decoder lose them: R^2 of recorded torques, projected and lifted, is {r2:.2}."
         ));
     }
     let mut paths = content.assessment.runs.iter().map(|run| &run.segment.path);
     let are_known = paths.all(|path| seen(content, path) == Some(true));
     (are_known && !failed.is_empty()).then(|| {
-        "The model is at fault, not the recordings: its training had these very files.".to_owned()
+        "The model is at fault, not the recordings: it was trained on these files.".to_owned()
     })
 }
 
@@ -77,11 +93,11 @@ fn subject(content: &Content<'_>) -> Result<String> {
     let absent = match listed(&absent).as_str() {
         "" => String::new(),
         names => format!(
-            " {names} {are} not modelled: no latent coordinate takes them in, and errors there say nothing about the dynamics."
+            " {names} {are} not modelled: no latent coordinate contains them, so their errors do not depend on the dynamics."
         ),
     };
     Ok(format!(
-        "The model reduces the {} coordinates of {robot} to {} latent ones, with {} active terms in {} ({}).{absent}",
+        "The model reduces the {} coordinates of {robot} to {} latent coordinates, with {} active terms in {} ({}).{absent}",
         assessment.names.len(),
         model.latent_dim(),
         assessment.active_terms,
@@ -109,7 +125,7 @@ fn seen(content: &Content<'_>, path: &Path) -> Option<bool> {
     Some(known.any(|known| known == digest))
 }
 
-const FLATTERS: &str = "which flatters the figures below";
+const FLATTERS: &str = "so these errors are smaller than on new recordings";
 
 fn compared(content: &Content<'_>) -> String {
     let runs = &content.assessment.runs;
@@ -119,76 +135,81 @@ fn compared(content: &Content<'_>) -> String {
     let count = |what: bool| all_seen.iter().filter(|seen| **seen == Some(what)).count();
     let of_recordings = counted(paths.len(), "recording");
     let training = match (count(true), count(false)) {
-        (0, 0) => "The model file does not say which recordings it was made with.".to_owned(),
-        (0, 1) if paths.len() == 1 => "Its training did not see it.".to_owned(),
-        (0, _) => "Its training saw none of them.".to_owned(),
-        (1, 0) if paths.len() == 1 => format!("Its training saw it, {FLATTERS}."),
-        (yes, 0) if yes == paths.len() => format!("Its training saw all of them, {FLATTERS}."),
-        (yes, _) => format!("Its training saw {yes} of the {of_recordings}, {FLATTERS}."),
+        (0, 0) => "The model file does not name the recordings of its training.".to_owned(),
+        (0, 1) if paths.len() == 1 => "It was not used in training.".to_owned(),
+        (0, _) => "None of them was used in training.".to_owned(),
+        (1, 0) if paths.len() == 1 => format!("It was used in training, {FLATTERS}."),
+        (yes, 0) if yes == paths.len() => format!("All were used in training, {FLATTERS}."),
+        (yes, _) => format!("{yes} of the {of_recordings} were used in training, {FLATTERS}."),
     };
     let motions = counted(runs.len(), "motion");
-    format!("It is compared with {motions} of {of_recordings}, {seconds:.1} s in all. {training}")
+    format!("Compared with {motions} of {of_recordings}, {seconds:.1} s in all. {training}")
 }
 
-fn millimetres(metres: f64) -> String {
-    format!("{} mm", rounded(1e3 * metres, 2))
-}
-
-fn errors(content: &Content<'_>) -> String {
-    let assessment = content.assessment;
-    let shown = |value: Option<f64>| value.map_or("nowhere predicted".to_owned(), millimetres);
+fn errors(assessment: &Assessment<'_>) -> String {
+    let words = |sums: &CoordinateSums| match (sums.diverged, body_rms(assessment, sums)) {
+        (0, [Some(x), Some(z)]) => {
+            let [x, z] = [x, z].map(|rms| with_unit(rms, "m"));
+            format!("the root mean square error is {x} in body.x and {z} in body.z")
+        }
+        (0, _) => "the prediction does not contain the body's position".to_owned(),
+        (diverged, _) => {
+            let rollouts = counted(sums.windows, "rollout");
+            format!("the prediction diverges in {diverged} of {rollouts}")
+        }
+    };
     let (over, long) = match &assessment.over_stride {
         Some([own, ..]) => ("a stride", own),
-        None => ("whole motions", &assessment.full),
+        None => ("the whole motion", &assessment.full),
     };
-    let [long, short] = [long, &assessment.restarted].map(|sums| {
-        let [x, z] = body_rms(assessment, sums).map(shown);
-        format!("{x} in body.x and {z} in body.z")
-    });
-    let runs = assessment.runs.iter();
-    let diverged = runs.filter(|run| run.full.diverged_at_s().is_some());
-    let diverged = match diverged.count() {
-        0 => String::new(),
-        diverged => format!(" The rollout diverges in {}.", counted(diverged, "motion")),
-    };
+    let every = assessment.restart_every_s;
     format!(
-        "Driven by the recorded torques and contacts over {over}, its error is {long} (root mean square); started \
-         again every {} s from the recorded state, {short}.{diverged}",
-        assessment.restart_every_s
+        "Predictions use the recorded torques and contacts. Over {over} {}. Restarted every {every} s from the recorded \
+         state, {}.",
+        words(long),
+        words(&assessment.restarted)
     )
 }
 
-fn beside_pendulum(content: &Content<'_>) -> Option<String> {
-    let assessment = content.assessment;
-    let own = body_rms(assessment, &assessment.full);
-    let words = |(axis, name): (usize, &str)| -> Option<String> {
-        let templates = assessment.baselines.iter();
-        let errors = templates.filter_map(|template| template_rms(&template.full)[axis]);
-        let ratio = errors.reduce(f64::min)? / own[axis]?;
-        let words = match ratio {
-            1.05.. => format!("{} times closer in {name}", rounded(ratio, 2)),
-            0.96.. => format!("as close in {name}"),
-            _ => format!("{} times further off in {name}", rounded(1.0 / ratio, 2)),
-        };
-        (ratio.is_finite() && ratio > 0.0).then_some(words)
+/// The errors as shares of those of the better template.
+fn beside_template(assessment: &Assessment<'_>) -> Option<String> {
+    let best = best_template(assessment).filter(|_| assessment.full.diverged == 0)?;
+    let best = &assessment.baselines[best];
+    let (own, others) = (
+        body_rms(assessment, &assessment.full),
+        template_rms(&best.full),
+    );
+    let ratio = |axis: usize| Some(others[axis]? / own[axis]?).filter(|ratio| ratio.is_finite());
+    let words = |ratio: f64| match ratio {
+        1.05.. => format!("{} times smaller", rounded(ratio, 2)),
+        0.96.. => "equal".to_owned(),
+        _ => format!("{} times larger", rounded(1.0 / ratio, 2)),
     };
-    let words = [(0, "body.x"), (1, "body.z")].into_iter().filter_map(words);
-    let words = words.reduce(|x, z| format!("{x} and {z}"))?;
+    let (x, z, name) = (words(ratio(0)?), words(ratio(1)?), best.name);
     Some(format!(
-        "Beside the better of two spring-loaded pendulums under the same forces it is {words}."
+        "The better baseline is {name}: over whole motions the model's error is {x} in body.x and {z} in body.z."
     ))
 }
 
+/// The baseline with recorded forces that is closest to the body over whole motions.
+pub(super) fn best_template(assessment: &Assessment<'_>) -> Option<usize> {
+    let error = |baseline: &Baseline| {
+        let [x, z] = template_rms(&baseline.full);
+        Some(x?.hypot(z?))
+    };
+    let errors = assessment.baselines.iter().map(error).enumerate();
+    let errors = errors.filter_map(|(index, error)| Some((index, error?)));
+    let best = errors.min_by(|a, b| a.1.total_cmp(&b.1));
+    best.map(|(index, _)| index)
+}
+
 fn commands(content: &Content<'_>) -> Option<String> {
-    let runs = || content.consistent.iter().map(|(_, run)| run);
+    let runs = || content.usual.iter().map(|(_, run)| run);
     let steps: usize = runs().map(|run| run.summary.steps).sum();
     let solved: usize = runs().map(|run| run.summary.solved).sum();
     let limits = match runs().map(|run| run.summary.limit_violations).sum() {
-        0 => "none of its commands leaves the torque limits".to_owned(),
-        violations => format!(
-            "{} beyond the torque limits",
-            counted(violations, "command")
-        ),
+        0 => "no command exceeds the torque limits".to_owned(),
+        violations => format!("{} above the torque limits", counted(violations, "command")),
     };
     let recoveries = runs().filter_map(|run| {
         let metrics = run.metrics.as_ref()?;
@@ -198,23 +219,23 @@ fn commands(content: &Content<'_>) -> Option<String> {
     let recoveries: Vec<[f64; 2]> = recoveries.collect();
     let mean = |which: usize| {
         let sum: f64 = recoveries.iter().map(|pair| pair[which]).sum();
-        millimetres(sum / recoveries.len() as f64)
+        with_unit(sum / recoveries.len() as f64, "m")
     };
     let recovery = (!recoveries.is_empty()).then(|| {
         let (own, off) = (mean(0), mean(1));
-        format!(" After a push of 0.1 m/s the body stays off by {own} on average, and by {off} with no feedback.")
+        format!(" After a push of 0.1 m/s the body deviates by {own} on average, and by {off} without feedback.")
     });
     let recovery = recovery.unwrap_or_default();
     (steps > 0).then(|| {
         format!(
-            "Along these recordings the latent controller solves {solved} of {steps} steps, and {limits}.{recovery}"
+            "Along these recordings the controller solves {solved} of {steps} steps, and {limits}.{recovery}"
         )
     })
 }
 
 fn recordings(content: &Content<'_>) -> Result<Table> {
     let rows = Jump::all(content)?.into_iter().map(|jump| {
-        let rms = jump.body_rms_m();
+        let rms = jump.body_rms();
         (jump.place.words, &*jump.run.segment, rms)
     });
     let names = &content.assessment.names;
@@ -227,10 +248,9 @@ fn recordings(content: &Content<'_>) -> Result<Table> {
     };
     let travelled = |values: &[f64]| values[values.len() - 1] - values[0];
     let risen = |values: &[f64]| values.iter().copied().fold(f64::MIN, f64::max) - values[0];
-    let shown = |rms: Option<f64>| rms.map(|rms| rounded(1e3 * rms, 2).to_string());
     let table = Table::of(rows)
         .column("recording", "", |(words, ..)| words.clone())
-        .column("seen in training", "", |(_, s, _)| {
+        .column("used in training", "", |(_, s, _)| {
             match seen(content, &s.path) {
                 Some(true) => "yes",
                 Some(false) => "no",
@@ -241,12 +261,13 @@ fn recordings(content: &Content<'_>) -> Result<Table> {
             format!("{:.2}", s.duration_s())
         })
         .column("forward", "m", |(_, s, _)| moved(x, travelled, s))
-        .column("rise of the body", "m", |(_, s, _)| moved(z, risen, s))
-        .column("body.x rms, whole motion", "mm", |(.., rms)| shown(rms[0]))
-        .column("body.z rms, whole motion", "mm", |(.., rms)| shown(rms[1]))
+        .column("rise", "m", |(_, s, _)| moved(z, risen, s))
+        .column("error of body.x", "", |(.., rms)| rms[0].clone())
+        .column("error of body.z", "", |(.., rms)| rms[1].clone())
         .table();
     let count = counted(table.rows.len(), "motion");
-    Ok(table.captioned(format!("{count} of the recordings")))
+    let words = "root mean square errors over the whole motion";
+    Ok(table.captioned(format!("{count} of the recordings; {words}")))
 }
 
 #[cfg(test)]

@@ -1,12 +1,14 @@
-//! The figures of one jump: recorded beside predicted, pendulums, robots as sticks.
+//! The figures of one motion: recorded and predicted, baselines, robots as sticks.
 
 use nalgebra::DVector;
 
+use super::introduction::best_template;
 use super::tables::file_name;
 use super::*;
 use crate::sim::Rollout;
 
 const FRAMES: usize = 10;
+const FARTHEST_M: f64 = 1.0; // from the recorded body, at which a predicted robot is drawn
 
 pub(crate) fn modelled(model: &ReducedModel, run: &SegmentRun<'_>) -> Result<Vec<bool>> {
     let weights = model.encoder_jacobian(&run.segment.x.column(0).into_owned())?;
@@ -107,12 +109,17 @@ impl<'a> Jump<'a> {
         ))
     }
 
-    /// Coordinates that the model does not encode stay as recorded.
+    /// Predicted states near the recording; coordinates that the model does not encode stay as recorded.
     fn states(&self) -> Samples {
         let recorded = &self.run.segment.x;
         let mut states = self.full.clone();
-        for (sample, state) in states.iter_mut().enumerate() {
-            let Some(state) = state else { continue };
+        for (sample, of_sample) in states.iter_mut().enumerate() {
+            let distance_m = |state: &DVector<f64>| {
+                let [x, z] = [BODY_X, BODY_Z].map(|row| state[row] - recorded[(row, sample)]);
+                x.hypot(z)
+            };
+            *of_sample = of_sample.take_if(|state| distance_m(state) < FARTHEST_M);
+            let Some(state) = of_sample else { continue };
             for row in (0..STATE_DIM).filter(|&row| !self.modelled[row]) {
                 state[row] = recorded[(row, sample)];
             }
@@ -177,10 +184,7 @@ impl<'a> Jump<'a> {
             self.panel(format!("{title} (not modelled)"), vec![line])
         };
         let figure = |id: &str, what: &str, rows: std::ops::Range<usize>| {
-            let (of, words) = (
-                &self.place.words,
-                "recorded, and decoded from the model's rollouts",
-            );
+            let (of, words) = (&self.place.words, "recorded, and predicted by the model");
             let caption = format!("{what} of {of}: {words}. Grey: flight.");
             self.rollout_figure(id, caption, rows.map(panel).collect())
         };
@@ -213,44 +217,82 @@ impl<'a> Jump<'a> {
         Ok(self.rollout_figure("latent_accelerations", caption, panels))
     }
 
-    /// Figure 8 of the paper, with the fitted pendulum beside the published one.
-    pub(crate) fn baselines(&self) -> Figure {
-        let run = self.run;
-        let roles = [Role::Baseline, Role::SecondBaseline];
+    /// Body position of the recording, the model and baselines under the same recorded forces.
+    fn body_path(&self, id: &str, shown: &[usize]) -> Figure {
+        let (run, every) = (self.run, &self.assessment.baselines);
+        let roles = [Role::Baseline, Role::SecondBaseline].into_iter();
+        let baselines: Vec<(Role, usize)> = roles.zip(shown.iter().copied()).collect();
         let panel = |row: usize, axis: usize, title: &str| {
             let mut lines = vec![
                 self.series(Role::Recorded, |k| Some(run.segment.x[(row, k)])),
                 self.series(Role::Full, |k| self.full[k].as_ref().map(|x| x[row])),
             ];
-            for (role, rollout) in roles.into_iter().zip(&run.baselines) {
-                lines.push(self.series(role, |k| rollout[k].map(|at| at[axis])));
-            }
+            let others = baselines.iter().map(|&(role, index)| {
+                let rollout = &run.baselines[index];
+                self.series(role, |k| rollout[k].map(|at| at[axis]))
+            });
+            lines.extend(others);
             self.panel(title, lines)
         };
-        let mut legend = vec![
-            (Role::Recorded, "recorded"),
-            (Role::Full, "model, whole motion"),
-        ];
-        let names = self.assessment.baselines.iter().map(|b| b.name);
-        legend.extend(roles.into_iter().zip(names));
-        let caption = format!(
-            "Body position of {}: the learned model and the pendulum under the same recorded forces.",
-            self.place.words
+        let model = match run.full.diverged_at_s() {
+            Some(time_s) => format!("model: diverges at {time_s:.2} s"),
+            None => "model".to_owned(),
+        };
+        let mut legend = vec![(Role::Recorded, "recorded"), (Role::Full, &model)];
+        legend.extend(
+            baselines
+                .iter()
+                .map(|&(role, index)| (role, every[index].name)),
         );
-        let (x, z) = (panel(BODY_X, 0, "body.x, m"), panel(BODY_Z, 1, "body.z, m"));
-        let figure = Figure::over_time(self.place.id("aslip"), caption, vec![x, z], &legend);
+        let meanings = shown.iter().map(|&index| meaning(&every[index]));
+        let caption = format!(
+            "{}: body position predicted from the first sample with the recorded torques. {}Grey: flight.",
+            self.place.words,
+            meanings.collect::<String>()
+        );
+        let (x, z) = ("forward position, m", "body height, m");
+        let panels = vec![panel(BODY_X, 0, x), panel(BODY_Z, 1, z)];
+        Figure::over_time(id, caption, panels, &legend)
+    }
+
+    /// Figure 8 of the paper, with fitted constants next to the published ones.
+    pub(crate) fn baselines(&self) -> Figure {
+        let every: Vec<usize> = (0..self.assessment.baselines.len()).collect();
+        let figure = self.body_path(&self.place.id("aslip"), &every);
         figure.in_columns(2, (360.0, 180.0))
     }
 
-    pub(crate) fn body_rms_m(&self) -> [Option<f64>; 2] {
+    /// The same with the best baseline alone, for the first screen.
+    pub(super) fn overview(&self) -> Figure {
+        let best = best_template(self.assessment);
+        let mut figure = self.body_path("overview", best.as_slice());
+        figure.panels.reverse();
+        figure.in_columns(1, (330.0, 140.0))
+    }
+
+    /// Root mean square errors in body x and z over the whole motion.
+    pub(crate) fn body_rms(&self) -> [String; 2] {
         let of = |row: usize| {
             let mut sums = FitSums::default();
             let states = self.full.iter().enumerate();
             for (sample, state) in states.filter_map(|(k, state)| Some((k, state.as_ref()?))) {
                 sums.add(self.run.segment.x[(row, sample)], state[row]);
             }
-            sums.fit().map(|fit| fit.rms)
+            let diverged = self.run.full.diverged_at_s().map(|_| f64::INFINITY);
+            let rms = diverged.or(sums.fit().map(|fit| fit.rms));
+            rms.map_or("-".to_owned(), |rms| with_unit(rms, "m"))
         };
         [BODY_X, BODY_Z].map(of)
     }
+}
+
+/// A line about a baseline that has the recorded forces.
+pub(super) fn meaning(baseline: &Baseline) -> String {
+    let kind = match baseline.template.stiffness_n_m {
+        0.0 => "a mass under gravity and the recorded forces of the feet",
+        _ => "a mass on a spring leg under gravity and the recorded forces of the feet",
+    };
+    let mut name = baseline.name.to_owned();
+    name[..1].make_ascii_uppercase();
+    format!("{name}: {kind}. ")
 }

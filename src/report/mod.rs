@@ -1,8 +1,7 @@
 //! A one-page assessment of a model, its tables and its figures.
 //!
 //! An assessment and controller runs come in; a self-contained HTML page and figures leave. `log.rs` makes another page of
-//! a generated controller's log. `introduction.rs` has the
-//! first words, `tables.rs` holds the tables and the same numbers for programs, `contents.rs` and `jump.rs` pick
+//! a generated controller's log. `introduction.rs` and `verdict.rs` have the first screen, `tables.rs` holds the tables and the same numbers for programs, `contents.rs` and `jump.rs` pick
 //! what is drawn, `figures/` draws it, `sections.rs` and `page.rs` place all. Start with `page.rs`. What this file
 //! imports is what its files import with `use super::*`.
 
@@ -15,6 +14,7 @@ mod page;
 mod plan;
 mod sections;
 mod tables;
+mod verdict;
 
 pub(crate) use contents::{
     Content, all_figures, control_figures, study_figures, without_statistics,
@@ -42,14 +42,14 @@ use jump::{Jump, JumpName, modelled};
 use serde_json::{Map, Value, json};
 
 use crate::evaluate::{
-    AFTER_A_PUSH, AslipSums, Assessment, Baseline, ByContact, ControlMetrics, CoordinateSums, Fit,
-    FitSums, Horizon, Invariance, LinearisedPhase, PredictionError, Run, SegmentRun, StepRow,
-    TORQUES_IN_CONTACT, Verdict,
+    AslipSums, Assessment, Baseline, ByContact, ControlMetrics, CoordinateSums, Fit, FitSums,
+    Horizon, Invariance, LinearisedPhase, PredictionError, Run, SegmentRun, StepRow, Verdict,
+    VerdictRow, with_unit,
 };
 use crate::model::{JumpPrior, ModelError, ReducedModel};
 use crate::plan::{GoalMap, MappedWalk, Plan, WalkMap};
 use crate::recording::{Segment, stretches};
-use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, Robot, STATE_DIM};
+use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2, JOINT_DIM, Robot, STATE_DIM};
 use crate::typeset::mathml::{HTML, HtmlProse, HtmlText, system};
 use crate::typeset::words::{counted, feet, rendered, rounding};
 use crate::typeset::{

@@ -3,7 +3,8 @@
 use askama::Template;
 
 use super::introduction::listed;
-use super::sections::{Section, sections, tiles};
+use super::sections::{Section, sections};
+use super::verdict::{Light, UseRow, total, use_rows, verdict_table};
 use super::*;
 use crate::artifact;
 use crate::equations::{Equations, PhaseEquations};
@@ -25,28 +26,62 @@ pub(crate) fn page(
     options: &PageOptions,
 ) -> Result<String, TypesetError> {
     let model = content.model;
-    let equations = &Equations::of(model);
-    let typeset = Typeset::new(equations, &SymbolTable::default(), Rounding::default());
-    let words = model.latent_words().into_iter().zip(1..);
-    let words = words.map(|(words, number)| format!("z{number}: {words}"));
+    let scaled = &Equations::of(model);
+    let physical = scaled.in_physical_units();
+    let typeset = |of, rounding| Typeset::new(of, &SymbolTable::default(), rounding);
+    let (shown, rule) = match &physical {
+        Ok(physical) => (physical, Rounding::PHYSICAL),
+        Err(_) => (scaled, Rounding::default()),
+    };
+    let printed = typeset(shown, rule);
+    let in_file = (physical.is_ok()).then(|| typeset(scaled, Rounding::default()));
+    let invariance = Invariance::of(model);
+    let not_checked = (invariance.as_ref().err())
+        .map(|error| format!("Known physics cannot be checked: {error}."));
+    let (light, passed) = total(content.verdict);
     let page = Page {
         model,
         version: env!("CARGO_PKG_VERSION"),
         digest: artifact::digest(model).to_string(),
         introduction,
-        tiles: tiles(content),
-        coordinates: words.collect(),
+        light,
+        passed,
+        uses: use_rows(content.verdict),
+        verdict: verdict_table(content.verdict).captioned("Every row of the verdict"),
+        overview: &figures.overview,
+        coordinates: coordinates(shown),
         remarks: &content.assessment.remarks,
-        phases: alike(typeset.systems.iter().zip(&equations.phases)),
-        rounding: rounding(&HTML, Rounding::default(), &typeset.rounding),
+        phases: alike(printed.systems.iter().zip(&shown.phases)),
+        rounding: rounding(&HTML, rule, &printed.rounding),
+        not_physical: (physical.as_ref().err()).map(ToString::to_string),
+        scaled: (in_file.iter())
+            .flat_map(|typeset| alike(typeset.systems.iter().zip(&scaled.phases)))
+            .collect(),
+        physics: (invariance.ok().flatten()).map(|of| invariance_table(model, &of)),
+        not_checked,
         jumps: &figures.jumps,
         rest: content.assessment.runs.len() - figures.jumps.len(),
-        sections: sections(content, figures, options),
+        sections: sections(content, introduction, figures, options),
         origin: origin(model.provenance()),
         commands: &options.commands,
     };
     Ok(rendered(&page)?)
 }
+
+/// Quantity and unit of each latent coordinate and its input; empty where the model does not determine them.
+fn coordinates(equations: &Equations<'_>) -> Vec<String> {
+    let words = equations.latent_words().into_iter().enumerate();
+    let words = words.map(|(index, words)| {
+        let unit = equations.latent_units().map(|units| units.input[index]);
+        let number = index + 1;
+        let input = unit.map(|unit| format!("; input u{number} in {unit}"));
+        format!("z{number}: {words}{}", input.unwrap_or_default())
+    });
+    words.collect()
+}
+
+/// Equations with the phases that have them.
+type Alike<'a> = Vec<(&'a EquationSystem, Vec<&'a PhaseEquations>)>;
 
 #[derive(Template)]
 #[template(path = "report/page.askama", config = "templates/askama.toml")]
@@ -55,13 +90,21 @@ struct Page<'a> {
     version: &'static str,
     digest: String,
     introduction: &'a Introduction,
-    tiles: Vec<(String, String)>,
-    /// Quantity and unit of each latent coordinate; empty where the model does not determine them.
+    light: Light,
+    passed: String,
+    uses: Vec<UseRow>,
+    verdict: Table,
+    overview: &'a Option<Figure>,
     coordinates: Vec<String>,
     remarks: &'a [String],
-    /// Equations with the phases that have them.
-    phases: Vec<(&'a EquationSystem, Vec<&'a PhaseEquations>)>,
+    phases: Alike<'a>,
     rounding: String,
+    /// Why the equations are in the scaled units of the model file.
+    not_physical: Option<String>,
+    /// The same in the units of the model file, if those are others.
+    scaled: Alike<'a>,
+    physics: Option<Table>,
+    not_checked: Option<String>,
     jumps: &'a [JumpFigures],
     rest: usize,
     sections: Vec<Section<'a>>,
@@ -77,19 +120,9 @@ pub(super) fn prose(text: &str) -> String {
     HtmlProse(text).to_string()
 }
 
-fn errors(jump: &JumpFigures) -> String {
-    let [x, z] = jump.body_rms_m.map(|rms| match rms {
-        Some(rms) => format!("{} mm", rounded(1e3 * rms, 2)),
-        None => "nothing predicted".to_owned(),
-    });
-    format!("body x off by {x}, body z by {z} over the whole motion")
-}
-
 /// Phases of the same equations together, each list where its first phase is.
-fn alike<'a>(
-    phases: impl Iterator<Item = (&'a EquationSystem, &'a PhaseEquations)>,
-) -> Vec<(&'a EquationSystem, Vec<&'a PhaseEquations>)> {
-    let mut groups: Vec<(&EquationSystem, Vec<&PhaseEquations>)> = Vec::new();
+fn alike<'a>(phases: impl Iterator<Item = (&'a EquationSystem, &'a PhaseEquations)>) -> Alike<'a> {
+    let mut groups: Alike<'_> = Vec::new();
     for (system, phase) in phases {
         let known = groups
             .iter_mut()
@@ -106,6 +139,10 @@ fn title(phases: &[&PhaseEquations]) -> String {
     let names: Vec<String> = phases.iter().map(|phase| html(&phase.name)).collect();
     let word = if names.len() == 1 { "Phase" } else { "Phases" };
     format!("{word} {}", listed(&names))
+}
+
+fn active(phase: &PhaseEquations) -> String {
+    counted(phase.active_count(), "active term")
 }
 
 fn holds(phase: &PhaseEquations) -> String {

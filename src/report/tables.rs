@@ -206,40 +206,37 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
 const ROUNDED: f64 = 1e-9; // below, a difference is the rounding of zero
 
 /// Gravity, mass and symmetries of the equations, which nothing gave them.
-pub(crate) fn invariance_table(invariance: &Invariance) -> Table {
+pub(crate) fn invariance_table(model: &ReducedModel, invariance: &Invariance) -> Table {
     let phases = invariance.phases.iter();
     let worst = |of: fn(&PhaseInvariance) -> f64| {
         let worst = phases.clone().map(of).fold(0.0, f64::max);
         Some(if worst < ROUNDED { 0.0 } else { worst })
     };
+    let mass_kg = model.robot().ok().map(Robot::mass_kg);
+    let (in_x, in_y) = (worst(|of| of.shift_x), worst(|of| of.shift_y));
     let rotation = invariance.rotation_rad_s2_per_nm;
     let joints = Some(invariance.joint_shift_rad_m);
+    let mirrored = worst(|of| of.mirror_asymmetry);
+    let (gravity, zero) = (Some(GRAVITY_M_S2), Some(0.0));
     let rows = [
-        ("gravity in flight", "m/s^2", invariance.gravity_m_s2),
-        ("mass", "kg", invariance.mass_kg),
-        ("pitch acceleration per moment", "rad/s^2 per N m", rotation),
-        ("joints moved by a body 1 m further on", "rad", joints),
+        ("gravity in flight, m/s^2", invariance.gravity_m_s2, gravity),
+        ("mass, kg", invariance.mass_kg, mass_kg),
         (
-            "acceleration changed by a shift in x",
-            "1/s^2",
-            worst(|phase| phase.shift_x),
+            "pitch acceleration per moment, rad/s^2 per N m",
+            rotation,
+            None,
         ),
-        (
-            "acceleration changed by a shift in y",
-            "1/s^2",
-            worst(|phase| phase.shift_y),
-        ),
-        (
-            "difference between mirror images",
-            "m/s^2",
-            worst(|phase| phase.mirror_asymmetry),
-        ),
+        ("joints moved by a body 1 m further on, rad", joints, zero),
+        ("acceleration changed by a shift in x, 1/s^2", in_x, zero),
+        ("acceleration changed by a shift in y, 1/s^2", in_y, zero),
+        ("difference between mirror images, m/s^2", mirrored, zero),
     ];
-    Table::of(rows)
-        .column("known physics", "", |row| format!("{}, {}", row.0, row.1))
-        .column("value", "", |row| row.2.map(significant))
+    Table::of(rows.into_iter().filter(|row| row.1.is_some()))
+        .column("known physics", "", |row| row.0)
+        .column("equations", "", |row| row.1.map(significant))
+        .column("known value", "", |row| row.2.map(significant))
         .table()
-        .captioned("Known physics that the equations reproduce")
+        .captioned("Read off the equations, compared with known values")
 }
 
 type Driven<'a> = (
@@ -298,35 +295,6 @@ pub(crate) fn failures(runs: &[NamedRun]) -> Vec<String> {
 
 pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
     of_runs(runs, Run::failure)
-}
-
-pub(crate) fn verdict_table(verdict: &Verdict) -> Table {
-    let number = |value: Option<f64>| match value {
-        Some(value) if !value.is_finite() => "diverges".to_owned(),
-        value => value.map_or("-".to_owned(), significant),
-    };
-    Table::of(&verdict.rows)
-        .column("for", "", |row| &row.of)
-        .column("figure", "", |row| match row.unit {
-            "" => row.name.clone(),
-            unit => format!("{}, {unit}", row.name),
-        })
-        .column("model", "", |row| number(row.value))
-        .column("needed", "", |row| {
-            format!("{} {}", row.bound.words(), significant(row.threshold))
-        })
-        .column("baseline", "", |row| {
-            let baseline = row.baseline.map(significant);
-            baseline.map(|baseline| format!("{baseline}, {}", row.baseline_name))
-        })
-        .column("result", "", |row| match (row.passed, row.counts) {
-            (None, _) => "not measured".to_owned(),
-            (Some(true), true) => "passed".to_owned(),
-            (Some(false), true) => "failed".to_owned(),
-            (Some(true), false) => format!("better than {}, does not count", row.baseline_name),
-            (Some(false), false) => format!("worse than {}, does not count", row.baseline_name),
-        })
-        .table()
 }
 
 /// The verdict in one line, then a line for each of its rows that is not passed.

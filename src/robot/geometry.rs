@@ -193,8 +193,8 @@ impl Robot {
         &self.legs[leg.index()]
     }
 
-    /// Sign of a joint's angle on the right in a mirrored motion: 1 if both sides turn with the same sign (the usual
-    /// flexions), -1 if with opposite signs (abductions about the same axis).
+    /// Sign of a joint's angle on the right in a mirrored motion. It is 1 if both sides turn with the same sign (the
+    /// usual flexions), and -1 if with opposite signs (abductions about the same axis).
     pub fn mirror_sign(&self, joint: usize) -> f64 {
         let of_pair = |leg: Leg| self.geometry(leg).axes[joint % LEG_JOINT_DIM];
         let (left, right) = match joint / LEG_JOINT_DIM < 2 {

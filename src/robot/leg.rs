@@ -331,8 +331,8 @@ fn write_moment(hip: &[Real], foot: &[Real], force: &[Real], moment: &mut [Real]
     moment[2] = arm[0] * force[1] - arm[1] * force[0];
 }
 
-/// Writes rows of two maps at an attitude of roll, pitch and yaw (rad): the rotation from the body's axes to the
-/// world's, and the map from moments about the body's axes to the generalised moments of roll, pitch and yaw.
+/// Writes rows of two maps at an attitude of roll, pitch and yaw (rad). The first is the rotation from the body's axes
+/// to the world's. The second maps moments about the body's axes to the generalised moments of roll, pitch and yaw.
 pub(crate) fn write_world_axes(
     attitude: &[Real],
     turned: &mut [[Real; 3]; 3],

@@ -1,8 +1,8 @@
 //! From joint torques to the force and moment on the body; rules on which feet are on the ground.
 //!
 //! Equation 4 with the sign of a reaction: the feet push the ground with `J^-T tau`, the ground pushes the body with
-//! `F_k = -J_k^-T tau_k`. Forces are in axes parallel to the body's; the moment is `x_k x F_k` (the paper prints `F_k x
-//! x_k`) with the foot in its own hip frame as the arm, as in the recordings the method was published with.
+//! `F_k = -J_k^-T tau_k`. Forces are in axes parallel to the body's. The moment is `x_k x F_k` (the paper prints
+//! `F_k x x_k`). Its arm is the foot in its own hip frame, as in the recordings the method was published with.
 
 use std::fmt;
 

@@ -775,8 +775,8 @@ static MAYBE_UNUSED void online_turn_leg(const online_leg_shape *leg, const real
     }
 }
 
-/* Writes rows of two maps at an attitude of roll, pitch and yaw (rad): the rotation from the body's axes to the
- * world's, and the map from moments about the body's axes to the generalised moments of roll, pitch and yaw. */
+/* Writes rows of two maps at an attitude of roll, pitch and yaw (rad). The first is the rotation from the body's axes
+ * to the world's. The second maps moments about the body's axes to the generalised moments of roll, pitch and yaw. */
 static MAYBE_UNUSED void online_write_world_axes(const real *attitude, real turned[restrict 3][3],
         real rates[restrict 3][3])
 {

@@ -68,8 +68,8 @@ typedef struct {
     real softness;
 } solver_links;
 
-/* Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, and columns 8 to
- * 11 of the rows from the eighth on. Entries right of the diagonal are not read. */
+/* Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, columns 8 to 11
+ * of those from the eighth on. Entries right of the diagonal are not read. */
 typedef struct {
     real blocks[SOLVER_WIDE / 4][NU][4];
 } solver_lower;

@@ -67,6 +67,7 @@ fn exit_codes_follow_the_purpose_of_each_command_and_the_verdict_is_the_same_in_
     fs::write(&doubled, model.to_string()).expect("writable");
     let all: &[&str] = &["0.1 s", "whole motion", "torques", "control"];
     let (predictions, control) = all.split_at(2);
+    let mut baselines = Vec::new();
     for (model, codes, fit, failed) in [
         (MODEL, [0, 0, 0], all, &[][..]),
         (without_torques, [0, 1, 0], predictions, control),
@@ -95,9 +96,15 @@ fn exit_codes_follow_the_purpose_of_each_command_and_the_verdict_is_the_same_in_
                 assert!(rows.iter().all(|row| row.get(key).is_some()), "{key}");
             }
         }
+        let predictions = verdicts[0]["rows"].as_array().expect("rows").iter();
+        let predictions = predictions.filter(|row| row["unit"] == "m" && row["use"] != "control");
+        let of_predictions: Vec<Value> = predictions.map(|row| row["baseline"].clone()).collect();
+        baselines.push(of_predictions);
         assert_eq!(verdicts[0], verdicts[1], "{model}");
         assert_eq!(verdicts[0], verdicts[2], "{model}");
     }
+    assert_eq!(baselines[0].len(), 4);
+    assert_eq!(baselines[0], baselines[2], "a rollout that diverges");
     headlines_say_it(
         &page,
         [
@@ -161,6 +168,11 @@ fn every_line_of_a_runaway_prediction_stays_inside_the_frame() {
         "--figures",
         &figures,
     ]);
+    let html = fs::read_to_string(&page).expect("written");
+    for words in ["<strong>0 of 4 passed.</strong>", "model: diverges at "] {
+        assert!(html.contains(words), "{words}");
+    }
+    assert!(!html.contains("000 mm"), "a length that nobody reads");
     let read = |name: &str| fs::read_to_string(format!("{figures}/{name}")).expect("drawn");
     let body = read("body_1.csv");
     let full = body

@@ -212,7 +212,7 @@ fn import_of_a_deeper_network_names_its_layers() {
         message(deeper, |_| {}),
         "m.safetensors: found `encoder.0.weight` (64 x 5), `encoder.2.weight` (2 x 64), the layers \
          of a deeper encoder, expected one linear layer, or --activation NAME (elu, relu, gelu, silu, \
-         softplus, tanh, sigmoid) to say what is between them"
+         softplus, tanh, sigmoid) for the activation between them"
     );
 }
 
@@ -298,7 +298,8 @@ fn import_of_layers_that_are_no_chain_or_of_one_layer_is_refused() {
     let elu = |options: &mut ImportOptions| options.activation = Some(Activation::Elu);
     let text = message(broken, elu);
     assert!(
-        text.contains("each taking the outputs of the one before") && text.contains("(2 x 3)"),
+        text.contains("each with the outputs of the previous one as inputs")
+            && text.contains("(2 x 3)"),
         "{text}"
     );
     let text = message(|_| {}, elu);

@@ -843,7 +843,7 @@ fn logs_of_other_formats_are_named_with_the_line_that_converts_them() {
         ] {
             let error = reader.read(&path).unwrap_err().to_string();
             assert!(
-                error.contains(words) && error.contains("this makes one"),
+                error.contains(words) && error.contains("convert the file with"),
                 "{name}: {error}"
             );
         }

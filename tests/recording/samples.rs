@@ -233,7 +233,7 @@ mod reading {
         notes.add(&reading(None, "b"));
         let lines = notes.lines();
         assert_eq!(lines.len(), 3);
-        assert!(lines[0].contains("1.10 to 1.24 s in a recorded second in 2 of 3 recordings"));
+        assert!(lines[0].contains("1.10 to 1.24 s per recorded second in 2 of 3 recordings"));
         assert!(lines[0].contains("uneven steps are resampled in 1 of 3 recordings"));
         assert_eq!(lines[1], "a in 2 of 3 recordings");
     }

@@ -127,7 +127,7 @@ impl Equations<'_> {
     }
 
     /// Quantity and unit of each latent coordinate of these equations; empty where the model does not determine them.
-    pub(crate) fn latent_words(&self) -> Vec<LatentWords> {
+    pub fn latent_words(&self) -> Vec<LatentWords> {
         let scaled = self.in_scaled_units().model.latent_words();
         let Some(units) = self.latent_units() else {
             return scaled;

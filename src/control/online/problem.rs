@@ -230,9 +230,10 @@ pub(super) fn turn_force(
 impl StageRows {
     /// The rows for a model on its robot.
     ///
-    /// By default two kinds are omitted: rows that the others imply to within 2 % of the limit, and torque rows that no
-    /// input within `INPUT_REACH` standard deviations of the training inputs reaches in any phase. Plans may exceed
-    /// these limits by 2 %, with an input unlike any in training, or with large losses. Clamped commands do not.
+    /// By default two kinds are omitted. The first are rows that the others imply to within 2 % of the limit. The
+    /// second are torque rows that no input within `INPUT_REACH` standard deviations of the training inputs reaches in
+    /// any phase. Plans may exceed these limits by 2 %, with an input unlike any in training, or with large losses.
+    /// Clamped commands do not.
     pub fn new(plant: &ControlModel, settings: &MpcSettings) -> Self {
         Self::of_settings(plant, settings, row_selection(plant, settings))
     }

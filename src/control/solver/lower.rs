@@ -3,8 +3,8 @@
 use super::riccati::{WIDE, add_multiple};
 use super::scalar::Real;
 
-/// Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, and columns 8 to
-/// 11 of the rows from the eighth on. Entries right of the diagonal are not read.
+/// Blocks of four columns: columns 0 to 3 of every row, columns 4 to 7 of the rows from the fourth on, columns 8 to 11
+/// of those from the eighth on. Entries right of the diagonal are not read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lower<T, const NU: usize> {
     blocks: [[[T; 4]; NU]; WIDE / 4],

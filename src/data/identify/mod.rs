@@ -1,6 +1,6 @@
 //! Identification of the robot from recordings: gravity, mass, the joints' losses, the legs' own inertia. In:
 //! recordings and the robot's geometry. Out: an [`Identification`], each value with its standard error, and its file.
-//! Read `estimate` first, the loop around the fit and the rejection of recordings that contradict each other;
+//! Read `estimate` first, the loop around the fit and the rejection of recordings that contradict each other.
 //! `equations` has the linear equations of every sample, `windows` their averages, `fit` the weighted least squares.
 //! `docs/explanation/identification.md` has the method and measured values.
 //!

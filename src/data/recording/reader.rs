@@ -1,5 +1,5 @@
 //! From files to recordings: by romc's own names or a map of columns, with clocks as stamped or repaired. romc's own
-//! text uses `;` or tabs with decimal comma or point, or `,` with decimal point, detected from the header. Columns are
+//! text has `;` or tabs with decimal comma or point, or `,` with decimal point; the header decides. Columns are
 //! identified by name in any order, gzip by the first two bytes. Memory is bounded by the samples kept.
 
 use std::sync::Arc;

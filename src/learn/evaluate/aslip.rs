@@ -22,10 +22,12 @@ impl Aslip {
     };
 
     pub fn constants(&self) -> String {
-        format!(
-            "m = {:.2} kg, k_s = {:.1} N/m, l_0 = {:.3} m, g = {:.2} m/s^2",
-            self.mass_kg, self.stiffness_n_m, self.rest_length_m, self.gravity_m_s2
-        )
+        let spring = match (self.stiffness_n_m, self.rest_length_m) {
+            (0.0, _) => String::new(),
+            (stiffness, length) => format!("k_s = {stiffness:.1} N/m, l_0 = {length:.3} m, "),
+        };
+        let (mass, gravity) = (self.mass_kg, self.gravity_m_s2);
+        format!("m = {mass:.2} kg, {spring}g = {gravity:.2} m/s^2")
     }
 
     fn acceleration(&self, position: Vector2<f64>, stance: Option<Stance>) -> Vector2<f64> {

@@ -74,6 +74,12 @@ impl Mean {
     }
 }
 
+/// Every sample of a rollout's windows, with the first of its window.
+fn samples_of_windows(rollout: &Rollout) -> impl Iterator<Item = (usize, usize)> {
+    let windows = rollout.windows.iter().map(|window| window.samples.clone());
+    windows.flat_map(|samples| samples.clone().map(move |sample| (samples.start, sample)))
+}
+
 /// State at a sample if the robot kept its velocity from `start` on.
 pub(super) fn coasted(segment: &Segment, start: usize, sample: usize) -> DVector<f64> {
     let elapsed_s = segment.time_s[sample] - segment.time_s[start];
@@ -117,15 +123,15 @@ impl CoordinateSums {
         Ok(())
     }
 
-    /// Adds residuals of the constant velocity at the start of each window, over the samples that `rollout` predicts.
+    /// Adds residuals of the constant velocity at the start of each window of `rollout`, whether or not that diverges.
     pub(super) fn add_constant_velocity(
         &mut self,
         segment: &Segment,
         latent: &LatentSegment,
         rollout: &Rollout,
     ) {
-        for (sample, window, _) in rollout.predictions() {
-            let x = coasted(segment, window.samples.start, sample);
+        for (start, sample) in samples_of_windows(rollout) {
+            let x = coasted(segment, start, sample);
             self.add(segment, sample, latent.phase[sample], &x);
         }
         self.windows += rollout.windows.len();
@@ -139,8 +145,7 @@ impl CoordinateSums {
         latent: &LatentSegment,
         rollout: &Rollout,
     ) -> Result<(), ModelError> {
-        for (sample, window, _) in rollout.predictions() {
-            let start = window.samples.start;
+        for (start, sample) in samples_of_windows(rollout) {
             let passed_s = latent.time_s[sample] - latent.time_s[start];
             let z = latent.z.column(start) + latent.dz.column(start) * passed_s;
             self.add(segment, sample, latent.phase[sample], &model.decode(&z)?);

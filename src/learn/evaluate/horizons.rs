@@ -368,9 +368,9 @@ fn moved_by(
     })
 }
 
-/// A linear inverted pendulum over the middle `p` of the feet on the ground: `ddx = (g / h) (x - p_x)` and likewise
-/// `y`, with the mean height `h` of the body over its feet (Kajita et al. 2001). Without a foot on the ground
-/// `ddx = 0`.
+/// A linear inverted pendulum over the middle `p` of the feet on the ground (Kajita et al. 2001):
+/// `ddx = (g / h) (x - p_x)` and likewise `y`, with the mean height `h` of the body over its feet. Without a foot on
+/// the ground `ddx = 0`.
 struct Pendulum {
     middle: Vec<Option<[f64; 2]>>,
     rate_per_s2: f64, // g / h

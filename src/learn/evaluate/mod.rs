@@ -34,7 +34,7 @@ pub(crate) use prediction::{linearise_phases, state_matrix};
 pub use round_trip::RoundTrip;
 pub use stride::StrideGrowth;
 pub(crate) use stride::{transition, usual_stride};
-pub use verdict::{AFTER_A_PUSH, Bound, TORQUES_IN_CONTACT, Verdict, verdict, verdict_by_default};
+pub use verdict::{Bound, Verdict, VerdictRow, verdict, verdict_by_default, with_unit};
 
 use coordinates::Mean;
 use nalgebra::{

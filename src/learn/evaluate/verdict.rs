@@ -16,8 +16,8 @@ const WHOLE: &str = "whole motion";
 const STRIDE: &str = "a stride";
 const TORQUES: &str = "torques";
 const CONTROL: &str = "control";
-pub const TORQUES_IN_CONTACT: &str = "R^2 of torques in contact";
-pub const AFTER_A_PUSH: &str = "deviation after a push";
+const TORQUES_IN_CONTACT: &str = "R^2 of torques in contact";
+const AFTER_A_PUSH: &str = "deviation after a push";
 const ONE_STAGE: &str = "error one step ahead, share of the baseline's";
 const CONSTANT_VELOCITY: &str = "constant velocity";
 const CONSTANT_LATENT_VELOCITY: &str = "constant latent velocity";
@@ -98,22 +98,31 @@ impl VerdictRow {
         }
     }
 
+    /// Value and unit, `diverges` or `not measured`.
+    pub fn value_words(&self) -> String {
+        let shown = |value| with_unit(value, self.unit);
+        self.value.map_or("not measured".to_owned(), shown)
+    }
+
     /// `deviation after a push 12.3 mm, at most 11.9 mm (no feedback: 12.1 mm)`.
     pub fn words(&self) -> String {
-        let shown = |value: f64| match self.unit {
-            "m" => format!("{:.1} mm", 1e3 * value),
-            "" if value.fract() == 0.0 => format!("{value}"),
-            unit => format!("{value:.3} {unit}").trim_end().to_owned(),
-        };
-        let value = match self.value {
-            None => "not measured".to_owned(),
-            Some(value) if value.is_infinite() => "diverges".to_owned(),
-            Some(value) => shown(value),
-        };
+        let shown = |value| with_unit(value, self.unit);
+        let value = self.value_words();
         let against = |baseline| format!(" ({}: {})", self.baseline_name, shown(baseline));
         let baseline = self.baseline.map(against).unwrap_or_default();
         let (name, bound, threshold) = (&self.name, self.bound.words(), shown(self.threshold));
         format!("{name} {value}, {bound} {threshold}{baseline}")
+    }
+}
+
+/// A value of a metric for reading, metres in mm below 1 m; `diverges` for one that is not finite.
+pub fn with_unit(value: f64, unit: &str) -> String {
+    match unit {
+        _ if !value.is_finite() => "diverges".to_owned(),
+        "m" if value.abs() < 1.0 => format!("{:.1} mm", 1e3 * value),
+        "m" => format!("{value:.1} m"),
+        "" if value.fract() == 0.0 => format!("{value}"),
+        unit => format!("{value:.3} {unit}").trim_end().to_owned(),
     }
 }
 
@@ -129,6 +138,23 @@ pub struct Verdict {
 impl Verdict {
     pub fn fails_predictions(&self) -> bool {
         (self.failed.iter()).any(|of| ![TORQUES, CONTROL].contains(&of.as_str()))
+    }
+
+    /// Every use with its worst counted row: failed ones first, then those with a baseline, then by margin; none where it
+    /// was not measured.
+    pub fn by_use(&self) -> Vec<(&str, Option<&VerdictRow>)> {
+        let mut uses: Vec<&str> = self.rows.iter().map(|row| &*row.of).collect();
+        uses.retain(|of| ![TORQUES, CONTROL].contains(of));
+        uses.dedup();
+        let worst = |of: &str| {
+            let rows = self.rows.iter().filter(|row| row.of == of && row.counts);
+            let measured = rows.filter(|row| row.passed.is_some());
+            let order = |row: &VerdictRow| (row.passed, row.baseline.is_none());
+            measured
+                .min_by(|a, b| (order(a).cmp(&order(b))).then(a.margin().total_cmp(&b.margin())))
+        };
+        let uses = uses.into_iter().chain([TORQUES, CONTROL]);
+        uses.map(|of| (of, worst(of))).collect()
     }
 
     pub fn fails_control(&self) -> bool {
@@ -334,9 +360,8 @@ fn rank_row(model: &ReducedModel, assessment: &Assessment<'_>) -> Option<Verdict
     let on_ground = phases.filter(|(phase, _)| !phase.feet.matches([false; 4]));
     let ranks = on_ground.filter_map(|(_, linear)| linear.as_ref());
     let least = ranks.map(LinearisedPhase::input_effective_rank).min()?;
-    let d = model.latent_dim();
     let name = "latent directions in which inputs act on the ground";
-    let (row, against) = ((CONTROL, name, ""), (NO_DYNAMICS, Some(d as f64)));
-    let bound = (Bound::AtLeast, LEAST_RANK.min(d) as f64);
+    let (row, against) = ((CONTROL, name, ""), ("", None));
+    let bound = (Bound::AtLeast, LEAST_RANK.min(model.latent_dim()) as f64);
     Some(VerdictRow::new(row, Some(least as f64), against, bound))
 }

@@ -2,8 +2,8 @@
 //! many evaluations (a stiff problem), the linearly implicit Euler rule restarts from the same state.
 //!
 //! A step of length `H` is computed with `n_0 < n_1 < ...` substeps, and the results are extrapolated to infinitely
-//! many (Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, II.9, and II, IV.9): order `2j + 2` or
-//! `j + 1` after `j + 1` results. Steps end at every requested time, where an input may have a kink.
+//! many. After `j + 1` results the order is `2j + 2` or `j + 1` (Hairer, Norsett, Wanner, *Solving Ordinary
+//! Differential Equations I*, II.9, and II, IV.9). Steps end at every requested time, where an input may have a kink.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,5 +1,5 @@
 //! Joint position control that recorded torques of legs in flight do not contain, as on a robot that also receives
-//! commanded postures: `ddz = -2 w dz - w^2 z` with one rate `w` for all equations, which is critically damped.
+//! commanded postures. It is `ddz = -2 w dz - w^2 z` with one rate `w` for all equations, which is critically damped.
 
 use nalgebra::{DVector, Matrix2, Vector2};
 

@@ -203,8 +203,8 @@ impl Knowledge {
 
     /// Prior knowledge of each phase in a frame with momentum rows: the centre of mass as `z1` (forwards) and `z2`
     /// (upwards), the rotation about it as `z3`, then foot positions. The floor is the same everywhere: no term depends
-    /// on `z1`. Forces accelerate a centre of mass and losses brake it, at any position of it and the legs: no term of
-    /// `ddz1` and `ddz2` depends on a position, and each keeps its own velocity, braking.
+    /// on `z1`. Forces accelerate a centre of mass and losses brake it, at any position of it and the legs. Therefore
+    /// no term of `ddz1` and `ddz2` depends on a position, and each keeps its own velocity, braking.
     ///
     /// With feet on the ground `ddz2` depends on its own force and velocity alone, and keeps its constant (gravity
     /// minus the share of the legs' weight that the ground carries). `ddz3` depends on velocities, on force and moment,

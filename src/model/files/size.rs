@@ -94,7 +94,7 @@ pub fn read_text_capped(path: &Path, format: Format) -> io::Result<String> {
     let invalid = |text: String| io::Error::new(io::ErrorKind::InvalidData, text);
     if let Some(OtherFormat { what, remedy, .. }) = recognised(path, &bytes) {
         let expected = format.facts().1;
-        let text = format!("found {what}, expected {expected}; this makes the text: {remedy}");
+        let text = format!("found {what}, expected {expected}; convert it with: {remedy}");
         return Err(invalid(text));
     }
     String::from_utf8(bytes).map_err(|error| invalid(error.to_string()))

@@ -21,8 +21,8 @@ const BEYOND: f64 = 0.15;
 #[serde(deny_unknown_fields)]
 pub struct StridePrior {
     pub gait: [GoalRange; GAIT_DIM],
-    /// `n x (7 x 40)`: the columns of one feature after the other, in SI units. Positions and yaw are deviations from
-    /// steady motion along x; roll, pitch and height are absolute.
+    /// `n x (7 x 40)`: the columns of one feature after the other, in SI units. x, y and yaw are deviations from steady
+    /// motion; roll, pitch and height are absolute.
     #[serde(with = "listed")]
     pub nodes: DMatrix<f64>,
 }

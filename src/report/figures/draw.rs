@@ -150,18 +150,41 @@ fn draw_lines(
     draw_axes(&axes, x_label, &mut marks);
     marks.push(Mark::text(LEFT, TOP - 6.0, Anchor::Start, title));
     for series in series {
-        // a line ends where it leaves the frame
-        let inside = |y: f64| (axes.y.0..=axes.y.1).contains(&y);
-        let points = thinned(&series.points);
-        for stretch in points.split(|point| !point.1.is_some_and(inside)) {
-            let line = stretch.iter();
-            let line = line.filter_map(|&(x, y)| Some((axes.x_at(x), axes.y_at(y?))));
-            if stretch.len() > 1 {
-                marks.push(Mark::Line(line.collect(), series.role));
-            }
+        for line in clipped(&thinned(&series.points), axes.y) {
+            let line = line.into_iter().map(|(x, y)| (axes.x_at(x), axes.y_at(y)));
+            marks.push(Mark::Line(line.collect(), series.role));
         }
     }
     marks
+}
+
+/// The lines within a range of y: a line that leaves it ends on its edge.
+fn clipped(points: &[(f64, Option<f64>)], (low, high): (f64, f64)) -> Vec<Vec<(f64, f64)>> {
+    let mut lines: Vec<Vec<(f64, f64)>> = Vec::new();
+    for pair in points.windows(2) {
+        let [(x0, Some(y0)), (x1, Some(y1))] = *pair else {
+            continue;
+        };
+        let within = |y: f64| (low..=high).contains(&y);
+        let beyond = [f64::lt, f64::gt].iter().zip([low, high]);
+        let mut beyond = beyond.map(|(is, edge)| is(&y0, &edge) && is(&y1, &edge));
+        if !y0.is_finite() || !y1.is_finite() || beyond.any(|both| both) {
+            continue;
+        }
+        let end = |x: f64, y: f64| match within(y) {
+            true => (x, y),
+            false => {
+                let edge = y.clamp(low, high);
+                (x0 + (x1 - x0) * (edge - y0) / (y1 - y0), edge)
+            }
+        };
+        let (from, to) = (end(x0, y0), end(x1, y1));
+        match lines.last_mut().filter(|line| line.last() == Some(&from)) {
+            Some(line) => line.push(to),
+            None => lines.push(vec![from, to]),
+        }
+    }
+    lines
 }
 
 /// A prediction that runs away does not flatten the record; a limit is always in sight.
@@ -355,4 +378,20 @@ fn padded(values: impl Iterator<Item = f64>) -> (f64, f64) {
         _ => 0.05 * low.abs() + 1e-6,
     };
     (low - margin, high + margin)
+}
+
+#[cfg(test)]
+#[test]
+fn a_line_that_leaves_the_frame_ends_on_its_edge() {
+    let points = [
+        (0.0, 0.5),
+        (1.0, 1.5),
+        (2.0, 3.0),
+        (3.0, -1.0),
+        (4.0, f64::NAN),
+    ];
+    let points = points.map(|(x, y)| (x, Some(y)));
+    let lines = clipped(&points, (0.0, 1.0));
+    let expected = vec![vec![(0.0, 0.5), (0.5, 1.0)], vec![(2.5, 1.0), (2.75, 0.0)]];
+    assert_eq!(lines, expected);
 }
