@@ -1,6 +1,6 @@
 """Rollouts of `romc simulate` against SciPy's LSODA on the same model file and inputs.
 
-romc writes its trajectories; this script takes the recorded latent states and inputs from them,
+romc writes its trajectories; this script reads the recorded latent states and inputs from them,
 evaluates the candidate terms of the model file by itself, and integrates with LSODA, tightly and
 sample by sample. Prints, for each model, the largest difference relative to the largest magnitude
 of each latent coordinate and velocity; exits 1 beyond 1e-6.
