@@ -2,7 +2,6 @@
 
 use askama::Template;
 
-use super::introduction::listed;
 use super::sections::{Section, sections, tiles};
 use super::*;
 use crate::artifact;
@@ -29,6 +28,11 @@ pub(crate) fn page(
     let typeset = Typeset::new(equations, &SymbolTable::default(), Rounding::default());
     let words = model.latent_words().into_iter().zip(1..);
     let words = words.map(|(words, number)| format!("z{number}: {words}"));
+    let groups = alike(&typeset.systems).into_iter();
+    let of_group = |group: Vec<usize>| {
+        let phases = group.iter().map(|&at| &equations.phases[at]);
+        (&typeset.systems[group[0]], phases.collect())
+    };
     let page = Page {
         model,
         version: env!("CARGO_PKG_VERSION"),
@@ -37,7 +41,7 @@ pub(crate) fn page(
         tiles: tiles(content),
         coordinates: words.collect(),
         remarks: &content.assessment.remarks,
-        phases: alike(typeset.systems.iter().zip(&equations.phases)),
+        phases: groups.map(of_group).collect(),
         rounding: rounding(&HTML, Rounding::default(), &typeset.rounding),
         jumps: &figures.jumps,
         rest: content.assessment.runs.len() - figures.jumps.len(),
@@ -83,23 +87,6 @@ fn errors(jump: &JumpFigures) -> String {
         None => "nothing predicted".to_owned(),
     });
     format!("body x off by {x}, body z by {z} over the whole motion")
-}
-
-/// Phases of the same equations together, each list where its first phase is.
-fn alike<'a>(
-    phases: impl Iterator<Item = (&'a EquationSystem, &'a PhaseEquations)>,
-) -> Vec<(&'a EquationSystem, Vec<&'a PhaseEquations>)> {
-    let mut groups: Vec<(&EquationSystem, Vec<&PhaseEquations>)> = Vec::new();
-    for (system, phase) in phases {
-        let known = groups
-            .iter_mut()
-            .find(|(other, _)| other.equations == system.equations);
-        match known {
-            Some((_, phases)) => phases.push(phase),
-            None => groups.push((system, vec![phase])),
-        }
-    }
-    groups
 }
 
 fn title(phases: &[&PhaseEquations]) -> String {
