@@ -212,9 +212,16 @@ fn every_shipped_model_prints_each_active_term_once() {
             ..PrintOptions::default()
         };
         let files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
-        let systems = normal_form(&files[0].contents);
-        assert_eq!(systems.len(), model.phases().len(), "{}", path.display());
-        for (system, phase) in systems.iter().zip(model.phases()) {
+        for (place, phase) in model.phases().iter().enumerate() {
+            let name = format!(
+                "{}_{}.tex",
+                model.identifier(),
+                model.phase_identifier(place)
+            );
+            let systems = normal_form(&equations(&files, &name));
+            let [system] = systems.as_slice() else {
+                panic!("{}: {} systems in {name}", path.display(), systems.len());
+            };
             assert_eq!(
                 system.matches(r"\ddot").count(),
                 model.latent_dim(),
@@ -383,33 +390,66 @@ fn every_kind_of_term_compiles_to_pdf_in_each_form() {
     }
 }
 
+/// Classes of papers with the width to which equations are broken.
+const PAPERS: [(&str, f64, &str); 3] = [
+    ("ieee", 22.0, r"\documentclass[journal]{IEEEtran}"),
+    (
+        // Columns of 252 pt as in IEEEtran, whose tables have smaller letters.
+        "columns",
+        22.0,
+        "\\documentclass[10pt,twocolumn]{article}\n\\usepackage[textwidth=516pt,columnsep=12pt]{geometry}",
+    ),
+    ("article", 32.0, r"\documentclass[10pt]{article}"),
+];
+
 #[test]
-fn equations_of_width_22_fit_a_column_of_a_two_column_paper() {
+fn every_file_fits_papers_of_one_and_two_columns() {
+    if !tools::has_latex() || !tools::has_latex_class("IEEEtran") {
+        return;
+    }
     for (path, model) in shipped_models() {
-        let options = PrintOptions {
-            width_em: Some(22.0),
-            ..PrintOptions::default()
+        let learned = Equations::as_learned(&model);
+        let physical = learned.in_physical_units().ok();
+        let rounding = match physical {
+            Some(_) => Rounding::PHYSICAL,
+            None => Rounding::default(),
         };
-        let mut files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
-        let stem = model.identifier();
-        // Columns of 252 pt as in IEEE conference papers; widths of tables are estimates, good to 3 pt.
-        let paper = format!(
-            "\\documentclass[10pt,twocolumn]{{article}}\n\\hfuzz=3pt\n\\usepackage{{amsmath,booktabs}}\n\
-             \\usepackage[textwidth=516pt,columnsep=12pt]{{geometry}}\n\\begin{{document}}\n\
-             The model for the contact phase is described by\n\\input{{{stem}}}\n\
-             \\input{{{stem}-nomenclature}}\n\\input{{{stem}-table}}\n\\end{{document}}\n"
-        );
-        files.push(EmittedFile::new("column.tex", paper));
-        println!("{}", path.display());
-        typeset_document(&files, "column");
-        typeset(&files, stem.as_str());
+        let equations = physical.as_ref().unwrap_or(&learned);
+        for (name, width, class) in PAPERS {
+            let options = PrintOptions {
+                width_em: Some(width),
+                rounding,
+                ..PrintOptions::default()
+            };
+            let mut files = latex::emit(equations, &options).unwrap();
+            // All but the preview, and but the files of single phases, which have the same labels.
+            let stem = model.identifier().as_str();
+            let is_input = |path: &str| {
+                let end = path.strip_prefix(stem).unwrap();
+                !end.starts_with('_') && end != "-preview.tex"
+            };
+            let inputs = files
+                .iter()
+                .map(|file| file.path.as_str())
+                .filter(|path| is_input(path));
+            // Within paragraphs, which classes indent.
+            let inputs = inputs.map(|path| format!("The model:\n\\input{{{path}}}\nand text.\n\n"));
+            let inputs: String = inputs.collect();
+            let paper = format!(
+                "{class}\n\\usepackage{{amsmath,booktabs,longtable}}\n\\begin{{document}}\n{inputs}\\end{{document}}\n"
+            );
+            files.push(EmittedFile::new(format!("{name}.tex"), paper));
+            println!("{}, {name}", path.display());
+            typeset_document(&files, name);
+            typeset(&files, stem);
+        }
     }
 }
 
 #[test]
-fn table_is_divided_where_its_column_ends_and_no_earlier() {
+fn coefficients_are_one_table_unless_it_is_wider_than_the_page() {
     let model = model("go1-d4.json");
-    let parts = |width_em: f64| {
+    let table = |width_em: f64| {
         let options = PrintOptions {
             width_em: Some(width_em),
             ..PrintOptions::default()
@@ -417,23 +457,58 @@ fn table_is_divided_where_its_column_ends_and_no_earlier() {
         let files = latex::emit(&Equations::as_learned(&model), &options).unwrap();
         equations(&files, "go1_d4-table.tex")
     };
-    let wide = parts(60.0);
-    assert_eq!(wide.matches(r"\begin{tabular}").count(), 1, "{wide}");
-    assert!(wide.contains(r"\label{tab:go1-d4}"), "{wide}");
-    assert!(!wide.contains("tab:go1-d4:1"), "{wide}");
-    let narrow = parts(22.0);
-    let n_parts = narrow.matches(r"\begin{tabular}").count();
-    assert!((2..=4).contains(&n_parts), "{narrow}");
+    for (width_em, environment) in [(60.0, "{table}"), (22.0, "{table}"), (15.0, "{table*}")] {
+        let text = table(width_em);
+        assert_eq!(text.matches(r"\begin{tabular}").count(), 1, "{text}");
+        assert!(text.contains(&format!(r"\begin{environment}")), "{text}");
+        assert!(text.contains(r"\label{tab:go1-d4}"), "{text}");
+        assert!(!text.contains("tab:go1-d4:1"), "{text}");
+    }
+    // two of four columns, and one column each at the least
+    for (width_em, n_parts) in [(7.5, 2), (1.0, 4)] {
+        let text = table(width_em);
+        assert_eq!(text.matches(r"\begin{tabular}").count(), n_parts, "{text}");
+        assert!(
+            text.contains("% Labels:\n%   tab:go1-d4\n%   tab:go1-d4:1\n"),
+            "{text}"
+        );
+        let last = format!(r"\label{{tab:go1-d4:{n_parts}}}");
+        assert!(text.contains(&last), "{text}");
+    }
+}
+
+#[test]
+fn phases_with_equal_equations_are_printed_once() {
+    let model = model("go1-trot-d6.json");
+    let files = latex::emit(&Equations::of(&model), &PrintOptions::default()).unwrap();
+    let text = equations(&files, "go1_trot_d6.tex");
+    assert_eq!(normal_form(&text).len(), 2, "{text}");
     assert!(
-        narrow.contains("% Labels:\n%   tab:go1-d4\n%   tab:go1-d4:1\n"),
-        "{narrow}"
+        text.contains("\n% Phases fr_rl, fl_rr, all: fr and rl, or fr alone"),
+        "{text}"
     );
+    let text = equations(&files, "go1_trot_d6-table.tex");
     assert!(
-        narrow.contains(&format!(r"\label{{tab:go1-d4:{n_parts}}}")),
-        "{narrow}"
+        text.contains(r"\emph{Phases fr\_rl, fl\_rr, all}"),
+        "{text}"
     );
-    // a column of numbers each at the least; ddz1 of flight has none
-    assert_eq!(parts(1.0).matches(r"\begin{tabular}").count(), 7);
+    let text = equations(&files, "go1_trot_d6_all.tex");
+    assert_eq!(normal_form(&text).len(), 1, "{text}");
+}
+
+#[test]
+fn numbers_in_physical_units_have_three_digits_below_each_other() {
+    let model = model("go1-d7.json");
+    let physical = Equations::of(&model).in_physical_units().unwrap();
+    let options = PrintOptions {
+        rounding: Rounding::PHYSICAL,
+        ..PrintOptions::default()
+    };
+    let files = latex::emit(&physical, &options).unwrap();
+    let text = equations(&files, "go1_d7-table.tex");
+    assert!(text.contains(r"$1470\phantom{.0000}$"), "{text}");
+    assert!(text.contains(r"$-314\phantom{.0000}$"), "{text}");
+    assert!(text.contains(r"$0.0967$"), "{text}");
 }
 
 #[test]

@@ -55,6 +55,26 @@ fn latex_of_a_model_with_robot_is_stable() {
 }
 
 #[test]
+fn latex_in_physical_units_is_stable() {
+    let model = model("models/go1-trot-d6.json");
+    let physical = Equations::of(&model).in_physical_units().unwrap();
+    let options = PrintOptions {
+        rounding: Rounding::PHYSICAL,
+        width_em: Some(22.0),
+        ..PrintOptions::default()
+    };
+    for file in latex::emit(&physical, &options).unwrap() {
+        // All phases; those of one phase are parts of them.
+        if !file.path.starts_with("go1_trot_d6_") {
+            insta::assert_snapshot!(
+                format!("latex__physical__{}", file.path),
+                without_version(&file.contents)
+            );
+        }
+    }
+}
+
+#[test]
 fn latex_of_every_function_is_stable() {
     let model = model("tests/fixtures/models/every-function.json");
     let files = latex::emit(&Equations::as_learned(&model), &PrintOptions::default()).unwrap();
@@ -68,6 +88,7 @@ fn latex_of_every_function_is_stable() {
 fn markdown_is_stable() {
     for name in [
         "models/paper-2d.json",
+        "models/go1-trot-d6.json",
         "tests/fixtures/models/every-function.json",
     ] {
         let files = markdown::emit(
@@ -84,6 +105,7 @@ fn markdown_is_stable() {
 fn mathml_is_stable() {
     for name in [
         "models/paper-2d.json",
+        "models/go1-trot-d6.json",
         "tests/fixtures/models/every-function.json",
     ] {
         let files = mathml::emit(

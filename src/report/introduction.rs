@@ -106,14 +106,6 @@ fn subject(content: &Content<'_>) -> Result<String> {
     ))
 }
 
-pub(super) fn listed(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [name] => name.clone(),
-        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
-    }
-}
-
 fn seen(content: &Content<'_>, path: &Path) -> Option<bool> {
     let recordings = content.model.provenance().get("recordings");
     let entries = recordings.and_then(Value::as_array)?.iter();

@@ -51,9 +51,10 @@ use crate::plan::{GoalMap, MappedWalk, Plan, WalkMap};
 use crate::recording::{Segment, stretches};
 use crate::robot::{BODY_X, BODY_Z, GRAVITY_M_S2, JOINT_DIM, Robot, STATE_DIM};
 use crate::typeset::mathml::{HTML, HtmlProse, HtmlText, system};
-use crate::typeset::words::{counted, feet, rendered, rounding};
+use crate::typeset::words::{counted, feet, listed, rendered, rounding};
 use crate::typeset::{
-    Cell, EquationSystem, Rounding, SymbolTable, Table, Typeset, TypesetError, rounded, significant,
+    Cell, EquationSystem, Rounding, SymbolTable, Table, Typeset, TypesetError, alike, rounded,
+    significant,
 };
 
 type Result<T, E = ModelError> = std::result::Result<T, E>;

@@ -2,7 +2,6 @@
 
 use askama::Template;
 
-use super::introduction::listed;
 use super::sections::{Section, sections};
 use super::verdict::{Light, UseRow, total, use_rows, verdict_table};
 use super::*;
@@ -51,11 +50,11 @@ pub(crate) fn page(
         overview: &figures.overview,
         coordinates: coordinates(shown),
         remarks: &content.assessment.remarks,
-        phases: alike(printed.systems.iter().zip(&shown.phases)),
+        phases: grouped(&printed, &shown.phases),
         rounding: rounding(&HTML, rule, &printed.rounding),
         not_physical: (physical.as_ref().err()).map(ToString::to_string),
         scaled: (in_file.iter())
-            .flat_map(|typeset| alike(typeset.systems.iter().zip(&scaled.phases)))
+            .flat_map(|typeset| grouped(typeset, &scaled.phases))
             .collect(),
         physics: (invariance.ok().flatten()).map(|of| invariance_table(model, &of)),
         not_checked,
@@ -121,18 +120,12 @@ pub(super) fn prose(text: &str) -> String {
 }
 
 /// Phases of the same equations together, each list where its first phase is.
-fn alike<'a>(phases: impl Iterator<Item = (&'a EquationSystem, &'a PhaseEquations)>) -> Alike<'a> {
-    let mut groups: Alike<'_> = Vec::new();
-    for (system, phase) in phases {
-        let known = groups
-            .iter_mut()
-            .find(|(other, _)| other.equations == system.equations);
-        match known {
-            Some((_, phases)) => phases.push(phase),
-            None => groups.push((system, vec![phase])),
-        }
-    }
-    groups
+fn grouped<'a>(typeset: &'a Typeset, phases: &'a [PhaseEquations]) -> Alike<'a> {
+    let of_group = |group: Vec<usize>| {
+        let phases = group.iter().map(|&at| &phases[at]);
+        (&typeset.systems[group[0]], phases.collect())
+    };
+    alike(&typeset.systems).into_iter().map(of_group).collect()
 }
 
 fn title(phases: &[&PhaseEquations]) -> String {

@@ -89,6 +89,16 @@ impl Leg {
         }
     }
 
+    /// `front right`, `rear left`.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Leg::FrontRight => "front right",
+            Leg::FrontLeft => "front left",
+            Leg::RearRight => "rear right",
+            Leg::RearLeft => "rear left",
+        }
+    }
+
     /// Sign of the leg's side along the body's y axis: +1 left, -1 right.
     pub const fn side(self) -> f64 {
         match self {

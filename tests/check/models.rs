@@ -1,10 +1,12 @@
 //! Random models against what romc prints of them, and against models with one coefficient changed.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use chacha20::ChaCha8Rng;
 use chacha20::rand_core::{Rng, SeedableRng};
 use nalgebra::{DMatrix, DVector};
+use romc::artifact;
 use romc::check::{CheckOptions, Comparison, Side, Verdict, compare};
 use romc::equations::Equations;
 use romc::import::SymbolNames;
@@ -230,6 +232,20 @@ fn random_models_are_proven_equal_to_what_romc_prints_of_them() {
         );
     }
     assert!(exact < COUNT as usize, "some were rounded");
+}
+
+#[test]
+fn phases_that_are_printed_once_are_all_compared() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/models/go1-trot-d6.json");
+    let model = artifact::read(Path::new(path)).expect("a shipped model");
+    // Markdown, cases and align
+    for kind in [1, 3, 6] {
+        let comparison = against(&model, kind, printed(&model, kind));
+        let names = comparison.phases.iter().map(|phase| phase.name.as_str());
+        let names: Vec<&str> = names.collect();
+        assert_eq!(names, ["fr_rl", "fl_rr", "all", "flight"]);
+        assert!(comparison.says_the_same(), "{kind}: {comparison:?}");
+    }
 }
 
 /// The model with one active coefficient's sign or size changed, and where.

@@ -85,6 +85,11 @@ pub fn has_latex() -> bool {
     })
 }
 
+/// Whether a document class of LaTeX is there.
+pub fn has_latex_class(name: &str) -> bool {
+    answers(Command::new("kpsewhich").arg(format!("{name}.cls")))
+}
+
 /// What `tests/latex.rs` and the emitted previews load.
 const LATEX_PACKAGES: [&str; 9] = [
     "[T1]{fontenc}",

@@ -17,11 +17,19 @@ pub struct Equation {
     pub is_approximate: bool,
 }
 
-/// Every candidate term that is printed somewhere, with its coefficients; in library order.
+/// The printed coefficients, phase below phase.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CoefficientTable {
-    /// Column heads: the acceleration, with the phase it belongs to, and its unit where that is physical.
-    pub columns: Vec<(String, Symbol, Option<Unit>)>,
+    /// Column heads: the accelerations and their units where these are physical.
+    pub columns: Vec<(Symbol, Option<Unit>)>,
+    pub parts: Vec<CoefficientPart>,
+}
+
+/// The coefficients of phases with equal equations.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CoefficientPart {
+    pub phases: Vec<String>,
+    /// The candidate terms that one of the equations has, in library order; none where all accelerations are zero.
     pub rows: Vec<CoefficientRow>,
 }
 
@@ -52,14 +60,39 @@ impl Typeset {
         let phases = phases.map(|(index, phase)| (&phase.name, system.coefficients(index)));
         let phases: Vec<(&String, DMatrix<f64>)> = phases.collect();
         let systems = phases.iter();
+        let systems: Vec<EquationSystem> = systems
+            .map(|(phase, xi)| rounder.system(phase, &outputs, &terms, xi))
+            .collect();
+        let parts = alike(&systems).into_iter().map(|group| CoefficientPart {
+            phases: (group.iter()).map(|&at| phases[at].0.clone()).collect(),
+            rows: rows(system, &phases[group[0]].1, &terms, &rounder),
+        });
+        let units = system.latent_units();
+        let unit = |output| units.map(|units| units.acceleration(output));
+        let columns = outputs.iter().enumerate();
         Self {
-            systems: systems
-                .map(|(phase, xi)| rounder.system(phase, &outputs, &terms, xi))
-                .collect(),
-            table: table(system, &phases, &outputs, &terms, &rounder),
+            table: CoefficientTable {
+                parts: parts.collect(),
+                columns: (columns.map(|(output, (left, _))| (left.clone(), unit(output))))
+                    .collect(),
+            },
+            systems,
             rounding: rounder.report,
         }
     }
+}
+
+/// Places of systems with the same printed equations together, each group where its first system is.
+pub fn alike(systems: &[EquationSystem]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for (place, system) in systems.iter().enumerate() {
+        let is_same = |group: &&mut Vec<usize>| systems[group[0]].equations == system.equations;
+        match groups.iter_mut().find(is_same) {
+            Some(group) => group.push(place),
+            None => groups.push(vec![place]),
+        }
+    }
+    groups
 }
 
 pub(super) fn coefficients(system: &Equations<'_>) -> impl Iterator<Item = f64> {
@@ -67,13 +100,13 @@ pub(super) fn coefficients(system: &Equations<'_>) -> impl Iterator<Item = f64> 
     equations.flatten().map(|summand| summand.coefficient)
 }
 
-fn table(
+/// The rows of a phase with the coefficients `xi`.
+fn rows(
     system: &Equations<'_>,
-    phases: &[(&String, DMatrix<f64>)],
-    outputs: &[(Symbol, String)],
+    xi: &DMatrix<f64>,
     terms: &[(&str, Signed)],
     rounder: &Rounder,
-) -> CoefficientTable {
+) -> Vec<CoefficientRow> {
     let units = system.latent_units();
     let cell = |value: &f64| Some(rounder.round(*value)).filter(|cell| !cell.is_zero());
     let row = |(row, (_, term)): (usize, &(&str, Signed))| CoefficientRow {
@@ -81,29 +114,51 @@ fn table(
         unit: units
             .map(|units| units.of_term(&system.pool, system.terms[row].expr))
             .filter(|unit| *unit != Unit::default()),
-        coefficients: (phases.iter())
-            .flat_map(|(_, xi)| xi.row(row).iter().map(cell).collect::<Vec<_>>())
-            .collect(),
+        coefficients: xi.row(row).iter().map(cell).collect(),
     };
-    CoefficientTable {
-        rows: (terms.iter().enumerate().map(row))
-            .filter(|row| row.coefficients.iter().any(Option::is_some))
-            .collect(),
-        columns: (phases.iter())
-            .flat_map(|(phase, _)| {
-                outputs.iter().enumerate().map(|(output, (left, _))| {
-                    let unit = units.map(|units| units.acceleration(output));
-                    ((*phase).clone(), left.clone(), unit)
-                })
-            })
-            .collect(),
-    }
+    (terms.iter().enumerate().map(row))
+        .filter(|row| row.coefficients.iter().any(Option::is_some))
+        .collect()
 }
 
 impl CoefficientTable {
     /// Whether its columns have units: all of them or none.
     pub(super) fn has_units(&self) -> bool {
-        self.columns.iter().any(|(.., unit)| unit.is_some())
+        self.columns.iter().any(|(_, unit)| unit.is_some())
+    }
+
+    /// The unit of a coefficient as a sentence; nothing where there are no units.
+    pub(super) fn unit_rule(&self) -> &'static str {
+        match self.has_units() {
+            true => "The unit of a coefficient is that of its column divided by that of its term.",
+            false => "",
+        }
+    }
+}
+
+impl CoefficientPart {
+    /// `Phase contact`, `Phases fr_rl, all`.
+    pub(super) fn title(&self, spelling: &Spelling) -> String {
+        let word = if self.phases.len() == 1 {
+            "Phase"
+        } else {
+            "Phases"
+        };
+        let names: Vec<String> = self
+            .phases
+            .iter()
+            .map(|name| (spelling.text)(name))
+            .collect();
+        format!("{word} {}", names.join(", "))
+    }
+
+    /// The title as a row of a table, with a note where no row follows.
+    pub(super) fn row_title(&self, spelling: &Spelling) -> String {
+        let title = self.title(spelling);
+        match self.rows.is_empty() {
+            true => title + ": all accelerations zero",
+            false => title,
+        }
     }
 }
 

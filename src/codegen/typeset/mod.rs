@@ -18,8 +18,8 @@ pub(crate) mod tree;
 pub mod words;
 
 pub use decimal::{Decimal, Rounding};
-pub(crate) use equations::{CoefficientRow, CoefficientTable};
-pub use equations::{Equation, EquationSystem, Typeset};
+pub(crate) use equations::{CoefficientPart, CoefficientRow, CoefficientTable};
+pub use equations::{Equation, EquationSystem, Typeset, alike};
 pub(crate) use robot::RobotTypeset;
 pub(crate) use symbols::Emitted;
 pub use symbols::{Form, NumberStyle, PrintOptions, RenameError, SymbolTable, TypesetError};

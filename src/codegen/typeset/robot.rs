@@ -8,6 +8,10 @@ use super::*;
 
 /// Weights below this share of their row's largest are left out of the printed encoder.
 const NEGLIGIBLE: f64 = 0.02;
+/// Difference of two accelerations from which it is explained, as a share of the largest.
+const NOTABLE: f64 = 0.01;
+const SAME: f64 = 1e-9; // difference of weights
+const NOISE: f64 = 1e-12; // share of the largest
 
 /// A model in robot coordinates `q`, in SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +24,19 @@ pub(crate) struct RobotTypeset {
     pub systems: Vec<EquationSystem>,
     /// What rounding changed in `systems`.
     pub rounding: RoundingReport,
+    /// Where a decoded position accelerates otherwise than the latent coordinate that it nearly is.
+    pub deviations: Vec<Deviation>,
+}
+
+/// A constant term of a robot coordinate's acceleration that differs from that of its latent coordinate.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Deviation {
+    /// Place of the phase in the model.
+    pub phase: usize,
+    pub coordinate: Symbol,
+    pub latent: Symbol,
+    /// The constant terms of both.
+    pub constants: [Decimal; 2],
 }
 
 impl RobotTypeset {
@@ -49,6 +66,7 @@ impl RobotTypeset {
         });
         let names = state.names.iter().map(|name| format!("dd({name})"));
         let outputs: Vec<(Symbol, String)> = doubled.zip(names).collect();
+        let (pairs, mut deviations) = (positions(map, &factors, &state.units), Vec::new());
         for (index, phase) in system.phases.iter().enumerate() {
             let xi = system.coefficients(index);
             let mut ddq = DMatrix::zeros(terms.len(), outputs.len());
@@ -58,6 +76,28 @@ impl RobotTypeset {
                     ddq[(term, row)] = finite(sum / factors[row], output, text)?;
                 }
             }
+            ddq.row_iter_mut()
+                .for_each(|mut of_term| drop_noise(of_term.iter_mut()));
+            let constants = pairs.iter().filter_map(|&(latent, coordinate)| {
+                let constant = terms.iter().position(|(text, _)| *text == "1")?;
+                Some((
+                    latent,
+                    coordinate,
+                    [ddq[(constant, coordinate)], xi[(constant, latent)]],
+                ))
+            });
+            let constants: Vec<(usize, usize, [f64; 2])> = constants.collect();
+            let sizes = constants.iter().map(|(.., [_, latent])| latent.abs());
+            let least = NOTABLE * sizes.fold(0.0, f64::max);
+            let differ = constants
+                .iter()
+                .filter(|(.., [robot, latent])| (robot - latent).abs() > least);
+            deviations.extend(differ.map(|&(latent, coordinate, constants)| Deviation {
+                phase: index,
+                coordinate: outputs[coordinate].0.clone(),
+                latent: symbols.acceleration(latent),
+                constants: constants.map(|value| rounder.round(value)),
+            }));
             systems.push(rounder.system(&phase.name, &outputs, &terms, &ddq));
         }
         Ok(Some(Self {
@@ -65,8 +105,38 @@ impl RobotTypeset {
             negligible_weights,
             systems,
             rounding: rounder.report,
+            deviations,
         }))
     }
+}
+
+/// Latent coordinates that are a position of the robot plus angles, with that position.
+fn positions(encoder: &AffineMap, factors: &DVector<f64>, units: &[String]) -> Vec<(usize, usize)> {
+    let rows = encoder.weights().row_iter().enumerate();
+    let pairs = rows.filter_map(|(row, weights)| {
+        let weights = weights.transpose().component_mul(factors);
+        let is_metre = |place: &usize| units[*place] == "m" && weights[*place].abs() > SAME;
+        let metres: Vec<usize> = (0..weights.len()).filter(is_metre).collect();
+        match metres.as_slice() {
+            [one] if (weights[*one] - 1.0).abs() < SAME && weights.norm() > 1.0 => {
+                Some((row, *one))
+            }
+            _ => None,
+        }
+    });
+    pairs.collect()
+}
+
+/// Zeroes for values of one unit that are rounding errors compared with the largest of them.
+fn drop_noise<'a>(values: impl IntoIterator<Item = &'a mut f64>) {
+    let mut values: Vec<&mut f64> = values.into_iter().collect();
+    let largest = values
+        .iter()
+        .fold(0.0_f64, |most, value| most.max(value.abs()));
+    let noise = values
+        .iter_mut()
+        .filter(|value| value.abs() < NOISE * largest);
+    noise.for_each(|value| **value = 0.0);
 }
 
 fn encoder(
@@ -80,6 +150,8 @@ fn encoder(
     terms.extend(coordinates.iter().map(of_symbol));
     let mut printed = DMatrix::zeros(terms.len(), encoder.output_dim());
     let mut absent = vec![0; encoder.output_dim()];
+    let mut bias = encoder.bias().clone();
+    drop_noise(bias.iter_mut());
     for (row, mut column) in printed.column_iter_mut().enumerate() {
         let weights = encoder.weights().row(row).transpose();
         let weights = weights.component_mul(factors);
@@ -87,7 +159,7 @@ fn encoder(
             finite(weight, &format!("z{}", row + 1), &symbol.to_string())?;
         }
         let smallest = NEGLIGIBLE * weights.amax();
-        column[0] = encoder.bias()[row];
+        column[0] = bias[row];
         for (index, &weight) in weights.iter().enumerate() {
             if weight.abs() >= smallest {
                 column[index + 1] = weight;
@@ -118,7 +190,7 @@ fn finite(value: f64, output: &str, term: &str) -> Result<f64, TypesetError> {
 }
 
 /// `fr.hx` as q with the subscript fr,hx; numbers where two names would look the same.
-fn coordinate_symbols(names: &[String]) -> Vec<Symbol> {
+pub(super) fn coordinate_symbols(names: &[String]) -> Vec<Symbol> {
     let spelled = |subscript| Symbol {
         glyph: Glyph::Letter('q'),
         dots: 0,

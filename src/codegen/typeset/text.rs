@@ -44,23 +44,17 @@ fn phases_text(equations: &Equations<'_>, options: &TextOptions) -> String {
     });
     let typeset = Typeset::new(equations, &options.symbols, rounding);
     let columns = options.columns.unwrap_or(TEXT_COLUMNS);
-    let systems: Vec<Vec<String>> = (typeset.systems.iter())
-        .map(|system| lines(system, columns))
-        .collect();
     let mut text = String::new();
-    for (index, system) in systems.iter().enumerate() {
-        if systems[..index].contains(system) {
-            continue;
-        }
-        let equal = (systems.iter().zip(&equations.phases)).filter(|(other, _)| *other == system);
-        let heads: Vec<String> = equal
-            .map(|(_, phase)| format!("{} ({})", phase.name, feet(&phase.feet)))
+    for group in alike(&typeset.systems) {
+        let phases = group.iter().map(|&at| &equations.phases[at]);
+        let heads: Vec<String> = phases
+            .map(|phase| format!("{} ({})", phase.name, feet(&phase.feet)))
             .collect();
         if !text.is_empty() {
             text.push('\n');
         }
         text += &joined(&heads, columns);
-        for line in system {
+        for line in lines(&typeset.systems[group[0]], columns) {
             let _ = writeln!(text, "  {line}");
         }
     }

@@ -2,6 +2,7 @@
 
 use super::decimal::{LEAST_DECIMALS, Occurrence, RELATIVE_ERROR};
 use super::*;
+use crate::equations::PhaseEquations;
 use crate::robot::{ContactFlags, Leg};
 
 /// How a sentence spells words from outside and mathematics.
@@ -47,6 +48,15 @@ pub fn counted(count: usize, noun: &str) -> String {
     }
 }
 
+/// `a`, `a and b`, `a, b and c`.
+pub fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [item] => item.clone(),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
 /// Words for how many feet of a front or rear pair are down, and whether they hold of none, one, both.
 const PAIRS: [(&str, [bool; 3]); 5] = [
     ("", [true, true, true]),
@@ -63,6 +73,22 @@ pub fn feet(rule: &FeetRule) -> String {
         FeetRule::None => "no foot on the ground".to_owned(),
         FeetRule::Patterns(_) if rule.is_always() => "whatever the feet do".to_owned(),
         FeetRule::Patterns(patterns) => format!("{} on the ground", pairs(patterns)),
+    }
+}
+
+/// When each of these phases holds, as a sentence.
+fn conditions(phases: &[&PhaseEquations], text: fn(&str) -> String) -> String {
+    let feet = |phase: &PhaseEquations| text(&feet(&phase.feet));
+    let parts = phases.iter().enumerate();
+    let parts: Vec<String> = parts
+        .map(|(place, phase)| {
+            let holds = if place == 0 { " holds" } else { "" };
+            format!("{}{holds} with {}", text(&phase.name), feet(phase))
+        })
+        .collect();
+    match phases {
+        [phase] => format!("Holds with {}.", feet(phase)),
+        _ => parts.join("; ") + ".",
     }
 }
 
@@ -107,7 +133,7 @@ fn by_name(pattern: &ContactFlags) -> String {
 pub fn rounding(spelling: &Spelling, rule: Rounding, report: &RoundingReport) -> String {
     let rule = match rule {
         Rounding::Adaptive => format!(
-            "Coefficients have {LEAST_DECIMALS} decimals, more where they would be off by over {} %.",
+            "Coefficients have {LEAST_DECIMALS} decimals, and more where rounding would change them by over {} %.",
             100.0 * RELATIVE_ERROR
         ),
         Rounding::Decimals(places) => format!("Coefficients have {places} decimals."),
@@ -118,8 +144,8 @@ pub fn rounding(spelling: &Spelling, rule: Rounding, report: &RoundingReport) ->
     let error = match &report.largest {
         None => "No coefficient is changed by rounding.".to_owned(),
         Some((error, place)) => format!(
-            "The largest rounding error is {}, of the term {} of {} in phase {}; no printed \
-             coefficient is off by more than {}{}",
+            "The largest rounding error is {}, of the term {} of {} in phase {}; relative errors \
+             of printed coefficients are at most {}{}",
             spelling.number(&at_most(*error)),
             summand(spelling, place),
             (spelling.math)(&Math::Symbol(place.left.clone()), &place.output),
@@ -195,16 +221,25 @@ impl<'a> Page<'a> {
         }
     }
 
+    /// Title, condition and equations of each group of phases with equal equations.
     pub(super) fn phases(
         &self,
         math: impl Fn(&EquationSystem, f64) -> String,
-    ) -> Vec<(&str, String, String)> {
-        let phases = self.typeset.systems.iter().zip(&self.equations.phases);
-        let phases = phases.map(|(system, phase)| {
-            let feet = feet(&phase.feet);
-            (phase.name.as_str(), feet, math(system, self.width_em))
+    ) -> Vec<(String, String, String)> {
+        let systems = &self.typeset.systems;
+        let groups = alike(systems).into_iter().zip(&self.typeset.table.parts);
+        let groups = groups.map(|(group, part)| {
+            let phases: Vec<&PhaseEquations> = (group.iter())
+                .map(|&at| &self.equations.phases[at])
+                .collect();
+            let math = math(&systems[group[0]], self.width_em);
+            (
+                part.title(self.spelling),
+                conditions(&phases, self.spelling.text),
+                math,
+            )
         });
-        phases.collect()
+        groups.collect()
     }
 }
 

@@ -4,7 +4,7 @@ use super::derivatives::with_dots;
 use super::numbers::without_operator_braces;
 use super::*;
 
-/// Reads a document's equations; comments `Phase NAME` and headings rank before labels that end in `known` phases.
+/// Reads a document's equations; comments `Phase NAME` or `Phases NAME, NAME` and headings rank before labels that end in `known` phases.
 pub(in crate::import) fn read(
     file: &str,
     bytes: &[u8],
@@ -23,9 +23,11 @@ pub(in crate::import) fn read(
         known,
         digits: None,
         phase: None,
+        others: Vec::new(),
         starts_phase: false,
         strange: None,
         sections: Vec::new(),
+        copies: Vec::new(),
     };
     let plain = SymbolNames::default();
     // In Markdown the sentence stands behind the equations.
@@ -52,7 +54,7 @@ pub(in crate::import) fn read(
             }
         }
     }
-    if let (true, Some((place, found))) = (document.sections.is_empty(), document.strange) {
+    if let (true, Some((place, found))) = (document.sections.is_empty(), document.strange.take()) {
         let expected = format!("\\ddot z_1 and so on, with {}", names.expected());
         return Err(ImportError::at(file, place, found, expected));
     }
@@ -60,7 +62,7 @@ pub(in crate::import) fn read(
         true => "an equation such as $$ \\ddot z_1 = 0.5 z_1 + u_1 $$",
         false => "an equation such as \\begin{align} \\ddot z_1 &= 0.5 z_1 + u_1 \\end{align}",
     };
-    complete(file, document.sections, text.lines().count(), expected)
+    complete(file, document.with_copies(), text.lines().count(), expected)
 }
 
 /// The left sides of the formulas, in which all names of latent coordinates have an index.
@@ -189,19 +191,32 @@ struct Document<'d> {
     known: &'d [String],
     digits: Option<Digits>,
     phase: Option<String>,
+    /// More phases with the equations of `phase`, where a comment names several.
+    others: Vec<String>,
     starts_phase: bool,
     /// The first left side of a variable that is not known, and its place.
     strange: Option<(Position, String)>,
     sections: Vec<Section>,
+    /// Places of sections, and other phases with the same equations.
+    copies: Vec<(usize, String)>,
 }
 
 impl Document<'_> {
     fn comment(&mut self, text: &str) {
         let text = text.trim();
-        if let Some(name) = text.strip_prefix("Phase ") {
-            let name = name.split(": ").next().unwrap_or(name);
-            let name = name.trim().trim_end_matches([':', '.']).trim();
-            self.phase = (!name.is_empty()).then(|| name.to_owned());
+        let several = text
+            .strip_prefix("Phases ")
+            .filter(|names| names.contains(", "));
+        if let Some(names) = text.strip_prefix("Phase ").or(several) {
+            let names = names.split(": ").next().unwrap_or(names);
+            let names = names.trim().trim_end_matches([':', '.']).trim();
+            let mut names = match several {
+                Some(_) => names.split(", ").map(str::to_owned).collect(),
+                None => vec![names.to_owned()],
+            };
+            names.retain(|name| !name.is_empty());
+            self.others = names.split_off(names.len().min(1));
+            self.phase = names.pop();
             self.starts_phase = self.phase.is_some();
         }
         if let Some(digits) = stated_digits(text) {
@@ -288,6 +303,38 @@ impl Document<'_> {
             .filter(|name| !name.bytes().all(|byte| byte.is_ascii_digit()))
     }
 
+    /// Refuses a phase that there is already.
+    fn check_new(&self, name: &String, place: Position) -> Read<()> {
+        let of_copy = |at: usize| self.copies.iter().any(|copy| copy == &(at, name.clone()));
+        let mut sections = self.sections.iter().enumerate();
+        let is_same = |(at, section): &(usize, &Section)| {
+            section.phase.as_ref() == Some(name) || of_copy(*at)
+        };
+        match sections.find(is_same) {
+            None => Ok(()),
+            Some((_, earlier)) => {
+                let found = format!("phase `{name}` again, as in line {}", earlier.line);
+                Err(ImportError::at(self.file, place, found, "each phase once"))
+            }
+        }
+    }
+
+    /// All sections, those of phases with the same equations behind each other.
+    fn with_copies(self) -> Vec<Section> {
+        let mut all = Vec::new();
+        for (place, section) in self.sections.into_iter().enumerate() {
+            let copies = self.copies.iter().filter(|(of, _)| *of == place);
+            let copies = copies.map(|(_, name)| Section {
+                phase: Some(name.clone()),
+                ..section.clone()
+            });
+            let copies: Vec<Section> = copies.collect();
+            all.push(section);
+            all.extend(copies);
+        }
+        all
+    }
+
     /// The open section, or a new one for another phase or a left side that is there already.
     fn section(
         &mut self,
@@ -306,13 +353,16 @@ impl Document<'_> {
             named.is_some() || repeats || !has_phase && is_other
         });
         if is_new {
+            let others = match named {
+                Some(_) => std::mem::take(&mut self.others),
+                None => Vec::new(),
+            };
             let named = named.or(label.clone().filter(|_| !has_phase));
-            let mut sections = self.sections.iter();
-            let earlier = sections.find(|section| named.is_some() && section.phase == named);
-            if let (Some(earlier), Some(name)) = (earlier, &named) {
-                let found = format!("phase `{name}` again, as in line {}", earlier.line);
-                return Err(ImportError::at(self.file, place, found, "each phase once"));
+            for name in named.iter().chain(&others) {
+                self.check_new(name, place)?;
             }
+            let copies = others.into_iter().map(|name| (self.sections.len(), name));
+            self.copies.extend(copies);
             self.sections.push(Section::new(named, place.0));
         }
         let section = (self.sections.last_mut()).expect("one was just made if there was none");

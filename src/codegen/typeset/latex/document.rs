@@ -1,15 +1,19 @@
 //! The files of the LaTeX backend.
 
+use std::collections::BTreeMap;
+
 use super::math::{Block, comment_text};
 use super::table::TableBlock;
 use super::*;
-use crate::model::{Activation, Identifier, ReducedModel, ScaleFactors, StateMap};
+use crate::model::{Identifier, ReducedModel};
+use crate::typeset::robot::Deviation;
 use crate::typeset::words;
 
 /// The LaTeX files of a model; NAME is its identifier:
 ///
-/// - `NAME.tex`: the equations of each phase, below how rounding changed them; `NAME_PHASE.tex`: those of one phase;
-/// - `NAME-table.tex`: the coefficients as booktabs tables; `NAME-nomenclature.tex`: the list of symbols;
+/// - `NAME.tex`: the equations of each phase, phases of equal equations once, below how rounding changed them, and in
+///   physical units above the units; `NAME_PHASE.tex`: those of one phase;
+/// - `NAME-table.tex`: the coefficients as a booktabs table; `NAME-nomenclature.tex`: the list of symbols;
 /// - `NAME-robot.tex`, with encoder and decoder: the latent coordinates and robot accelerations in SI units;
 /// - `NAME-preview.tex`: a document that shows them all, in two columns for narrow equations.
 ///
@@ -20,19 +24,29 @@ pub fn emit(system: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let typeset = Typeset::new(system, &options.symbols, options.rounding);
     let robot = RobotTypeset::new(system, &options.symbols, options.rounding)?;
     let stem = model.identifier().as_str();
+    let units = nomenclature::units_sentence(system, &options.symbols);
     let header = Header { model, options };
-    let systems = &phases(model, &typeset.systems, "", options);
+    let groups = alike(&typeset.systems);
+    let systems = &of_groups(model, &typeset.systems, &groups, "", options);
     let of_all = header.equations(&typeset.rounding);
-    let mut files = vec![equations(format!("{stem}.tex"), of_all, systems, false)?];
-    for (place, system) in systems.iter().enumerate() {
+    let remark = units.clone().unwrap_or_default();
+    let mut files = vec![equations(
+        format!("{stem}.tex"),
+        of_all,
+        systems,
+        false,
+        &remark,
+    )?];
+    let in_comment = units.map_or(String::new(), |units| format!("\n% {units}"));
+    for place in 0..model.phases().len() {
         let path = format!("{stem}_{}.tex", model.phase_identifier(place));
         let of_phase = header.short("One phase of the equations, with the same label.");
-        let system = std::slice::from_ref(system);
-        files.push(equations(path, of_phase, system, false)?);
+        let system = [of_group(model, &typeset.systems, &[place], "", options)];
+        files.push(equations(path, of_phase + &in_comment, &system, false, "")?);
     }
     let width_em = options.width_em.unwrap_or(math::WIDTH_EM);
     let blocks = table::blocks(&typeset.table, model.name(), options.numbers, width_em);
-    let packages = match blocks.iter().any(|block| block.long) {
+    let packages = match blocks.iter().any(|block| block.environment == "longtable") {
         true => "Needs booktabs and longtable.",
         false => "Needs booktabs.",
     };
@@ -42,22 +56,29 @@ pub fn emit(system: &Equations<'_>, options: &PrintOptions) -> Emitted {
         blocks,
     };
     files.push(file(format!("{stem}-table.tex"), &coefficients)?);
-    let of_symbols = header.short("A table as wide as the line; needs amsmath.");
-    let symbols = symbol_list(system, of_symbols, options);
-    files.push(file(format!("{stem}-nomenclature.tex"), &symbols)?);
+    let of_symbols = header.short("A list of symbols; needs amsmath.");
+    files.push(nomenclature::file(system, of_symbols, options)?);
     let is_physical = system.latent_units().is_some();
     if let Some(robot) = &robot {
         let comments = header.robot(robot, is_physical);
         let systems = of_robot(model, robot, options);
         let path = format!("{stem}-robot.tex");
-        files.push(equations(path, comments, &systems, true)?);
+        let remark = deviations(model, robot, options);
+        files.push(equations(path, comments, &systems, true, &remark)?);
     }
+    let phases = systems.iter().zip(&groups);
     let preview = Document::Preview {
         header: header.short("A document of its own; the files beside it are for \\input."),
         model,
-        phases: (systems.iter().enumerate())
-            .map(|(place, system)| (system.introduction.as_str(), model.phase_identifier(place)))
+        phases: phases
+            .map(|(system, group)| {
+                (
+                    system.introduction.as_str(),
+                    model.phase_identifier(group[0]),
+                )
+            })
             .collect(),
+        units: remark,
         rounding: words::rounding(&TEX, options.rounding, &typeset.rounding),
         siunitx: options.numbers == NumberStyle::Siunitx,
         two_columns: is_narrow(width_em),
@@ -74,11 +95,13 @@ fn equations(
     header: String,
     systems: &[System],
     is_introduced: bool,
+    remark: &str,
 ) -> Result<EmittedFile, TypesetError> {
     let equations = Document::Equations {
         header: header + &label_list(systems.iter().map(|system| system.block.labels())),
         is_introduced,
         systems,
+        remark,
     };
     file(path, &equations)
 }
@@ -93,30 +116,20 @@ enum Document<'a> {
         /// Whether a sentence stands before each system: the file holds more than the equations of motion.
         is_introduced: bool,
         systems: &'a [System],
+        /// Sentences below the equations.
+        remark: &'a str,
     },
     #[template(path = "latex/table.askama")]
     Tables {
         header: String,
         blocks: Vec<TableBlock>,
     },
-    #[template(path = "latex/nomenclature.askama")]
-    Nomenclature {
-        header: String,
-        positions: Vec<(String, Option<String>, String)>, // symbol, unit, meaning
-        velocities: String,
-        inputs: Vec<(String, String, usize)>, // symbol, unit and number
-        all_inputs: String,
-        is_physical: bool,
-        /// The map of velocities: the weights of an affine encoder, the Jacobian of another.
-        map: Option<&'static str>,
-        layers: Option<String>,
-        factors: Vec<(char, String)>,
-    },
     #[template(path = "latex/preview.askama")]
     Preview {
         header: String,
         model: &'a ReducedModel,
         phases: Vec<(&'a str, &'a Identifier)>, // introduction and identifier
+        units: String,
         rounding: String,
         siunitx: bool,
         two_columns: bool,
@@ -134,7 +147,7 @@ pub(super) fn is_narrow(width_em: f64) -> bool {
     width_em <= TWO_COLUMNS_EM
 }
 
-const TEX: Spelling = Spelling {
+pub(super) const TEX: Spelling = Spelling {
     text: tex_text,
     math: |math, _| format!("${}$", tex(math, NumberStyle::Plain)),
 };
@@ -151,40 +164,66 @@ fn label_list(labels: impl IntoIterator<Item = impl fmt::Display>) -> String {
     format!("\n% Labels:{}", lines.collect::<String>())
 }
 
-/// The systems of a model's phases; `part` tells their labels from those of another file.
-fn phases(
+fn of_groups(
     model: &ReducedModel,
     systems: &[EquationSystem],
+    groups: &[Vec<usize>],
     part: &str,
     options: &PrintOptions,
 ) -> Vec<System> {
-    systems
-        .iter()
-        .zip(model.phases())
-        .map(|(system, phase)| {
-            let label = format!("eq:{}{part}:{}", label(model.name()), label(&system.phase));
-            let block = math::block(system, label, options);
-            let feet = words::feet(&phase.feet);
-            let tall = match options.form == Form::Cases && block.lines.len() > math::CASES_LINES {
-                true => " Taller than a page as cases: align breaks across pages.",
-                false => "",
-            };
-            System {
-                comment: format!("Phase {}: {feet}.{tall}", comment_text(&system.phase)),
-                introduction: format!(r"Phase \emph{{{}}}, with {feet}:", tex_text(&system.phase)),
-                block,
-            }
-        })
-        .collect()
+    let groups = groups.iter();
+    let system = |group: &Vec<usize>| of_group(model, systems, group, part, options);
+    groups.map(system).collect()
 }
 
-/// The encoder's rows, then the robot's accelerations a phase.
+/// The system of phases with equal equations; `part` distinguishes its label from that of another file.
+fn of_group(
+    model: &ReducedModel,
+    systems: &[EquationSystem],
+    group: &[usize],
+    part: &str,
+    options: &PrintOptions,
+) -> System {
+    let system = &systems[group[0]];
+    let label = format!("eq:{}{part}:{}", label(model.name()), label(&system.phase));
+    let block = math::block(system, label, options);
+    let tall = match options.form == Form::Cases && block.lines.len() > math::CASES_LINES {
+        true => " Tall, and cases do not break across pages: align does.",
+        false => "",
+    };
+    let phases = group.iter().map(|&place| &model.phases()[place]);
+    let phases = phases.map(|phase| (phase.name.as_str(), words::feet(&phase.feet)));
+    let phases: Vec<(&str, String)> = phases.collect();
+    let (word, introduction) = match phases.as_slice() {
+        [(name, feet)] => (
+            "Phase",
+            format!(r"Phase \emph{{{}}}, with {feet}:", tex_text(name)),
+        ),
+        _ => {
+            let each = phases.iter();
+            let each = each.map(|(name, feet)| format!(r"\emph{{{}}} ({feet})", tex_text(name)));
+            (
+                "Phases",
+                format!("Phases {}:", words::listed(&each.collect::<Vec<_>>())),
+            )
+        }
+    };
+    let (names, feet): (Vec<&str>, Vec<String>) = phases.into_iter().unzip();
+    let names = comment_text(&names.join(", "));
+    System {
+        comment: format!("{word} {names}: {}.{tall}", feet.join("; ")),
+        introduction,
+        block,
+    }
+}
+
+/// The encoder's rows, then the robot's accelerations in each phase.
 fn of_robot(model: &ReducedModel, robot: &RobotTypeset, options: &PrintOptions) -> Vec<System> {
     let label = format!("eq:{}-robot:encoder", label(model.name()));
     let count = robot.negligible_weights;
     let without = match count {
         0 => String::new(),
-        _ => format!(r", without weights below 2\,\% of the largest of their row ({count})"),
+        _ => format!(r" ({count} weights below 2\,\% of the largest of their row are left out)"),
     };
     let encoder = System {
         comment: format!(
@@ -194,8 +233,57 @@ fn of_robot(model: &ReducedModel, robot: &RobotTypeset, options: &PrintOptions) 
         introduction: format!("Latent coordinates{without}:"),
         block: math::block(&robot.encoder, label, options),
     };
-    let of_phases = phases(model, &robot.systems, "-robot", options);
+    let groups = alike(&robot.systems);
+    let of_phases = of_groups(model, &robot.systems, &groups, "-robot", options);
     [encoder].into_iter().chain(of_phases).collect()
+}
+
+/// Why positions of the robot accelerate otherwise than the latent coordinates that they nearly are.
+fn deviations(model: &ReducedModel, robot: &RobotTypeset, options: &PrintOptions) -> String {
+    let groups = alike(&robot.systems);
+    let is_printed = |of: &&Deviation| groups.iter().any(|group| group[0] == of.phase);
+    let printed = robot.deviations.iter().filter(is_printed);
+    let mut of_latents: BTreeMap<&Symbol, Vec<&Deviation>> = BTreeMap::new();
+    for deviation in printed {
+        of_latents
+            .entry(&deviation.latent)
+            .or_default()
+            .push(deviation);
+    }
+    let value = |of: &&Deviation| {
+        let name = tex_text(&model.phases()[of.phase].name);
+        let [robot, latent] = (of.constants.each_ref()).map(|c| tex_number(c, options.numbers));
+        format!(r"\emph{{{name}}}: ${robot}$ instead of ${latent}$")
+    };
+    let sentence = |(latent, all): (&&Symbol, &Vec<&Deviation>)| {
+        let values: Vec<String> = all.iter().map(value).collect();
+        let symbols = [&all[0].coordinate, *latent].map(tex_symbol);
+        let [coordinate, latent] = symbols;
+        let values = values.join("; ");
+        format!("The constant term of ${coordinate}$ differs from that of ${latent}$ ({values}). ")
+    };
+    let sentences: String = of_latents.iter().map(sentence).collect();
+    let positions = of_latents.keys().map(|latent| {
+        let position = Symbol {
+            dots: 0,
+            ..(**latent).clone()
+        };
+        format!("${}$", tex_symbol(&position))
+    });
+    let positions: Vec<String> = positions.collect();
+    let include = if positions.len() == 1 {
+        "includes"
+    } else {
+        "include"
+    };
+    match positions.is_empty() {
+        true => String::new(),
+        false => format!(
+            "{sentences}The decoder causes the difference: {} {include} joint angles, and decoded joints \
+             accelerate with $\\ddot{{\\mathbf{{z}}}}$ where those of the robot do not.",
+            words::listed(&positions)
+        ),
+    }
 }
 
 struct Header<'a> {
@@ -241,108 +329,4 @@ impl Header<'_> {
 
 fn file(path: String, template: &Document<'_>) -> Result<EmittedFile, TypesetError> {
     Ok(EmittedFile::new(path, rendered(template)?))
-}
-
-const STRONGEST: usize = 3; // of an encoder row's weights are named
-const NEGLIGIBLE: f64 = 0.1; // share of the row's largest weight below which none is named
-
-fn symbol_list<'a>(system: &Equations<'_>, header: String, options: &PrintOptions) -> Document<'a> {
-    let (model, units) = (&*system.model, system.latent_units());
-    let (dim, numbers) = (model.latent_dim(), options.numbers);
-    let symbol = |variable| format!("${}$", tex_symbol(&options.symbols.symbol(variable)));
-    // `$z_1, \dots, z_6$`, or all of up to three.
-    let range = |of: fn(usize) -> LatentVariable| match dim {
-        ..=3 => (0..dim)
-            .map(|index| symbol(of(index)))
-            .collect::<Vec<_>>()
-            .join(", "),
-        _ => format!(r"{}, \dots, {}", symbol(of(0)), symbol(of(dim - 1))),
-    };
-    let words = system.latent_words();
-    let position = |index: usize| {
-        let unit = units.map(|units| tex_unit(units.position[index]));
-        let words = words.get(index).map(|words| match unit {
-            Some(_) => words.quantity.clone(),
-            None => words.to_string(),
-        });
-        let words = words.map_or(String::new(), |words| format!(": {}", tex_text(&words)));
-        let meaning = coordinate(model, index, &words, numbers);
-        (symbol(LatentVariable::Z(index)), unit, meaning)
-    };
-    let input = |(index, unit): (usize, &Unit)| {
-        (symbol(LatentVariable::U(index)), tex_unit(*unit), index + 1)
-    };
-    let inputs = units
-        .iter()
-        .flat_map(|units| units.input.iter().enumerate().map(input));
-    Document::Nomenclature {
-        header,
-        positions: (0..dim).map(position).collect(),
-        velocities: range(LatentVariable::Dz),
-        inputs: inputs.collect(),
-        all_inputs: range(LatentVariable::U),
-        is_physical: units.is_some(),
-        map: match (model.encoder(), model.encoder_map()) {
-            (Ok(_), _) => Some(r"\mathbf{W}_e"),
-            (Err(_), Ok(_)) => Some(r"\mathbf{J}"),
-            (Err(_), Err(_)) => None,
-        },
-        layers: (model
-            .encoder_map()
-            .ok()
-            .filter(|_| model.encoder().is_err()))
-        .map(layers),
-        factors: scale_factors(model, numbers),
-    }
-}
-
-/// A latent coordinate with its words, and the robot coordinates that it mostly consists of.
-fn coordinate(model: &ReducedModel, row: usize, words: &str, numbers: NumberStyle) -> String {
-    let (Ok(encoder), Some(state)) = (model.encoder(), model.state()) else {
-        return format!("latent coordinate {}", row + 1);
-    };
-    let weights = encoder.weights().row(row);
-    let weights = state.names.iter().zip(weights.iter().copied());
-    let mut weights: Vec<(&String, f64)> = weights.collect();
-    weights.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
-    let largest = weights.first().map_or(0.0, |(_, weight)| weight.abs());
-    let strongest: Vec<String> = (weights.iter().take(STRONGEST))
-        .filter(|(_, weight)| weight.abs() > NEGLIGIBLE * largest)
-        .map(|(name, weight)| {
-            let weight = Decimal::rounded(*weight, Rounding::default());
-            let (name, weight) = (tex_text(name), tex_number(&weight, numbers));
-            format!(r"\texttt{{{name}}} (${weight}$)")
-        })
-        .collect();
-    let (number, strongest) = (row + 1, strongest.join(", "));
-    format!("latent coordinate {number}{words}; largest weights: {strongest}")
-}
-
-/// A nonlinear encoder by the widths of its layers; its weights stay in the model file.
-fn layers(encoder: &StateMap) -> String {
-    let widths = encoder.layers().iter().map(|layer| {
-        let width = layer.map.output_dim();
-        match layer.activation {
-            Activation::Linear => width.to_string(),
-            activation => format!("{width} ({activation})"),
-        }
-    });
-    let (inputs, widths) = (encoder.input_dim(), widths.collect::<Vec<_>>().join(", "));
-    format!("inputs {inputs}, layers {widths}")
-}
-
-fn scale_factors(model: &ReducedModel, numbers: NumberStyle) -> Vec<(char, String)> {
-    let value = |factors: &ScaleFactors| match factors {
-        ScaleFactors::Uniform(factor) => {
-            format!(
-                "${}$ for all",
-                tex_number(&Decimal::exact(*factor), numbers)
-            )
-        }
-        ScaleFactors::PerCoordinate(_) => "one per coordinate".to_owned(),
-    };
-    let scaling = model.scaling().into_iter();
-    scaling
-        .flat_map(|of| [('x', value(&of.state)), ('u', value(&of.input))])
-        .collect()
 }

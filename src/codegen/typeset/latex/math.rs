@@ -128,8 +128,9 @@ pub(crate) fn tex_unit(unit: Unit) -> String {
 pub(super) const WIDTH_EM: f64 = 30.5;
 const INDENT: f64 = 2.3; // of a continued line, in em: `\qquad` and the empty group before its sign
 const BRACE: f64 = 1.8; // of the brace of `cases`, in em
-/// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: no page holds many more.
-pub(super) const CASES_LINES: usize = 30;
+/// Lines from which [`Form::Automatic`] prefers an environment that breaks across pages: more leave no place for a table
+/// above them.
+pub(super) const CASES_LINES: usize = 24;
 
 pub(super) struct Block {
     pub label: String,

@@ -22,6 +22,7 @@
 
 mod document;
 pub(crate) mod math;
+mod nomenclature;
 mod table;
 
 pub use document::emit;

@@ -1,29 +1,29 @@
-//! The coefficients as booktabs tables.
+//! The coefficients as a booktabs table: phases below each other, one column per acceleration.
 
-use super::document::is_narrow;
+use super::document::{TEX, is_narrow};
 use super::*;
+use crate::typeset::words;
 
-const TERM_HEAD_EM: f64 = 2.31;
-const COLUMN_SPACE_EM: f64 = 1.2; // around a column: twice LaTeX's `\tabcolsep` at 10 pt
-const UNIT_EM: f64 = 5.0; // beside a term
-/// Rows from which a table breaks across pages, or is cut where it cannot.
-const LONGEST: usize = 40;
+/// Lines of normal size from which a table breaks across pages, or is cut where it cannot.
+const LONGEST: f64 = 36.0;
 
-/// One table no wider than its column of text.
+/// One table no wider than its column of text or, over two columns, the page.
 pub(super) struct TableBlock {
+    /// `table`, `table*` over two columns, or `longtable`.
+    pub environment: &'static str,
+    /// Commands before the rows.
+    pub size: &'static str,
     pub columns: String,
     pub caption: String,
     /// What `\ref` can name: its own label, and for the first that of the whole.
     pub labels: Vec<String>,
-    pub phases: String,
-    pub rules: String,
     pub heads: String,
-    pub rows: Vec<String>,
-    pub long: bool,
+    /// Title and rows of each group of phases.
+    pub parts: Vec<(String, Vec<String>)>,
 }
 
-/// Cuts the table into blocks as wide as a column of text: phases share one if all fit. Narrow ones are cut between
-/// rows as well, as no table breaks across pages there.
+/// One block, as narrow as it can be printed well; several only where it is wider than the page or longer than a
+/// column in which no table breaks.
 pub(super) fn blocks(
     table: &CoefficientTable,
     model_name: &str,
@@ -31,31 +31,48 @@ pub(super) fn blocks(
     width_em: f64,
 ) -> Vec<TableBlock> {
     let mut blocks = Vec::new();
-    for columns in groups(table, width_em) {
-        let is_shown = |row: &&CoefficientRow| {
-            let mut cells = columns.iter().map(|&column| &row.coefficients[column]);
-            cells.any(Option::is_some)
+    for layout in layouts(table, width_em) {
+        let parts = table.parts.iter().map(|part| {
+            let is_shown = |row: &&CoefficientRow| {
+                let mut columns = layout.columns.iter();
+                columns.any(|&column| row.coefficients[column].is_some())
+            };
+            Part {
+                phases: part,
+                rows: part.rows.iter().filter(is_shown).collect(),
+                is_continued: false,
+            }
+        });
+        let parts: Vec<Part<'_>> = parts.collect();
+        let n_lines: usize = parts.iter().map(|part| part.rows.len() + 1).sum();
+        let longest = (LONGEST / layout.print.scale) as usize;
+        let is_long = n_lines > longest && layout.environment == TABLE && !is_narrow(width_em);
+        let layout = match is_long {
+            true => Layout {
+                environment: "longtable",
+                ..layout
+            },
+            false => layout,
         };
-        let rows: Vec<&CoefficientRow> = table.rows.iter().filter(is_shown).collect();
-        let at_once = match is_narrow(width_em) {
-            true => LONGEST,
-            false => rows.len().max(1),
+        let pieces = match is_long {
+            true => vec![parts],
+            false => pieces(parts, longest),
         };
-        let parts = rows.chunks(at_once);
-        blocks.extend(parts.map(|rows| block(table, &columns, rows, numbers)));
+        blocks.extend((pieces.iter()).map(|parts| block(table, &layout, parts, numbers)));
     }
     let count = blocks.len();
-    let units = match table.has_units() {
-        true => ". The unit of a coefficient is that of its column over that of its term",
-        false => "",
+    let name = tex_text(model_name);
+    let stem = format!("tab:{}", label(model_name));
+    let rule = match table.unit_rule() {
+        "" => String::new(),
+        rule => format!(". {}", rule.trim_end_matches('.')),
     };
-    let (name, stem) = (tex_text(model_name), format!("tab:{}", label(model_name)));
     for (place, block) in (1..).zip(&mut blocks) {
         let part = match count {
             1 => String::new(),
             _ => format!(", part {place} of {count}"),
         };
-        block.caption = format!(r"Coefficients of \texttt{{{name}}}{part}{units}");
+        block.caption = format!("Coefficients of the model {name}{part}{rule}");
         let own = (count > 1).then(|| format!("{stem}:{place}"));
         let whole = (place == 1).then(|| stem.clone());
         block.labels = whole.into_iter().chain(own).collect();
@@ -73,51 +90,170 @@ pub(super) fn references(blocks: &[TableBlock]) -> String {
     }
 }
 
-/// Columns that stand side by side.
-fn groups(table: &CoefficientTable, width_em: f64) -> Vec<Vec<usize>> {
-    let terms = table.rows.iter();
-    let terms = terms.map(|row| width(&row.term) + row.unit.map_or(0.0, |_| UNIT_EM));
-    let terms = terms.fold(TERM_HEAD_EM, f64::max) + COLUMN_SPACE_EM;
-    let widths = table
-        .columns
-        .iter()
-        .enumerate()
-        .map(|(column, (.., unit))| {
-            let head = unit.map_or(1.0, |_| UNIT_EM);
-            ColumnWidth::of(column, table.rows.iter()).em().max(head) + COLUMN_SPACE_EM
-        });
-    let widths: Vec<f64> = widths.collect();
-    let all_fit = terms + widths.iter().sum::<f64>() <= width_em;
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    for column in 0..table.columns.len() {
-        let fits = groups.last().is_some_and(|group| {
-            let same_phase = table.columns[group[0]].0 == table.columns[column].0;
-            let taken: f64 = group.iter().map(|&column| widths[column]).sum();
-            all_fit || same_phase && terms + taken + widths[column] <= width_em
-        });
-        match groups.last_mut() {
-            Some(group) if fits => group.push(column),
-            _ => groups.push(vec![column]),
+/// Phases with some of their rows.
+struct Part<'a> {
+    phases: &'a CoefficientPart,
+    rows: Vec<&'a CoefficientRow>,
+    is_continued: bool, // from the table before
+}
+
+/// Parts cut into tables of at most `longest` lines, titles included.
+fn pieces(parts: Vec<Part<'_>>, longest: usize) -> Vec<Vec<Part<'_>>> {
+    let mut pieces: Vec<Vec<Part<'_>>> = vec![Vec::new()];
+    let mut used = 0;
+    for Part { phases, rows, .. } in parts {
+        let mut rest = rows.as_slice();
+        loop {
+            // A title stands above a row of its phase.
+            if used + 1 + rest.len().min(1) > longest {
+                pieces.push(Vec::new());
+                used = 0;
+            }
+            let (now, later) = rest.split_at(rest.len().min(longest - used - 1));
+            let last = pieces.last_mut().expect("begun above");
+            last.push(Part {
+                phases,
+                rows: now.to_vec(),
+                is_continued: rest.len() < rows.len(),
+            });
+            used += 1 + now.len();
+            rest = later;
+            if rest.is_empty() {
+                break;
+            }
         }
     }
+    pieces
+}
+
+const TABLE: &str = "table";
+
+/// How the rows are set.
+struct Print {
+    /// Size of letters, as a share of that of the text around.
+    scale: f64,
+    /// Space around a column, in em: twice `\\tabcolsep`.
+    column_space_em: f64,
+    commands: &'static str,
+}
+
+/// From normal to tight. Letters of `\\footnotesize` are wider than scaled ones.
+const PRINTS: [Print; 3] = [
+    Print {
+        scale: 1.0,
+        column_space_em: 1.2,
+        commands: "",
+    },
+    Print {
+        scale: 0.85,
+        column_space_em: 1.2,
+        commands: "\\footnotesize\n",
+    },
+    Print {
+        scale: 0.85,
+        column_space_em: 0.6,
+        commands: "\\footnotesize\\setlength{\\tabcolsep}{3pt}\n",
+    },
+];
+
+/// Columns side by side, and how they are set.
+struct Layout {
+    environment: &'static str,
+    print: &'static Print,
+    columns: Vec<usize>,
+}
+
+/// The first print that fits a column of text, then the page of two; else columns in groups that fit the page.
+fn layouts(table: &CoefficientTable, width_em: f64) -> Vec<Layout> {
+    let (page, page_em) = match is_narrow(width_em) {
+        true => ("table*", 2.0 * width_em),
+        false => (TABLE, width_em),
+    };
+    let all: Vec<usize> = (0..table.columns.len()).collect();
+    for (environment, available) in [(TABLE, width_em), (page, page_em)] {
+        let fits = |print: &&Print| width_of(table, &all, print) <= available;
+        if let Some(print) = PRINTS.iter().find(fits) {
+            return vec![Layout {
+                environment,
+                print,
+                columns: all,
+            }];
+        }
+    }
+    let print = &PRINTS[PRINTS.len() - 1];
+    // As few groups as fit, nearly equal; a column each at the least.
+    let fit = |group: &[usize]| group.len() == 1 || width_of(table, group, print) <= page_em;
+    let sizes = (2..=all.len()).map(|n_groups| all.len().div_ceil(n_groups));
+    let size = sizes.into_iter().find(|size| all.chunks(*size).all(fit));
+    let groups = all.chunks(size.unwrap_or(1));
     groups
+        .map(|columns| Layout {
+            environment: page,
+            print,
+            columns: columns.to_vec(),
+        })
+        .collect()
+}
+
+const TERM_HEAD_EM: f64 = 2.31;
+
+/// Estimated width of the table with these columns, in em of the text around.
+fn width_of(table: &CoefficientTable, columns: &[usize], print: &Print) -> f64 {
+    let rows = || table.parts.iter().flat_map(|part| &part.rows);
+    let terms = rows()
+        .map(|row| width(&row.term))
+        .fold(TERM_HEAD_EM, f64::max);
+    let units = rows().filter_map(|row| row.unit).map(unit_width);
+    let units = units.reduce(f64::max);
+    let numbers = columns.iter().map(|&column| {
+        let (left, unit) = &table.columns[column];
+        let head = symbol_width(left).max(unit.map_or(0.0, unit_width));
+        ColumnWidth::of(column, rows()).em().max(head)
+    });
+    let widths: Vec<f64> = [terms].into_iter().chain(units).chain(numbers).collect();
+    let titles = table.parts.iter().map(|part| {
+        let title = part.row_title(&words::PLAIN);
+        LETTER_EM * title.chars().count() as f64
+    });
+    let width =
+        print.scale * widths.iter().sum::<f64>() + print.column_space_em * widths.len() as f64;
+    (titles.map(|title| print.scale * title)).fold(width, f64::max)
+}
+
+const LETTER_EM: f64 = 0.5; // of a title, on average
+
+/// Estimated width of a unit in print.
+fn unit_width(unit: Unit) -> f64 {
+    let em = |letter: char| match letter {
+        'm' => 0.84,
+        '^' => 0.0,
+        '0'..='9' => 0.4,
+        _ => 0.6,
+    };
+    unit.to_string().chars().map(em).sum()
 }
 
 /// A block without its caption and labels.
 fn block(
     table: &CoefficientTable,
-    columns: &[usize],
-    rows: &[&CoefficientRow],
+    layout: &Layout,
+    parts: &[Part<'_>],
     numbers: NumberStyle,
 ) -> TableBlock {
-    let of_rows = |&column: &usize| ColumnWidth::of(column, rows.iter().copied());
-    let widths: Vec<ColumnWidth> = columns.iter().map(of_rows).collect();
+    let shown = || parts.iter().flat_map(|part| part.rows.iter().copied());
+    let of_rows = |&column: &usize| ColumnWidth::of(column, shown());
+    let widths: Vec<ColumnWidth> = layout.columns.iter().map(of_rows).collect();
+    let has_units = table.has_units();
     let row = |row: &&CoefficientRow| {
         let mut text = format!("${}$", tex(&row.term, numbers));
-        if let Some(unit) = row.unit {
-            text.push_str(&format!(r"\quad${}$", tex_unit(unit)));
+        if has_units {
+            text.push_str(" & ");
+            text.push_str(
+                &row.unit
+                    .map_or(String::new(), |unit| format!("${}$", tex_unit(unit))),
+            );
         }
-        for (&column, width) in columns.iter().zip(&widths) {
+        for (&column, width) in layout.columns.iter().zip(&widths) {
             text.push_str(" & ");
             if let Some(number) = &row.coefficients[column] {
                 text.push_str(&cell(number, width, numbers));
@@ -129,43 +265,42 @@ fn block(
         NumberStyle::Plain => format!(" & ${math}$"),
         NumberStyle::Siunitx => format!(" & {{${math}$}}"),
     };
-    let heads = columns.iter().map(|&column| &table.columns[column]);
-    let symbols = heads.clone().map(|(_, left, _)| head(tex_symbol(left)));
-    let units = heads.filter_map(|(.., unit)| Some(head(tex_unit((*unit)?))));
-    let units = match table.has_units() {
-        true => format!("\n{} \\\\", units.collect::<String>()),
-        false => String::new(),
-    };
-    let (phases, rules) = phase_heads(table, columns);
+    let heads = layout.columns.iter().map(|&column| &table.columns[column]);
+    let symbols: String = heads
+        .clone()
+        .map(|(left, _)| head(tex_symbol(left)))
+        .collect();
+    let units: String = heads
+        .filter_map(|(_, unit)| Some(head(tex_unit((*unit)?))))
+        .collect();
     let widths_of_columns = widths.iter().map(|width| match numbers {
         NumberStyle::Plain => "r".to_owned(),
         NumberStyle::Siunitx => format!("S[table-format={}]", width.format()),
     });
+    let n_columns = layout.columns.len() + if has_units { 2 } else { 1 };
+    let title = |part: &Part<'_>| {
+        let continued = if part.is_continued { ", continued" } else { "" };
+        let title = part.phases.row_title(&TEX) + continued;
+        format!(r"\multicolumn{{{n_columns}}}{{@{{}}l}}{{\emph{{{title}}}}} \\")
+    };
+    let before = if has_units { "ll" } else { "l" };
     TableBlock {
-        columns: format!("l{}", widths_of_columns.collect::<String>()),
+        environment: layout.environment,
+        size: layout.print.commands,
+        columns: format!(
+            "@{{}}{before}{}@{{}}",
+            widths_of_columns.collect::<String>()
+        ),
         caption: String::new(),
         labels: Vec::new(),
-        phases,
-        rules,
-        heads: format!(r"Term{} \\{units}", symbols.collect::<String>()),
-        rows: rows.iter().map(row).collect(),
-        long: rows.len() > LONGEST,
+        heads: match has_units {
+            true => format!("Term & Unit{symbols} \\\\\n &{units} \\\\"),
+            false => format!(r"Term{symbols} \\"),
+        },
+        parts: (parts.iter())
+            .map(|part| (title(part), part.rows.iter().map(row).collect()))
+            .collect(),
     }
-}
-
-/// Phase names, each over its columns, and the rules below them.
-fn phase_heads(table: &CoefficientTable, columns: &[usize]) -> (String, String) {
-    let phase = |column: &usize| &table.columns[*column].0;
-    let (mut names, mut rules) = (String::new(), String::new());
-    let mut start = 2;
-    for columns in columns.chunk_by(|a, b| phase(a) == phase(b)) {
-        let (span, name) = (columns.len(), tex_text(phase(&columns[0])));
-        let end = start + span - 1;
-        names.push_str(&format!(r" & \multicolumn{{{span}}}{{c}}{{{name}}}"));
-        rules.push_str(&format!(r"\cmidrule(lr){{{start}-{end}}}"));
-        start = end + 1;
-    }
-    (format!(r"{} \\", names.trim_start()), rules)
 }
 
 fn cell(number: &Decimal, width: &ColumnWidth, numbers: NumberStyle) -> String {
