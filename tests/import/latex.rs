@@ -536,3 +536,23 @@ fn hostile_documents_end_with_an_error() {
         assert!(matches!(error.place, Place::Character(..)), "{error}");
     }
 }
+
+#[test]
+fn comment_that_names_several_phases_gives_each_the_equations() {
+    let text = "% Phases rear stance, flight: two feet; none.\n\\[\\ddot z_1 = u_1\\]\n\
+                % Phase contact: any.\n\\[\\ddot z_1 = 2u_1\\]\n";
+    let found = named(text, &[]).expect("three phases");
+    let phases = [("rear stance", "u1"), ("flight", "u1"), ("contact", "2*u1")];
+    let expected = phases.map(|(name, side)| (Some(name.to_owned()), vec![side.to_owned()]));
+    assert_eq!(found, expected);
+    let again = text.replace("Phase contact", "Phase flight");
+    let error = named(&again, &[]).expect_err(&again).to_string();
+    assert!(
+        error.contains("phase `flight` again, as in line 2"),
+        "{error}"
+    );
+    // A sentence that begins alike names none.
+    let sentence = text.replace("Phases rear stance, flight", "Phases follow");
+    let found = named(&sentence, &[]).expect("two sections");
+    assert_eq!(found[0].0, None);
+}

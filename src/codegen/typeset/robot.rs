@@ -76,28 +76,20 @@ impl RobotTypeset {
                     ddq[(term, row)] = finite(sum / factors[row], output, text)?;
                 }
             }
-            ddq.row_iter_mut()
-                .for_each(|mut of_term| drop_noise(of_term.iter_mut()));
-            let constants = pairs.iter().filter_map(|&(latent, coordinate)| {
-                let constant = terms.iter().position(|(text, _)| *text == "1")?;
-                Some((
-                    latent,
-                    coordinate,
-                    [ddq[(constant, coordinate)], xi[(constant, latent)]],
-                ))
-            });
-            let constants: Vec<(usize, usize, [f64; 2])> = constants.collect();
-            let sizes = constants.iter().map(|(.., [_, latent])| latent.abs());
-            let least = NOTABLE * sizes.fold(0.0, f64::max);
-            let differ = constants
-                .iter()
-                .filter(|(.., [robot, latent])| (robot - latent).abs() > least);
-            deviations.extend(differ.map(|&(latent, coordinate, constants)| Deviation {
-                phase: index,
-                coordinate: outputs[coordinate].0.clone(),
-                latent: symbols.acceleration(latent),
-                constants: constants.map(|value| rounder.round(value)),
-            }));
+            if rounding != Rounding::Exact {
+                ddq.row_iter_mut()
+                    .for_each(|mut of_term| drop_noise(of_term.iter_mut()));
+            }
+            if let Some(constant) = terms.iter().position(|(text, _)| *text == "1") {
+                let constants = [ddq.row(constant).transpose(), xi.row(constant).transpose()];
+                let differing = differing(&pairs, &constants).into_iter();
+                deviations.extend(differing.map(|(latent, coordinate, constants)| Deviation {
+                    phase: index,
+                    coordinate: outputs[coordinate].0.clone(),
+                    latent: symbols.acceleration(latent),
+                    constants: constants.map(|value| rounder.round(value)),
+                }));
+            }
             systems.push(rounder.system(&phase.name, &outputs, &terms, &ddq));
         }
         Ok(Some(Self {
@@ -125,6 +117,21 @@ fn positions(encoder: &AffineMap, factors: &DVector<f64>, units: &[String]) -> V
         }
     });
     pairs.collect()
+}
+
+/// Those of the `pairs` whose constant accelerations, of the robot and latent, differ notably, with both.
+fn differing(
+    pairs: &[(usize, usize)],
+    [robot, latent]: &[DVector<f64>; 2],
+) -> Vec<(usize, usize, [f64; 2])> {
+    let constants = pairs
+        .iter()
+        .map(|&(row, coordinate)| (row, coordinate, [robot[coordinate], latent[row]]));
+    let sizes = constants.clone().map(|(.., [_, latent])| latent.abs());
+    let least = NOTABLE * sizes.fold(0.0, f64::max);
+    constants
+        .filter(|(.., [robot, latent])| (robot - latent).abs() > least)
+        .collect()
 }
 
 /// Zeroes for values of one unit that are rounding errors compared with the largest of them.

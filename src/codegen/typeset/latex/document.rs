@@ -30,32 +30,21 @@ pub fn emit(system: &Equations<'_>, options: &PrintOptions) -> Emitted {
     let systems = &of_groups(model, &typeset.systems, &groups, "", options);
     let of_all = header.equations(&typeset.rounding);
     let remark = units.clone().unwrap_or_default();
-    let mut files = vec![equations(
-        format!("{stem}.tex"),
-        of_all,
-        systems,
-        false,
-        &remark,
-    )?];
-    let in_comment = units.map_or(String::new(), |units| format!("\n% {units}"));
+    let path = format!("{stem}.tex");
+    let mut files = vec![equations(path, of_all, systems, false, &remark)?];
+    let of_phase = header.short(&format!(
+        "One phase of the equations; instead of {stem}.tex."
+    ));
+    let of_phase = of_phase + &units.map_or(String::new(), |units| format!("\n% {units}"));
     for place in 0..model.phases().len() {
         let path = format!("{stem}_{}.tex", model.phase_identifier(place));
-        let of_phase = header.short("One phase of the equations, with the same label.");
         let system = [of_group(model, &typeset.systems, &[place], "", options)];
-        files.push(equations(path, of_phase + &in_comment, &system, false, "")?);
+        files.push(equations(path, of_phase.clone(), &system, false, "")?);
     }
     let width_em = options.width_em.unwrap_or(math::WIDTH_EM);
     let blocks = table::blocks(&typeset.table, model.name(), options.numbers, width_em);
-    let packages = match blocks.iter().any(|block| block.environment == "longtable") {
-        true => "Needs booktabs and longtable.",
-        false => "Needs booktabs.",
-    };
     let tables = table::references(&blocks);
-    let coefficients = Document::Tables {
-        header: header.short(packages) + &label_list(blocks.iter().flat_map(|block| &block.labels)),
-        blocks,
-    };
-    files.push(file(format!("{stem}-table.tex"), &coefficients)?);
+    files.push(file(format!("{stem}-table.tex"), &header.tables(blocks))?);
     let of_symbols = header.short("A list of symbols; needs amsmath.");
     files.push(nomenclature::file(system, of_symbols, options)?);
     let is_physical = system.latent_units().is_some();
@@ -66,18 +55,14 @@ pub fn emit(system: &Equations<'_>, options: &PrintOptions) -> Emitted {
         let remark = deviations(model, robot, options);
         files.push(equations(path, comments, &systems, true, &remark)?);
     }
-    let phases = systems.iter().zip(&groups);
+    let phases = systems.iter().zip(&groups).map(|(system, group)| {
+        let identifier = model.phase_identifier(group[0]);
+        (system.introduction.as_str(), identifier)
+    });
     let preview = Document::Preview {
         header: header.short("A document of its own; the files beside it are for \\input."),
         model,
-        phases: phases
-            .map(|(system, group)| {
-                (
-                    system.introduction.as_str(),
-                    model.phase_identifier(group[0]),
-                )
-            })
-            .collect(),
+        phases: phases.collect(),
         units: remark,
         rounding: words::rounding(&TEX, options.rounding, &typeset.rounding),
         siunitx: options.numbers == NumberStyle::Siunitx,
@@ -300,6 +285,19 @@ impl Header<'_> {
             None => String::new(),
         };
         format!("% romc {version}, model {name}{digest}.\n% {note}")
+    }
+
+    fn tables<'a>(&self, blocks: Vec<TableBlock>) -> Document<'a> {
+        let is_long = blocks.iter().any(|block| block.environment == "longtable");
+        let packages = match is_long {
+            true => "Needs booktabs and longtable.",
+            false => "Needs booktabs.",
+        };
+        let labels = label_list(blocks.iter().flat_map(|block| &block.labels));
+        Document::Tables {
+            header: self.short(packages) + &labels,
+            blocks,
+        }
     }
 
     fn equations(&self, report: &RoundingReport) -> String {

@@ -165,7 +165,7 @@ fn largest_weights(model: &ReducedModel, row: usize, numbers: NumberStyle) -> Op
     let strongest: Vec<String> = (weights.iter().take(STRONGEST))
         .filter(|(_, weight)| weight.abs() > NEGLIGIBLE * largest)
         .map(|&(place, weight)| {
-            let weight = tex_number(&Decimal::rounded(weight, Rounding::default()), numbers);
+            let weight = tex_number(&Decimal::rounded(weight, Rounding::Significant(2)), numbers);
             let (words, symbol) = (
                 coordinate_words(&state.names[place]),
                 tex_symbol(&symbols[place]),
@@ -243,8 +243,9 @@ fn lift(
         .map(|unit| Unit::from_name(unit))
         .collect();
     let is_by_squares = |latent: &usize| {
-        let own = own_units.iter().zip(units.lift.column(*latent).into_iter());
-        let own = own.filter(|(unit, _)| **unit == Some(units.input[*latent]));
+        let shares = units.lift.column(*latent);
+        let own = (own_units.iter().zip(&shares))
+            .filter(|(unit, _)| **unit == Some(units.input[*latent]));
         (own.map(|(_, share)| share.abs()).sum::<f64>() - 1.0).abs() > SAME
     };
     let by_squares = (0..units.input.len()).filter(is_by_squares);

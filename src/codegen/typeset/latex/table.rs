@@ -245,34 +245,21 @@ fn block(
     let widths: Vec<ColumnWidth> = layout.columns.iter().map(of_rows).collect();
     let has_units = table.has_units();
     let row = |row: &&CoefficientRow| {
-        let mut text = format!("${}$", tex(&row.term, numbers));
-        if has_units {
-            text.push_str(" & ");
-            text.push_str(
-                &row.unit
-                    .map_or(String::new(), |unit| format!("${}$", tex_unit(unit))),
-            );
-        }
-        for (&column, width) in layout.columns.iter().zip(&widths) {
-            text.push_str(" & ");
-            if let Some(number) = &row.coefficients[column] {
-                text.push_str(&cell(number, width, numbers));
-            }
-        }
-        text.trim_end().to_owned() + r" \\"
+        let cells = layout.columns.iter().zip(&widths);
+        let cells = cells.map(|(&column, width)| {
+            let number = row.coefficients[column].as_ref();
+            number.map_or(String::new(), |number| cell(number, width, numbers))
+        });
+        let unit = row
+            .unit
+            .map_or(String::new(), |unit| format!("${}$", tex_unit(unit)));
+        let cells: Vec<String> = [format!("${}$", tex(&row.term, numbers))]
+            .into_iter()
+            .chain(has_units.then_some(unit))
+            .chain(cells)
+            .collect();
+        cells.join(" & ").trim_end().to_owned() + r" \\"
     };
-    let head = |math: String| match numbers {
-        NumberStyle::Plain => format!(" & ${math}$"),
-        NumberStyle::Siunitx => format!(" & {{${math}$}}"),
-    };
-    let heads = layout.columns.iter().map(|&column| &table.columns[column]);
-    let symbols: String = heads
-        .clone()
-        .map(|(left, _)| head(tex_symbol(left)))
-        .collect();
-    let units: String = heads
-        .filter_map(|(_, unit)| Some(head(tex_unit((*unit)?))))
-        .collect();
     let widths_of_columns = widths.iter().map(|width| match numbers {
         NumberStyle::Plain => "r".to_owned(),
         NumberStyle::Siunitx => format!("S[table-format={}]", width.format()),
@@ -293,13 +280,28 @@ fn block(
         ),
         caption: String::new(),
         labels: Vec::new(),
-        heads: match has_units {
-            true => format!("Term & Unit{symbols} \\\\\n &{units} \\\\"),
-            false => format!(r"Term{symbols} \\"),
-        },
+        heads: heads(table, &layout.columns, numbers),
         parts: (parts.iter())
             .map(|part| (title(part), part.rows.iter().map(row).collect()))
             .collect(),
+    }
+}
+
+/// Symbols of the columns and, where they are physical, their units in a second line.
+fn heads(table: &CoefficientTable, columns: &[usize], numbers: NumberStyle) -> String {
+    let head = |math: String| match numbers {
+        NumberStyle::Plain => format!(" & ${math}$"),
+        NumberStyle::Siunitx => format!(" & {{${math}$}}"),
+    };
+    let of = |&column: &usize| {
+        let (left, unit) = &table.columns[column];
+        let unit = unit.map(|unit| head(tex_unit(unit)));
+        (head(tex_symbol(left)), unit.unwrap_or_default())
+    };
+    let (symbols, units): (String, String) = columns.iter().map(of).unzip();
+    match table.has_units() {
+        true => format!("Term & Unit{symbols} \\\\\n &{units} \\\\"),
+        false => format!(r"Term{symbols} \\"),
     }
 }
 
