@@ -21,7 +21,7 @@ def executed() -> nbformat.NotebookNode:
     with tempfile.TemporaryDirectory() as folder:
         resources = {"metadata": {"path": folder}}
         options = {"timeout": 300, "kernel_name": "python3", "resources": resources}
-        # The same outputs in every run: no times, and what is printed in one piece.
+        # The same outputs in every run: no times, and printed text in one piece.
         options |= {"record_timing": False, "coalesce_streams": True}
         nbclient.NotebookClient(notebook, **options).execute()
     # The kernel has added its version.

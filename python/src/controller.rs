@@ -73,7 +73,7 @@ pub struct Controller {
     model: Arc<ReducedModel>,
 }
 
-/// What a step returns besides arrays.
+/// A step's command.
 #[derive(IntoPyObject)]
 struct StepResult<'py> {
     torque: Bound<'py, PyArray1<f64>>,

@@ -29,7 +29,7 @@ const NOTEBOOK_EM: f64 = 60.0;
 pub struct EmitArguments {
     digits: Option<usize>,
     significant: Option<usize>,
-    /// Whether coefficients are printed in full unless digits are given.
+    /// Whether coefficients are printed in full where no digits are set.
     exact: bool,
     width: Option<f64>,
     form: Option<String>,
@@ -43,7 +43,7 @@ pub struct EmitArguments {
     sincos: String,
 }
 
-/// The same as the library takes them.
+/// The same for the library.
 struct Emission {
     as_learned: bool,
     is_physical: bool,
@@ -144,7 +144,7 @@ pub fn emit(
     Ok(files.map(|file| (file.path, file.contents)).collect())
 }
 
-/// The equations of each phase, and what rounding did to them.
+/// The equations of each phase, and their rounding in words.
 #[pyfunction]
 pub fn equations(
     py: Python<'_>,
@@ -156,7 +156,7 @@ pub fn equations(
         let equations = emission.equations(model)?;
         let print = &emission.options.print;
         let typeset = Typeset::new(&equations, &print.symbols, print.rounding);
-        // Text is read back: it has all digits unless some are asked for.
+        // Text is read back: it has all digits where none are set.
         let in_text = match print.rounding {
             Rounding::Adaptive => Rounding::Exact,
             rounding => rounding,

@@ -47,7 +47,7 @@ impl Class {
     }
 }
 
-/// What a caller can act on.
+/// Class and place of an error.
 struct Fault {
     class: Class,
     file: Option<String>,

@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::errors::python_error;
 use crate::recording::{Recording, gather};
 
-/// What recordings show of a robot: as JSON, as TOML, and the text of `romc identify`.
+/// Gravity, mass, friction and rotor inertia from recordings: as JSON, as TOML, and the text of `romc identify`.
 #[pyfunction]
 pub fn identify(
     py: Python<'_>,

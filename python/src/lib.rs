@@ -1,7 +1,7 @@
-//! The native half of the Python package: what `romc` computes, on NumPy arrays.
+//! The native half of the Python package: the functions of `romc` on NumPy arrays.
 //!
 //! The other half, `python/romc`, has the classes that users see and their documentation; it turns
-//! what they hand in into contiguous arrays and lists, which is all that these functions take.
+//! their arguments into contiguous arrays and lists for these functions.
 //! Long calls let other Python threads run.
 
 mod arrays;

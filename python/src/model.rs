@@ -261,7 +261,7 @@ impl Model {
         Ok(from_vectors(py, d, &accelerations))
     }
 
-    /// The model file's keys besides the tensors, for `repr` and notebooks.
+    /// The model file's keys without the tensors, for `repr` and notebooks.
     fn summary(&self) -> BTreeMap<&'static str, String> {
         let mut summary = BTreeMap::new();
         summary.insert("description", self.data.description().to_owned());

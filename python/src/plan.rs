@@ -11,8 +11,8 @@ use crate::errors::{python_error, within};
 use crate::model::Model;
 use crate::recording::{Recording, Segment};
 
-/// Plans a jump; returns it as a recording, and its figures as JSON. A plan that is not to be trusted
-/// is an error unless forced.
+/// Plans a jump; returns it as a recording, and its figures as JSON. A plan that is not trusted
+/// is an error if it is not forced.
 #[pyfunction]
 pub fn plan(
     py: Python<'_>,
@@ -45,7 +45,7 @@ pub fn plan(
     Ok((Recording::made(planned.motion.into()), json))
 }
 
-/// Plans a walk; returns it as a recording. One that is not to be trusted is an error unless forced.
+/// Plans a walk; returns it as a recording. One that is not trusted is an error if it is not forced.
 #[pyfunction]
 pub fn walk(
     py: Python<'_>,

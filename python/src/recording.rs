@@ -206,7 +206,7 @@ impl RobotOf<'_> {
     }
 }
 
-/// Reads files, one reader for all; returns the recordings, and in words what was done besides reading.
+/// Reads files, one reader for all; returns the recordings, and the repairs in words.
 #[pyfunction]
 pub fn read(
     py: Python<'_>,
@@ -339,7 +339,7 @@ fn through_the_format(
     })
 }
 
-/// The recordings of a list, in one piece of memory as the library takes them.
+/// The recordings of a list, in one piece of memory.
 pub fn gather(recordings: &[PyRef<'_, Recording>]) -> Vec<romc::recording::Recording> {
     let recordings = recordings.iter();
     recordings

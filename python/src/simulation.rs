@@ -138,8 +138,8 @@ pub fn predict<'py>(
     let turns = |segment: &&Segment| !matches!(segment.by_heading()[..], [Cow::Borrowed(_)]);
     if let Some(segment) = segments.iter().find(turns) {
         let message = format!(
-            "{}: the motion from row {} turns by more than 0.25 rad, and predictions are of pieces in the axes of their \
-             heading: simulate(recording).runs has these pieces",
+            "{}: the motion from row {} turns by more than 0.25 rad, and predictions are of pieces in the axes of \
+             their heading: simulate(recording).runs has these pieces",
             segment.path.display(),
             segment.first_row
         );
@@ -208,5 +208,5 @@ fn verdict_text(verdict: &Verdict) -> String {
 }
 
 const OUTCOME_WIDTH: usize = 14;
-/// Width of what a row measures, so that lines have 80 characters at most.
+/// Width of the words of a row, so that lines have 80 characters at most.
 const WORDS_WIDTH: usize = 80 - OUTCOME_WIDTH - 4;

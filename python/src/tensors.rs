@@ -43,11 +43,11 @@ pub struct ImportArguments {
     wrench_frame: String,
     actuators: Option<Losses>,
     sample_time: Option<f64>,
-    /// Whether a model that misses the recordings is made all the same.
+    /// Whether a model that misses the recordings is nevertheless made.
     unchecked: bool,
 }
 
-/// What the joints take of the motors' torques: a file with a table `actuators`, or its arrays by name.
+/// Joint friction and rotor inertia: a file with a table `actuators`, or its arrays by name.
 #[derive(FromPyObject)]
 enum Losses {
     File(PathBuf),
@@ -138,8 +138,8 @@ impl ImportArguments {
     }
 }
 
-/// Imports named arrays; returns the model, and what is wrong with it along the recordings, if anything
-/// is and it is not refused. Recordings give it the statistics of the inputs.
+/// Imports named arrays; returns the model, and its fault along the recordings if it has one and is not
+/// refused. Recordings give it the statistics of the inputs.
 #[pyfunction]
 pub fn import_tensors(
     py: Python<'_>,

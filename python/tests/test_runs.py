@@ -108,7 +108,7 @@ def test_torques_of_a_reference_make_its_input_as_those_of_a_recording_do(model,
     controllers = [romc.Controller(model).set_reference(**reference) for reference in references]
     torques = [of.step(jump.t[40], jump.x[40], jump.dx[40], jump.feet[40]).torque for of in controllers]
     assert np.array_equal(torques[0], torques[1]) and np.array_equal(torques[0], torques[2])
-    with pytest.raises(romc.RecordingError, match="`torque`: found `u` too"):
+    with pytest.raises(romc.RecordingError, match="`torque`: found `torque` and `u`"):
         romc.Controller(model).set_reference(**inputs, torque=jump.torque)
     with pytest.raises(romc.RecordingError, match="`torque`"):
         romc.Controller(model).set_reference(**{**arrays, "torque": jump.torque[:, :11]})
@@ -166,7 +166,7 @@ def test_settings_are_those_of_the_table(model, jump):
         ("tilt_rad", "far", "tilt_rad: found 'far', expected a number"),
         ("frozen_steps", 1.5, "frozen_steps is 1.5, expected a whole number"),
         ("tilt", 0.5, 'setting: found "tilt", expected one of horizon, .*, tilt_rad, '),
-        ("step_s", 0.02, "step: found step_s too, expected one of them"),
+        ("step_s", 0.02, "step: found step and step_s, expected one of them"),
     ]:
         with pytest.raises(romc.RomcError, match=message):
             romc.Controller(model, **{name: value, "step": 0.01})

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::*;
 
-/// What a program gives to a command besides its arguments.
+/// Recordings, a model and a stop for a command, from the program in which it runs.
 #[derive(Debug, Default)]
 pub struct Host {
     /// Recordings that a command uses as they are where its arguments name their paths.
@@ -69,7 +69,7 @@ pub(super) fn keep_note(text: &str) -> bool {
     })
 }
 
-/// Runs a command by its arguments, the first of them `romc`, with what the program holds.
+/// Runs a command by its arguments, the first of them `romc`, on the recordings and the model of the program.
 ///
 /// # Errors
 /// [`HostError::Usage`] for arguments that are not the command's, else the command's own.

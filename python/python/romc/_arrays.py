@@ -1,4 +1,4 @@
-"""Whatever holds numbers, as arrays of NumPy."""
+"""Numbers of any kind as arrays of NumPy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def floats(name: str, value: Any, ndim: Optional[int] = None, error: Type[RomcEr
     """An array of doubles in one piece of memory, without a copy where `value` is one.
 
     Takes NumPy arrays, lists, PyTorch tensors (on any device, with gradients) and, by the array protocol, JAX arrays
-    and what else converts.
+    and everything else that converts.
     """
     if hasattr(value, "detach"):
         value = value.detach().cpu().double()

@@ -23,7 +23,7 @@ def main() -> None:
 
 
 class Answer(NamedTuple):
-    """What a command returns: the object of `--json`, the text that it prints, the model of a training."""
+    """Object of `--json` and printed text of a command, and the model of a training."""
 
     summary: Dict[str, Any]
     text: str

@@ -1,8 +1,9 @@
-"""Arguments that several constructors of models take."""
+"""Options of functions that have many."""
 
 from __future__ import annotations
 
-from typing import Any, Mapping, Sequence, TypedDict, Union
+import json
+from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, TypedDict, Union
 
 from romc._arrays import Floats
 from romc.recording import PathLike, Recordings
@@ -33,7 +34,7 @@ class ImportOptions(TypedDict, total=False):
 
 
 class TrainOptions(TypedDict, total=False):
-    """Options of `romc train` by their names there; `docs/reference/training-settings.md` and `romc train --help` have each."""
+    """Options of `romc train` by their names there, which `docs/reference/training-settings.md` documents."""
 
     split: Sequence[int]
     config: PathLike
@@ -94,3 +95,24 @@ class StudyOptions(TypedDict, total=False):
     shard: str
     columns: PathLike
     clock: str
+
+
+def emit_arguments(exact: bool, *, rename: Optional[Mapping[str, str]], **others: Any) -> Dict[str, object]:
+    """The options of `romc compile`."""
+    arguments: Dict[str, object] = {
+        "precision": "f64",
+        "sincos": "inline",
+        "exact": exact,
+        "rename": [f"{variable}={name}" for variable, name in (rename or {}).items()],
+    }
+    return {**arguments, **others}
+
+
+def ranges(domain: Mapping[str, Mapping[str, Tuple[float, float]]]) -> str:
+    """Ranges as the command line reads them from a file."""
+    lines = []
+    for phase, variables in domain.items():
+        lines.append(f"[{json.dumps(phase)}]")
+        for variable, (low, high) in variables.items():
+            lines.append(f"{json.dumps(variable)} = [{float(low)!r}, {float(high)!r}]")
+    return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-"""Parts of a model out of other libraries' objects, by what they can do: nothing of theirs is imported."""
+"""Parts of a model from objects of other libraries, by their methods: nothing of theirs is imported."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _layer(name: str, pair: LayerPair) -> Tensors:
 def affine(part: str, pipeline: Any) -> LayerPair:
     """Weights and bias of a fitted pipeline, from its values at the origin and the unit vectors.
 
-    Raises `ModelError` unless random points confirm that it is affine.
+    Raises `ModelError` if random points show that it is not affine.
     """
     if part == "encoder":
         apply, width = pipeline.transform, int(pipeline.n_features_in_)
@@ -83,7 +83,7 @@ def affine(part: str, pipeline: Any) -> LayerPair:
     scale = max(1.0, float(np.abs(expected).max()))
     off = float(np.abs(points @ weights.T + bias - expected).max()) / scale
     if not off <= 1e-9:
-        found = f"found a nonlinear {type(pipeline).__name__} (off by {off:.1e} from the affine map)"
+        found = f"found a nonlinear {type(pipeline).__name__} (error {off:.1e} of the affine map)"
         expected_text = "an affine one, or layers as pairs (weights, bias) with activation="
         raise ModelError(f"`{part}`: {found}, expected {expected_text}", tensor=part)
     return weights, bias
@@ -99,7 +99,7 @@ def phase_tensors(prefix: str, source: Union[Mapping[str, Any], Any, None]) -> T
 
 def torch_parts(module: Any, decoder: Any) -> Tuple[Tensors, Optional[str]]:
     """The tensors of a PyTorch module with parts `encoder` and `decoder`, or of two modules, and the activation
-    between their layers. Tensors besides those of the two parts keep their names in the state dictionary."""
+    between their layers. Tensors of other parts keep their names in the state dictionary."""
     if decoder is not None:
         parts, others = {"encoder": module, "decoder": decoder}, {}
     else:

@@ -22,7 +22,7 @@ STATUSES: Dict[str, str] = dict(_romc.statuses())
 
 @dataclass(frozen=True)
 class Command:
-    """What the robot's joints get until the next step."""
+    """The command of the robot's joints until the next step."""
 
     torque: Floats
     """Feed-forward torques, `(12,)`, in N m, within the robot's limits whatever happened."""
@@ -37,8 +37,8 @@ class Command:
     u_lat: Floats
     """Latent input, `(d,)`, scaled."""
     status: str
-    """How the step ended: `solved`, `softened`, `contact_early`, ... with a plan, else why there is none. `STATUSES` has
-    them all."""
+    """How the step ended: `solved`, `softened`, `contact_early`, ... with a plan, else why there is none. `STATUSES`
+    has them all."""
     status_code: int
     """The same as in the generated controllers: 0 solved, positive a fallback or changed problem, negative refused
     input."""
@@ -102,9 +102,10 @@ class Controller:
     """Latent model-predictive control: a reference, then one command per measurement.
 
     `horizon` stages of `step` seconds. `lift` makes torques of the latent input: `transpose` (`u = W_e^T u_lat`) or
-    `consistent` (torques whose own ground forces come closest). Others of the controller's settings (`docs/reference/controller-settings.md`)
-    are keywords under the names in `settings`: a number, or the word of `lift`, `solver`, `linearisation`, `after_end`.
-    `float("inf")` switches a bound off, 0 a count and a limit that is 0 by default; `None` is the default.
+    `consistent` (torques whose own ground forces come closest). Others of the controller's settings
+    (`docs/reference/controller-settings.md`) are keywords under the names in `settings`: a number, or the word of
+    `lift`, `solver`, `linearisation`, `after_end`. `float("inf")` switches a bound off, 0 a count and a limit that is 0
+    by default; `None` is the default.
 
     >>> controller = romc.Controller(model).set_reference(jump)
     >>> controller.step(t, x, dx, feet).torque
@@ -119,13 +120,13 @@ class Controller:
         **settings: Union[float, str, None],
     ) -> None:
         if step is not None and "step_s" in settings:
-            raise RomcError("step: found step_s too, expected one of them")
+            raise RomcError("step: found step and step_s, expected one of them")
         given = {"horizon": horizon, "step_s": step, "lift": lift, **settings}
         self._native = _romc.Controller(model._native, [of for of in given.items() if of[1] is not None])
 
     @property
     def settings(self) -> Dict[str, Union[float, str]]:
-        """All settings by name, which `Controller(model, **settings)` takes; `step_s` is `step`."""
+        """All settings by name, as arguments of `Controller(model, **settings)`; `step_s` is `step`."""
         return self._native.settings
 
     def set_reference(
@@ -142,8 +143,8 @@ class Controller:
     ) -> "Controller":
         """Takes a trajectory to follow; returns the controller.
 
-        Either a recording of one segment, a segment or a file: then `reference_input` says whether its torques are
-        the input's reference (`recorded`) or none are (`none`). Or arrays with the shapes and units of a segment's;
+        Either a recording of one segment, a segment or a file: then its torques are the reference of the input
+        (`reference_input="recorded"`) or not (`"none"`). Or arrays with the shapes and units of a segment's;
         their input is `u`, `(n, 18)`, or that of the motors' `torque`, `(n, 12)`, by the model's input rule, as of a
         recording; it is estimated from the model if neither is given.
 
@@ -151,7 +152,7 @@ class Controller:
         """
         if torque is not None:
             if u is not None:
-                raise RecordingError("`torque`: found `u` too, expected one of them", column="torque")
+                raise RecordingError("`torque`: found `torque` and `u`, expected one of them", column="torque")
             reference = Recording.from_arrays(t, x, dx, torque, feet)
         if reference is not None:
             if isinstance(reference, Segment):
@@ -170,13 +171,13 @@ class Controller:
         return self
 
     def prepare(self, t: float) -> None:
-        """Prepares the step at a time (s), while nothing waits for a command: the step then takes less time."""
+        """Prepares the step at a time (s), while nothing waits for a command: the step is then faster."""
         self._native.prepare(t)
 
     def step(self, t: float, x: Any, dx: Any, feet: Any) -> Command:
         """The command for a measurement: time (s), state `(18,)` and velocity `(18,)` in SI units, feet `(4,)`.
 
-        Never raises for numbers that make no sense: the command is then a safe one, and its status says why.
+        Implausible numbers are no error: the command is then a safe one, and its status has the reason.
         """
         step = self._native.step(
             t,
@@ -187,7 +188,7 @@ class Controller:
         return Command(**step)
 
     def along(self, recording: Union[Recording, PathLike], reference_input: str = "recorded") -> ControlRun:
-        """Runs along a recording from a fresh start, as `romc mpc` does: what would have been commanded there, the
+        """Runs along a recording from a fresh start, as `romc mpc` does: the commands there, the
         baselines and the verdict."""
         [native] = natives(recording)
         return ControlRun(*self._native.along(native, reference_input))

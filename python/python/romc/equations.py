@@ -30,7 +30,7 @@ class Equations:
 
     @property
     def rounding(self) -> str:
-        """What rounding did to the printed coefficients, in words."""
+        """The rounding of the printed coefficients, in words."""
         return self._rounding
 
     def terms(self, phase: str) -> List[Summands]:
@@ -53,7 +53,7 @@ class Equations:
         return _romc.equations_text(self._model, self._arguments)
 
     def to_text(self) -> str:
-        """Text that `romc import` and `romc check` read, with all digits unless `digits` or `significant` is given."""
+        """Text that `romc import` and `romc check` read, with all digits where none are set."""
         lines = []
         for phase in self._phases:
             lines.append(f"[{phase['name']}]")

@@ -8,12 +8,11 @@ import warnings
 from typing import Optional, Union
 
 # Words of messages after an option that are not its value.
-_PROSE = (
-    "alone|and|are|as|decide|depends|describes|does|has|is|leaves|names|only|or|part|replaces|says|takes|to|with|without"
-)
-_OPTION = re.compile(rf"--([a-z]+(?:-[a-z]+)*)(?: (?!(?:{_PROSE})\b)([\w.,=-]*\w))?")
+_PROSE = "alone and are as decide depends describes does has is leaves names only or part replaces to with without"
+_NO_VALUE = rf"(?:{_PROSE.replace(' ', '|')})\b"
+_OPTION = re.compile(rf"--([a-z]+(?:-[a-z]+)*)(?: (?!{_NO_VALUE})([\w.,=-]*\w))?")
 
-# Options that take no value.
+# Options without a value.
 _FLAGS = {
     "as_learned",
     "exact",
@@ -47,7 +46,7 @@ def in_python(message: str) -> str:
         return f'{name}="{value}"'
 
     message = re.sub(r"(a tensor|tensors) mean\.state and std\.state", "mean= and std=", message)
-    message = message.replace("--unchecked writes", "unchecked=True takes")
+    message = message.replace("--unchecked writes", "unchecked=True accepts")
     message = message.replace("--library FILE with the list of terms", "library=[...], the list of terms")
     message = re.sub(r"a tensor (mean|std)\.state", r"\1=", message)
     # The command line's parser: invalid value 'x' for '--latent-dim <D>', then its possible values.
@@ -91,15 +90,15 @@ class RomcError(ValueError):
 
 
 class ModelError(RomcError):
-    """A model, or a part of one, that cannot be used; `tensor`, `row` and `column` say where."""
+    """A model, or a part of one, that cannot be used, with `tensor`, `row` and `column` of the fault."""
 
 
 class RecordingError(RomcError):
-    """A recording or reference that cannot be used; `file`, `row` and `column` say where."""
+    """A recording or reference that cannot be used, with `file`, `row` and `column` of the fault."""
 
 
 class RomcWarning(UserWarning):
-    """What romc did to data besides reading it, or finds doubtful and takes all the same."""
+    """Repairs of data, and doubts about data that romc nevertheless accepts."""
 
 
 def warn(message: str) -> None:

@@ -1,4 +1,4 @@
-"""What recordings and models hold, and what recordings show of a robot."""
+"""Inspection of recordings and models, and identification of a robot from recordings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from romc.recording import Columns, PathLike, Recording, Recordings, natives
 
 
 class Inspection:
-    """What `romc inspect` finds in a recording or a model; `print` shows the text of the command.
+    """The findings of `romc inspect` in a recording or a model; `print` shows the text of the command.
 
     `summary` is its object of `romc inspect --json`.
     """
@@ -42,20 +42,20 @@ class RecordingInspection(Inspection):
     def metrics(self) -> Dict[str, Any]:
         """Plausibility metrics that are compared with the bounds of `docs/reference/recordings.md`: `foot_slip_m` and
         `relative_foot_slip_m` (root mean squares of the places of feet on the ground), `other_reading_m` (the same with
-        other signs or legs), `fall_m_s2` (vertical acceleration in flight), `weight_share` (of the weight, carried by the
-        torques), `hip_share` by leg, `acceleration_offset_m_s2`; `None` where the recording has too few samples."""
+        other signs or legs), `fall_m_s2` (vertical acceleration in flight), `weight_share` (of the weight, carried by
+        the torques), `hip_share` by leg, `acceleration_offset_m_s2`; `None` where the recording has too few samples."""
         metrics: Dict[str, Any] = self.summary["figures"]
         return metrics
 
     @property
     def mismatches(self) -> List[str]:
-        """What cannot be true of the robot, in words: exchanged legs, other units, a fallen robot, ..."""
+        """Contradictions to the robot's physics, in words: exchanged legs, other units, a fallen robot, ..."""
         return list(self.summary["mismatches"])
 
     @property
     def implausible(self) -> List[Dict[str, Any]]:
-        """Runs of implausible samples: `what`, `samples`, `segment`, `first_row`, `worst_row`, `column`, `value` and the
-        `bound` that it breaks."""
+        """Runs of implausible samples: `what`, `samples`, `segment`, `first_row`, `worst_row`, `column`, `value` and
+        the `bound` that it breaks."""
         return list(self.summary["implausible"])
 
     @property
@@ -84,7 +84,7 @@ class ModelInspection(Inspection):
 
     @property
     def invariance(self) -> Optional[Dict[str, Any]]:
-        """Metrics of known physics: gravity, mass, invariance to shifts and reflection; `None` without a known robot."""
+        """Metrics of known physics: gravity, mass, invariance to shifts and reflection; `None` without a robot."""
         metrics: Optional[Dict[str, Any]] = self.summary["invariance"]
         return metrics
 
@@ -96,24 +96,24 @@ class ModelInspection(Inspection):
 
 
 def inspect(
-    what: Union[Recording, Model, PathLike],
+    subject: Union[Recording, Model, PathLike],
     *,
     robot: Optional[PathLike] = None,
     columns: Optional[PathLike] = None,
     clock: Optional[str] = None,
 ) -> Union[RecordingInspection, ModelInspection]:
-    """Describes a recording or a model, and lists what is implausible in it, as `romc inspect` does.
+    """Describes a recording or a model with its implausible parts, as `romc inspect` does.
 
-    `what` is a `Recording`, a `Model`, or a file of one. `robot` is the robot whose limits and geometry a recording is
-    compared with, `"go1"` by default. A file is read with its clock as recorded, if `clock` is not `"repaired"`.
+    `subject` is a `Recording`, a `Model`, or a file of one. `robot` is the robot whose limits and geometry a recording
+    is compared with, `"go1"` by default. The clock of a file stays as recorded, except with `clock="repaired"`.
 
     >>> romc.inspect("jump.csv.gz").metrics["foot_slip_m"]
     """
     arguments = Arguments("inspect").options(robot=robot, columns=columns, clock=clock)
-    if isinstance(what, Model):
-        answer = arguments.file(f"{what.name}.json").run(what._native)
+    if isinstance(subject, Model):
+        answer = arguments.file(f"{subject.name}.json").run(subject._native)
     else:
-        answer = arguments.recordings(what).run()
+        answer = arguments.recordings(subject).run()
     [found] = answer.summary["files"]
     return ModelInspection(answer) if found["kind"] == "model" else RecordingInspection(answer)
 
@@ -122,7 +122,7 @@ class Identification:
     """Gravity, mass and the joints' friction and rotor inertia, found in recordings; `print` shows the text of
     `romc identify`.
 
-    `Model.from_arrays(actuators=found.actuators)` takes them, and so does `romc.train(actuators="file.toml")` after
+    `Model.from_arrays(actuators=found.actuators)` uses them, as does `romc.train(actuators="file.toml")` after
     `found.save("file.toml")`.
     """
 
@@ -163,7 +163,7 @@ class Identification:
 
     @property
     def actuators(self) -> Dict[str, Any]:
-        """Friction and rotor inertia of the joints with the moments of a leg, as `Model.from_arrays` takes them."""
+        """Friction and rotor inertia of the joints with the moments of a leg, for `Model.from_arrays`."""
         return {**self.summary["actuators"], "legs": self.summary["legs"]}
 
     @property
@@ -204,10 +204,10 @@ def identify(
     columns: Optional[Columns] = None,
     clock: str = "recorded",
 ) -> Identification:
-    """Finds gravity, mass and the joints' friction and rotor inertia in recordings of one robot, as `romc identify` does.
+    """Finds gravity, mass and the joints' friction and rotor inertia in recordings of one robot, as `romc identify`.
 
-    `recordings` are files or `Recording` objects of jumps: flight shows gravity and the legs' inertia, moving legs their
-    friction. `robot` is `"go1"`, `"go2"`, `"a1"`, or a `.toml` or `.urdf` file, whose geometry and limits count.
+    `recordings` are files or `Recording` objects of jumps: flight shows gravity and the legs' inertia, moving legs
+    their friction. `robot` is `"go1"`, `"go2"`, `"a1"`, or a `.toml` or `.urdf` file, whose geometry and limits count.
 
     >>> found = romc.identify("jump.csv.gz", robot="go1")
     >>> found.mass, found.standard_error["mass_kg"]                  # kg

@@ -13,6 +13,7 @@ from romc import _romc, _sources
 from romc._arrays import Floats, floats, rowwise
 from romc._command import Arguments
 from romc._import import LibraryLike, imported
+from romc._options import emit_arguments, ranges
 from romc.equations import Equations
 from romc.errors import ModelError
 from romc.plan import Plan
@@ -37,8 +38,8 @@ class Model:
     """
 
     training: Optional[Dict[str, Any]]
-    """The object of `romc train --json` for a model of `romc.train`: `report` with metrics by set, `test`, `notes`; `None`
-    for others."""
+    """The object of `romc train --json` for a model of `romc.train`: `report` with metrics by set, `test`, `notes`;
+    `None` for others."""
 
     def __init__(
         self, native: "_romc.Model", *, exact: bool = False, training: Optional[Dict[str, Any]] = None
@@ -85,13 +86,13 @@ class Model:
         """A model of arrays: NumPy's, JAX's, PyTorch's, lists.
 
         - `encoder`, `decoder`: `(weights, bias)` with weights `(d, n)` and `(n, d)` as in `z = W x + b` (or their
-          transposes, which `weights="row"` says where both fit); a list of such pairs, one per layer, with
+          transposes, with `weights="row"` where both fit); a list of such pairs, one per layer, with
           `activation`; or a fitted affine pipeline with `transform` and `inverse_transform`, as scikit-learn has.
         - `xi`: coefficients by phase, `(terms, d)` or `(d, terms)`; `mask` has 0 where training switched one off.
         - `library`: the candidate terms in the order of Xi's rows: names such as `["1", "z1", "sin(dz1)", "u1"]`, or
           the shorthand `Library(degree=1, trigonometric=True, inputs=True, order="paper")`.
 
-        Options, which `from_torch` and `from_pysindy` take too:
+        Options, also of `from_torch` and `from_pysindy`:
 
         - `robot`: `"go1"`, `"go2"`, `"a1"`, or a `.toml` or `.urdf` file.
         - `scaling`, `input_scaling`: scaled value = factor x SI value, one number or one per coordinate; 1 if left out.
@@ -100,9 +101,9 @@ class Model:
         - `phases`: the feet that select each phase, `any`, `none`, `always` or patterns such as `"0011,0001"` (fr
           fl rr rl), the first match wins; `contact` and `flight` are known.
         - `wrench_frame`: axes of the force and moment in the inputs, `"body"` (as published), `"world"` or `"ground"`.
-        - `actuators`: friction and inertia of the joints, if training took them from the torques: a mapping of
-          `"viscous"` (N m s/rad), `"dry"` (N m) and `"armature"` (kg m^2), 12 numbers each or 3 for a leg, and if known `"legs"`, a mapping of
-          the moments of a leg; or a file of `romc identify`.
+        - `actuators`: friction and inertia of the joints, if training subtracted them from the torques: a mapping of
+          `"viscous"` (N m s/rad), `"dry"` (N m) and `"armature"` (kg m^2), 12 numbers each or 3 for a leg, and if known
+          `"legs"`, a mapping of the moments of a leg; or a file of `romc identify`.
         - `inputs_from`: recordings that give the mean and covariance of the inputs, which the controller needs, and
           that the model is compared with: one that misses them is refused, with the usual slip that explains it;
           `unchecked=True` warns instead.
@@ -192,8 +193,8 @@ class Model:
 
     @property
     def latent_words(self) -> List[str]:
-        """Quantity and unit of each latent coordinate, such as `"centre of mass upwards, in 10 m"`: the scaled value is 1
-        at 10 m. Empty unless a linear encoder maps the coordinates of a known robot."""
+        """Quantity and unit of each latent coordinate, such as `"centre of mass upwards, in 10 m"`: the scaled value is
+        1 at 10 m. Empty without a linear encoder of the coordinates of a known robot."""
         return self._native.latent_words
 
     @property
@@ -230,15 +231,15 @@ class Model:
         return rowwise(self._native.decode, ("z", z))
 
     def encode_velocity(self, dx: Any, x: Any = None) -> Floats:
-        """Latent velocities `(n, d)` of velocities `(n, 18)`; a nonlinear encoder needs the states `x` too."""
+        """Latent velocities `(n, d)` of velocities `(n, 18)`; a nonlinear encoder also needs the states `x`."""
         return rowwise(self._native.encode_velocity, ("x", self._state(x, dx)), ("dx", dx))
 
     def project_input(self, u: Any, x: Any = None) -> Floats:
-        """Latent inputs `(n, d)` of inputs `(n, 18)` (N m, N); a nonlinear encoder needs the states `x` too."""
+        """Latent inputs `(n, d)` of inputs `(n, 18)` (N m, N); a nonlinear encoder also needs the states `x`."""
         return rowwise(self._native.project_input, ("x", self._state(x, u)), ("u", u))
 
     def lift_input(self, u_lat: Any, x: Any = None) -> Floats:
-        """Inputs `(n, 18)` (N m, N) of latent inputs `(n, d)`; a nonlinear encoder needs the states `x` too."""
+        """Inputs `(n, 18)` (N m, N) of latent inputs `(n, d)`; a nonlinear encoder also needs the states `x`."""
         return rowwise(self._native.lift_input, ("x", self._state(x, u_lat)), ("u_lat", u_lat))
 
     def acceleration(self, phase: str, z: Any, dz: Any, u_lat: Any) -> Floats:
@@ -271,10 +272,11 @@ class Model:
 
         `digits` decimals or `significant` digits of coefficients; `form` is `cases` or `align`, `width` the longest
         line in em; `rename` has other names for variables, `{"z1": "x"}`; `units` is `"physical"` (m, rad, N: the
-        default of a model that has such units) or `"si"` (the latent coordinates as the model scales them); `as_learned` keeps coefficients times terms as the model has them. As in `romc compile`.
+        default of a model that has such units) or `"si"` (the latent coordinates as the model scales them);
+        `as_learned` keeps coefficients times terms as the model has them. As in `romc compile`.
         """
-        arguments = _emit_arguments(
-            self,
+        arguments = emit_arguments(
+            self._exact,
             digits=digits,
             significant=significant,
             form=form,
@@ -308,10 +310,10 @@ class Model:
         `matlab`, `controller`, ...
 
         `precision` is `f64` or `f32`, `sincos` `inline` or `library`, `units` of coordinates `si`, `scaled` or
-        `physical`. Files that romc did not make stay, unless `force`.
+        `physical`. Files that romc did not make are replaced only with `force`.
         """
-        arguments = _emit_arguments(
-            self,
+        arguments = emit_arguments(
+            self._exact,
             digits=digits,
             significant=significant,
             form=form,
@@ -333,14 +335,14 @@ class Model:
         *,
         margin: Optional[float] = None,
     ) -> "Simplified":
-        """A shorter model, none of whose accelerations is off by more than `tolerance` anywhere in the domain, and
-        the certificate.
+        """A shorter model, whose accelerations have errors of at most `tolerance` everywhere in the domain, and the
+        certificate.
 
-        `domain`: recordings, whose bounding box in each phase counts, widened by `margin` (0.1 of each range unless
-        given); or ranges by phase and variable, `{"contact": {"z1": (-0.2, 0.4), ...}}`, in scaled units.
+        `domain`: recordings, whose bounding box in each phase counts, widened by `margin` (of each range,
+        0.1 by default); or ranges by phase and variable, `{"contact": {"z1": (-0.2, 0.4), ...}}`, in scaled units.
         `tolerance`: a number in scaled units per s^2, or `"1%"` of each acceleration's root mean square.
         """
-        ranges = _ranges(domain) if isinstance(domain, Mapping) else None
+        ranges = ranges(domain) if isinstance(domain, Mapping) else None
         recordings = natives(domain, self._native) if not isinstance(domain, Mapping) else []
         text = tolerance if isinstance(tolerance, str) else repr(float(tolerance))
         native, is_changed, certificate, page = _romc.simplify(self._native, text, recordings, ranges, margin)
@@ -364,8 +366,8 @@ class Model:
     def score(self, recordings: Recordings, horizon_s: float = 0.1) -> Score:
         """The verdict on the model along recordings (or their files), which training should not have used.
 
-        A dict: uses of the model that it is fit for, those that it failed, and the rows that decide, each with its value,
-        baseline, threshold and whether it passed. `horizon_s` is the time of the short predictions, in s.
+        A dict: uses of the model that it is fit for, those that it failed, and the rows that decide, each with its
+        value, baseline, threshold and whether it passed. `horizon_s` is the time of the short predictions, in s.
 
         >>> model.score(jumps)["fit_for"]
         ['0.1 s', 'whole motion', 'torques', 'control']
@@ -386,12 +388,12 @@ class Model:
         clock: Optional[str] = None,
         force: bool = False,
     ) -> Path:
-        """Writes the page of `romc report` on the model along recordings (or their files): equations, errors, baselines,
-        torques of the controller. Returns its path, which ends in `.html`.
+        """Writes the page of `romc report` on the model along recordings (or their files): equations, errors,
+        baselines, torques of the controller. Returns its path, which ends in `.html`.
 
-        `restart_every` is the time of the short predictions in s, `tolerance` that of the simplification which the page
-        lists (`"1%"` by default), `study` a folder of `romc.study`, `plan` the plan that the first jump follows, `figures`
-        a folder for each figure as SVG, PDF and CSV. `force` replaces an existing page.
+        `restart_every` is the time of the short predictions in s, `tolerance` that of the simplification which the
+        page lists (`"1%"` by default), `study` a folder of `romc.study`, `plan` the plan that the first jump follows,
+        `figures` a folder for each figure as SVG, PDF and CSV. `force` replaces an existing page.
         """
         arguments = Arguments("report").file(f"{self.name}.json").recordings(recordings)
         arguments.recordings([] if plan is None else listed(plan), "plan")
@@ -417,7 +419,7 @@ class Model:
         and a prior, which `romc train` writes.
 
         `start`: a recording whose first sample the jump starts from, else the mean start of the training jumps.
-        Raises `RomcError` with the reasons where there is no plan to be trusted, unless `force`.
+        Raises `RomcError` with the reasons where there is no trusted plan; `force` returns it nevertheless.
         """
         if isinstance(start, (str, os.PathLike)):
             start = read(start)
@@ -428,10 +430,11 @@ class Model:
     def walk(
         self, speed: float, *, yaw_rate: float = 0.0, duration: float = 5.0, force: bool = False
     ) -> Recording:
-        """Plans a walk of `duration` s at `speed` m/s that turns by `yaw_rate` rad/s, as `romc plan --speed` does; the model
-        needs strides, which `romc train --phases trot` writes.
+        """Plans a walk of `duration` s at `speed` m/s that turns by `yaw_rate` rad/s, as `romc plan --speed` does; the
+        model needs strides, which `romc train --phases trot` writes.
 
-        Raises `RomcError` where speed or yaw rate are far from those of the training, unless `force`.
+        Raises `RomcError` where speed or yaw rate are far from those of the training; `force` returns it
+        nevertheless.
         """
         return Recording(_romc.walk(self._native, speed, yaw_rate, duration, force))
 
@@ -475,24 +478,3 @@ class Simplified(NamedTuple):
 
 def _unpickled(name: str, text: str, exact: bool, training: Optional[Dict[str, Any]]) -> Model:
     return Model(_romc.Model.from_text(name, text), exact=exact, training=training)
-
-
-def _emit_arguments(model: Model, *, rename: Optional[Mapping[str, str]], **others: Any) -> Dict[str, object]:
-    """The options of `romc compile`."""
-    arguments: Dict[str, object] = {
-        "precision": "f64",
-        "sincos": "inline",
-        "exact": model._exact,
-        "rename": [f"{variable}={name}" for variable, name in (rename or {}).items()],
-    }
-    return {**arguments, **others}
-
-
-def _ranges(domain: Mapping[str, Mapping[str, Tuple[float, float]]]) -> str:
-    """Ranges as the command line reads them from a file."""
-    lines = []
-    for phase, variables in domain.items():
-        lines.append(f"[{json.dumps(phase)}]")
-        for variable, (low, high) in variables.items():
-            lines.append(f"{json.dumps(variable)} = [{float(low)!r}, {float(high)!r}]")
-    return "\n".join(lines) + "\n"

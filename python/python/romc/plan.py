@@ -13,7 +13,7 @@ class Plan(Recording):
     """A planned jump: a recording of one segment, which `Model.simulate`, `Controller.set_reference` and every command
     take.
 
-    `summary` is the object of `romc plan --json`: `distance_m`, `apex_m` (what the motion reaches), `goal_m`,
+    `summary` is the object of `romc plan --json`: `distance_m`, `apex_m` (of the planned motion), `goal_m`,
     `durations_s` by part, `cost`, `input_deviation` (largest deviation of the input from the training's, in standard
     deviations), `extrapolates`, `reasons`, `status`, `solve_ms` and so on.
     """

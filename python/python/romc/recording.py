@@ -81,7 +81,7 @@ class Segment:
 class Recording:
     """One or several jumps: a sequence of segments.
 
-    A recording of one segment has its arrays too: `recording.x` is `recording[0].x`.
+    A recording of one segment also has its arrays: `recording.x` is `recording[0].x`.
     """
 
     def __init__(self, native: "_romc.Recording") -> None:
@@ -99,8 +99,8 @@ class Recording:
         ddx: Any = None,
         name: str = "arrays",
     ) -> "Recording":
-        """A recording of arrays with the shapes and units of a `Segment`'s; accelerations come from differences of
-        the velocities unless given. Checked as a file is: a gap or a jump back in time begins a segment.
+        """A recording of arrays with the shapes and units of a `Segment`'s; accelerations are `ddx`, or
+        differences of the velocities. Checked as a file is: a gap or a jump back in time begins a segment.
 
         Raises `RecordingError` with `row` (the sample, from 0) and `column`.
         """
@@ -142,7 +142,7 @@ class Recording:
 
     def _only(self) -> Segment:
         if len(self) != 1:
-            raise RecordingError(f"{self.path}: found {len(self)} segments, expected one: take recording[0], ...")
+            raise RecordingError(f"{self.path}: found {len(self)} segments, expected one: use recording[0], ...")
         return self[0]
 
     @property
@@ -195,7 +195,7 @@ def read(
     - `columns`: the map (`docs/reference/column-maps.md`), a TOML file, or its tables as a dictionary,
       `{"time": {"column": "stamp", "unit": "ms"}, ...}`; with it `path` may be a folder of files.
     - `clock`: as in the commands that compute, times and angular rates that disagree with the motion are mended
-      (`repaired`), which a `RomcWarning` says, or kept (`recorded`).
+      (`repaired`), with a `RomcWarning`, or kept (`recorded`).
 
     - `robot`: as in the commands, a known robot mends places of the body that are late, and has names of joints in
       `.mcap` files.
@@ -207,8 +207,8 @@ def read(
 
 
 def guess_columns(path: PathLike, robot: PathLike = "go1") -> str:
-    """A first map of the columns of an unknown log, TOML with what each line rests on, as `romc inspect --guess`
-    writes it; a `RomcWarning` says why the log cannot be read by it yet, if so."""
+    """A first map of the columns of an unknown log, TOML with the reason of each line, as `romc inspect --guess`
+    writes it; a `RomcWarning` has the reason if the log cannot be read by it yet."""
     text, refused = _romc.guess(os.fspath(path), os.fspath(robot))
     if refused is not None:
         warn(f"{os.fspath(path)}: read by the guessed map: {refused}")
@@ -246,7 +246,8 @@ def listed(recordings: Recordings) -> List[Union[PathLike, Recording]]:
     for entry in entries:
         if not isinstance(entry, (str, os.PathLike, Recording)):
             found = f"found {type(entry).__name__}, expected paths or recordings"
-            raise RecordingError(f"recordings: {found}: romc.read(path), or Recording.from_arrays(t, x, dx, torque, feet)")
+            remedy = "romc.read(path), or romc.Recording.from_arrays(t, x, dx, torque, feet)"
+            raise RecordingError(f"recordings: {found}: {remedy}")
     return entries
 
 

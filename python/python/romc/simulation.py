@@ -64,11 +64,12 @@ class Score(Dict[str, Any]):
 
 
 class Simulation:
-    """What a model predicts along recordings.
+    """Predictions of a model along recordings.
 
     `metrics` is the object `rollouts` of `romc simulate --json`: rms (rad, m) and R^2 of each coordinate over whole
-    rollouts and restarted ones, baselines, losses. `verdict` is that of every command: `fit_for`, `failed` and the `rows`
-    that decide, each with value, baseline, threshold and passed. `runs` has the trajectories, one entry per segment.
+    rollouts and restarted ones, baselines, losses. `verdict` is that of every command: `fit_for`, `failed` and the
+    `rows` that decide, each with value, baseline, threshold and passed. `runs` has the trajectories, one entry per
+    segment.
     """
 
     metrics: Dict[str, Any]

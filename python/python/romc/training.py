@@ -83,14 +83,14 @@ def study(
 ) -> Any:
     """Trains models of several latent dimensions with several seeds, as `romc study` does: accuracy against size.
 
-    - `latent_dims`: `4`, `[2, 4, 6]`, `range(1, 8)` or `"1..7"`; by default 1 to 18, of which those beyond the rows that
-      an encoder can have are refused;
+    - `latent_dims`: `4`, `[2, 4, 6]`, `range(1, 8)` or `"1..7"`; by default 1 to 9, the most rows of an encoder with
+      named coordinates;
     - `seeds`: trainings per dimension. The closed form leaves out other jumps with each seed;
     - `out_dir`: keeps the trainings, tables and figures; a study that was stopped goes on there. By default nothing is
       kept;
-    - `per`: rows of the table, one per `"dimension"` (columns `latent_dim`, `trained`, `refused`, and `_mean` and `_std`
-      over seeds of `decoder_mse`, `active`, `combined_loss`, `torque_r2`, `prediction_x_m`, `prediction_z_m`) or one
-      per `"training"` (`seed`, the same metrics, and in `refused` why there is no model);
+    - `per`: rows of the table, one per `"dimension"` (columns `latent_dim`, `trained`, `refused`, and `_mean` and
+      `_std` over seeds of `decoder_mse`, `active`, `combined_loss`, `torque_r2`, `prediction_x_m`, `prediction_z_m`)
+      or one per `"training"` (`seed`, the same metrics, and `refused`, the reason without a model);
     - `as_frame`: whether the table is a pandas `DataFrame`, else a list of dicts; by default if pandas is installed.
 
     Options are `method`, `paper`, `robot`, `config`, `lambda_`, `shard`, `columns`, `clock`, as on the command line.
