@@ -15,6 +15,7 @@ trap 'rm -rf "$work"' EXIT
 for model in paper-2d go1-d2 go1-d4 go2-async-d4; do
   for columns in one two; do
     width=(); [ "$columns" = one ] || width=(--width 22)
+    [ "$model" != go1-d4 ] || width+=(--units physical)
     "$romc" compile "models/$model.json" --emit latex "${width[@]}" --out-dir "$work/$model-$columns" >/dev/null
     stem=${model//-/_}
     (cd "$work/$model-$columns" && for _ in 1 2; do
