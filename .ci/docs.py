@@ -144,7 +144,8 @@ def blocks(page):
     """The `sh` blocks of a page, with the line where each begins."""
     text = page.read_text(encoding="utf-8")
     for found in re.finditer(r"^```sh\n(.*?)^```", text, flags=re.S | re.M):
-        yield text[: found.start()].count("\n") + 2, found.group(1)
+        if "cargo " not in found.group(1):  # the checks run the demo and the tests themselves
+            yield text[: found.start()].count("\n") + 2, found.group(1)
 
 
 def run(romc, names):
