@@ -342,10 +342,10 @@ class Model:
         0.1 by default); or ranges by phase and variable, `{"contact": {"z1": (-0.2, 0.4), ...}}`, in scaled units.
         `tolerance`: a number in scaled units per s^2, or `"1%"` of each acceleration's root mean square.
         """
-        ranges = ranges(domain) if isinstance(domain, Mapping) else None
+        bounds = ranges(domain) if isinstance(domain, Mapping) else None
         recordings = natives(domain, self._native) if not isinstance(domain, Mapping) else []
         text = tolerance if isinstance(tolerance, str) else repr(float(tolerance))
-        native, is_changed, certificate, page = _romc.simplify(self._native, text, recordings, ranges, margin)
+        native, is_changed, certificate, page = _romc.simplify(self._native, text, recordings, bounds, margin)
         return Simplified(Model(native, exact=is_changed), json.loads(certificate), page)
 
     def predict(self, recording: Union[Recording, PathLike], horizon_s: Optional[float] = 0.1) -> Floats:
