@@ -122,8 +122,25 @@ fn groups(names: &[String]) -> Vec<(String, Vec<usize>)> {
     all.map(|(name, rows)| (name.to_owned(), rows)).collect()
 }
 
+/// Names and units of the errors of a horizon: the robot's coordinates, then the centre of mass.
+fn quantities(assessment: &Assessment<'_>, horizon: &Horizon) -> Vec<(String, String)> {
+    let coordinates = assessment.names.iter().zip(&assessment.units);
+    let coordinates = coordinates.map(|(name, unit)| (name.clone(), unit.clone()));
+    let mass_centre = horizon.mass_centre.iter().map(|of| {
+        let body = &assessment.names[of.axis];
+        (
+            body.replace("body.", "com."),
+            assessment.units[of.axis].clone(),
+        )
+    });
+    coordinates.chain(mass_centre).collect()
+}
+
 pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -> Table {
-    let groups = groups(&assessment.names);
+    let mut groups = groups(&assessment.names);
+    let quantities = quantities(assessment, &horizons[0]);
+    let mass_centre = (0..).zip(&quantities).skip(assessment.names.len());
+    groups.extend(mass_centre.map(|(row, (name, _))| (name.clone(), vec![row])));
     let met = horizons
         .iter()
         .filter(|horizon| horizon.predictors[0].1.windows > 0);
@@ -148,7 +165,7 @@ pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -
     let mut table = Table::of(rows)
         .column("horizon", "", |(horizon, ..)| &horizon.name)
         .column("coordinate", "", |(_, name, _)| *name)
-        .column("unit", "", |(.., rows)| &assessment.units[rows[0]])
+        .column("unit", "", |(.., rows)| &quantities[rows[0]].1)
         .column("least R^2", "", least_r2);
     for (predictor, (name, _)) in horizons[0].predictors.iter().enumerate() {
         table = table.column(name, "", |(horizon, _, rows)| rms(horizon, predictor, rows));
@@ -166,14 +183,14 @@ pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -
 }
 
 pub(crate) fn horizon_json(of: &Assessment<'_>, horizon: &Horizon) -> Value {
-    let coordinates = of.names.iter().zip(&of.units).enumerate();
+    let coordinates = quantities(of, horizon).into_iter().enumerate();
     let coordinates = coordinates.map(|(i, (name, unit))| {
         let own = horizon.predictors[0].1.fits()[i];
-        let mut value = fit_json(unit, own);
+        let mut value = fit_json(&unit, own);
         for (predictor, sums) in &horizon.predictors[1..] {
             value[predictor.replace(' ', "_")] = json!(rms(sums.fits()[i]));
         }
-        (name.clone(), value)
+        (name, value)
     });
     let own = &horizon.predictors[0].1;
     json!({

@@ -4,7 +4,7 @@ use super::*;
 use romc::evaluate::Horizon;
 use romc::model::ReducedModel;
 use romc::recording::{PhaseRule, Segment, stride_s};
-use romc::robot::{BODY_X, BODY_Z, JOINT_DIM};
+use romc::robot::{BODY_X, BODY_Z, JOINT_DIM, STATE_DIM};
 use romc::train::{BodyEquations, BodyRows};
 
 fn trots(set: &str, count: usize) -> Vec<Recording> {
@@ -66,6 +66,46 @@ fn trots_are_predicted_and_no_longer_when_an_equation_is_negated() {
         broken[BODY_Z - BODY_X][0] > 5.0 * found[BODY_Z - BODY_X][0],
         "{broken:?}"
     );
+}
+
+/// The centre of mass and the rotation about it, after 0.1 s and over a stride; they depend on the equations, and the
+/// legs' decoder does not matter.
+#[test]
+fn centre_of_mass_of_unseen_trots_is_predicted() {
+    let model = artifact::read(Path::new("models/go1-trot-d12.json")).expect("shipped");
+    let test = trots("test", 3);
+    let centre = |model: &ReducedModel, predictor: usize| -> [Vec<f64>; 2] {
+        let assessment = Assessment::over(model, &test, 0.1).expect("a robot");
+        let horizons = Horizon::all(model, &assessment).expect("simulates");
+        assert_eq!(horizons[0].mass_centre.len(), 6);
+        [0, 3].map(|horizon| {
+            let fits = horizons[horizon].predictors[predictor].1.fits();
+            let fits = fits[STATE_DIM..].iter();
+            fits.map(|fit| fit.expect("moves").rms).collect()
+        })
+    };
+    let [soon, stride] = centre(&model, 0);
+    let [coasting, _] = centre(&model, 1);
+    let most = [0.7e-3, 0.3e-3, 0.8e-3, 5e-3, 4e-3, 3e-3];
+    for (k, most) in most.into_iter().enumerate() {
+        assert!(soon[k] < most && soon[k] < coasting[k], "{k}: {soon:?}");
+    }
+    for (k, most) in [3.5e-3, 2e-3, 3.5e-3].into_iter().enumerate() {
+        assert!(stride[k] < most, "{k}: {stride:?}");
+    }
+    let mut phases = model.phases().to_vec();
+    for phase in &mut phases {
+        phase.xi.columns_range_mut(0..6).fill(0.0);
+    }
+    let broken = model.into_builder().phases(phases).build();
+    let [without, _] = centre(&broken.expect("sound"), 0);
+    for k in 0..6 {
+        // Without equations the velocity stays, as for the baseline.
+        assert!(
+            (without[k] / coasting[k] - 1.0).abs() < 1e-3,
+            "{k}: {without:?}"
+        );
+    }
 }
 
 #[test]

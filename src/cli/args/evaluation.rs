@@ -62,7 +62,7 @@ pub(crate) struct SimulateArguments {
     /// Replace an existing output file
     #[arg(long, help_heading = OUTPUT, action = ArgAction::SetTrue, value_parser = overwrite())]
     pub force: Overwrite,
-    /// Also print the errors of all coordinates over several horizons, with those of a constant velocity and a robot at rest
+    /// Also print the errors of all coordinates and of the centre of mass over several horizons, with those of baselines
     #[arg(long, help_heading = OUTPUT)]
     pub verbose: bool,
 }

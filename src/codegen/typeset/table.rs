@@ -79,11 +79,10 @@ const MOST_IN_COLUMN: i32 = 6; // digits of a number whose column has decimals i
 fn common_decimals(numbers: impl Iterator<Item = f64>) -> Option<usize> {
     let sizes = numbers.filter(|value| value.is_finite() && *value != 0.0);
     let places = sizes.map(|value| value.abs().log10().floor() as i32);
-    let (least, most) = places.fold((i32::MAX, i32::MIN), |(least, most), place| {
-        (least.min(place), most.max(place))
-    });
+    let ranges = places.map(|place| (place, place));
+    let (least, most) = ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
     let decimals = (2 - most).max(1 - least.min(1)).max(0);
-    let is_short = least <= most && most.max(0) + 1 + decimals <= MOST_IN_COLUMN;
+    let is_short = most.max(0) + 1 + decimals <= MOST_IN_COLUMN;
     is_short.then_some(decimals as usize)
 }
 

@@ -48,6 +48,8 @@ pub struct Assessment<'a> {
 #[derive(Debug, Clone)]
 pub struct Horizon {
     pub name: String,
+    /// Coordinates of the centre of mass in the model. Their errors follow those of the robot's coordinates.
+    pub mass_centre: Vec<MassCentre>,
     /// The model, then baselines; errors in SI units. The rigid body has errors of the body alone.
     pub predictors: Vec<(&'static str, CoordinateSums)>,
 }

@@ -105,6 +105,14 @@ impl CoordinateSums {
         })
     }
 
+    /// The same with sums for `count` more quantities, see `add_pair`.
+    pub(super) fn with_more(mut self, count: usize) -> Self {
+        for sums in self.by_phase.iter_mut().chain([&mut self.sums]) {
+            sums.resize(sums.len() + count, FitSums::default());
+        }
+        self
+    }
+
     pub fn add_rollout(
         &mut self,
         model: &ReducedModel,
@@ -181,9 +189,13 @@ impl CoordinateSums {
         phase: usize,
         (row, y_hat): (usize, f64),
     ) {
-        let y = segment.x[(row, sample)];
-        self.sums[row].add(y, y_hat);
-        self.by_phase[phase][row].add(y, y_hat);
+        self.add_pair(phase, row, [segment.x[(row, sample)], y_hat]);
+    }
+
+    /// Adds a recorded and a predicted value of one quantity.
+    pub(super) fn add_pair(&mut self, phase: usize, row: usize, [recorded, predicted]: [f64; 2]) {
+        self.sums[row].add(recorded, predicted);
+        self.by_phase[phase][row].add(recorded, predicted);
     }
 
     pub fn fits(&self) -> Vec<Option<Fit>> {

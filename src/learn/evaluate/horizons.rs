@@ -46,7 +46,8 @@ impl<'a> Horizon {
         let names = names.chain(stride_s.map(|_| PENDULUM));
         let has_strides = stride_s.is_some() && model.stride_prior().is_ok();
         let names = names.chain(has_strides.then_some(MEAN_STRIDE));
-        let sums = CoordinateSums::new(model)?;
+        let mass_centre = model.mass_centre();
+        let sums = CoordinateSums::new(model)?.with_more(mass_centre.len());
         let predictors: Vec<_> = names.map(|name| (name, sums.clone())).collect();
         let motion =
             |segment: Cow<'a, Segment>, latent: Cow<'a, LatentSegment>, recorded: &Segment| {
@@ -101,8 +102,11 @@ impl<'a> Horizon {
         horizons.push(("take-off to touchdown".to_owned(), Restart::Never, None));
         let all = horizons.into_iter();
         all.map(|(name, restart, motions)| {
-            let predictors = predictors.clone();
-            let mut horizon = Self { name, predictors };
+            let mut horizon = Self {
+                name,
+                mass_centre: mass_centre.clone(),
+                predictors: predictors.clone(),
+            };
             for motion in motions.as_ref().unwrap_or(&runs) {
                 horizon.add(model, &compiled, motion, &baselines, restart)?;
             }
@@ -134,44 +138,50 @@ impl<'a> Horizon {
                 continue;
             }
             let (phase, from) = (latent.phase[sample], segment.x.column(start));
+            let coasted = coasted(segment, start, sample);
             for (name, sums) in &mut self.predictors {
                 let predicted = match *name {
-                    MODEL => Some(model.decode(&window.z.column(column).into_owned())?),
-                    CONSTANT_VELOCITY => Some(coasted(segment, start, sample)),
-                    AT_REST => Some(from.into_owned()),
+                    MODEL => Predicted::Latent(window.z.column(column).into_owned()),
+                    CONSTANT_VELOCITY => Predicted::All(coasted.clone()),
+                    AT_REST => Predicted::All(from.into_owned()),
                     MEAN_JUMP => {
-                        (baselines.mean_jump.as_ref().zip(take_off_s)).map(|(jump, at_s)| {
-                            let [before, after] = [start, sample]
-                                .map(|sample| jump.at(segment.time_s[sample] - at_s));
-                            from + after - before
-                        })
+                        let Some((jump, at_s)) = baselines.mean_jump.as_ref().zip(take_off_s)
+                        else {
+                            continue;
+                        };
+                        let [before, after] =
+                            [start, sample].map(|sample| jump.at(segment.time_s[sample] - at_s));
+                        Predicted::All(from + after - before)
                     }
-                    MEAN_STRIDE => (motion.stride.as_ref()).map(|stride| {
+                    MEAN_STRIDE => {
+                        let Some(stride) = &motion.stride else {
+                            continue;
+                        };
                         let [before, after] = [start, sample].map(|k| segment.time_s[k]);
-                        from + stride.at(after) - stride.at(before)
-                    }),
+                        Predicted::All(from + stride.at(after) - stride.at(before))
+                    }
                     PENDULUM => {
-                        let pendulum = motion.pendulum.as_ref();
-                        let moved = pendulum.map(|of| of.moved(segment, start..sample));
-                        for (row, moved) in [BODY_X, BODY_X + 1]
-                            .into_iter()
-                            .zip(moved.into_iter().flatten())
-                        {
-                            sums.add_one(segment, sample, phase, (row, moved));
-                        }
-                        None
+                        let pendulum = motion.pendulum.iter();
+                        let moved = pendulum.flat_map(|of| of.moved(segment, start..sample));
+                        Predicted::Body([BODY_X, BODY_X + 1].into_iter().zip(moved).collect())
                     }
                     _ => {
-                        let moved = (motion.rigid_body.as_ref())
-                            .map(|by| moved_by(segment, by, start..sample));
-                        for (row, moved) in BODY.into_iter().zip(moved.into_iter().flatten()) {
-                            sums.add_one(segment, sample, phase, (row, moved));
-                        }
-                        None
+                        let by = motion.rigid_body.iter();
+                        let moved = by.flat_map(|by| moved_by(segment, by, start..sample));
+                        Predicted::Body(BODY.into_iter().zip(moved).collect())
                     }
                 };
-                if let Some(x) = predicted {
-                    sums.add(segment, sample, phase, &x);
+                for (row, of) in (model.decoder_map()?.output_dim()..).zip(&self.mass_centre) {
+                    let y = latent.z[(of.latent, sample)] / of.factor;
+                    if let Some(y_hat) = predicted.mass_centre(model, of, &coasted)? {
+                        sums.add_pair(phase, row, [y, y_hat]);
+                    }
+                }
+                match predicted {
+                    Predicted::Latent(z) => sums.add(segment, sample, phase, &model.decode(&z)?),
+                    Predicted::All(x) => sums.add(segment, sample, phase, &x),
+                    Predicted::Body(rows) => (rows.into_iter())
+                        .for_each(|(row, x)| sums.add_one(segment, sample, phase, (row, x))),
                 }
             }
         }
@@ -180,6 +190,36 @@ impl<'a> Horizon {
         own.diverged += diverged.filter(|w| w.diverged_at_s.is_some()).count();
         own.windows += rollout.windows.len();
         Ok(())
+    }
+}
+
+/// The state that a predictor gives for one sample.
+enum Predicted {
+    Latent(DVector<f64>),
+    /// All coordinates of the robot.
+    All(DVector<f64>),
+    /// Some coordinates of the body.
+    Body(Vec<(usize, f64)>),
+}
+
+impl Predicted {
+    /// A coordinate of the centre of mass, m or rad. If the body alone is predicted, both have the same acceleration.
+    fn mass_centre(
+        &self,
+        model: &ReducedModel,
+        of: &MassCentre,
+        coasted: &DVector<f64>,
+    ) -> Result<Option<f64>> {
+        let encoded =
+            |x: &DVector<f64>| Ok::<_, ModelError>(model.encode(x)?[of.latent] / of.factor);
+        Ok(match self {
+            Self::Latent(z) => Some(z[of.latent] / of.factor),
+            Self::All(x) => Some(encoded(x)?),
+            Self::Body(rows) => match rows.iter().find(|(row, _)| *row == of.axis) {
+                Some((row, moved)) => Some(encoded(coasted)? + moved - coasted[*row]),
+                None => None,
+            },
+        })
     }
 }
 

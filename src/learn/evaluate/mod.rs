@@ -44,7 +44,7 @@ use serde::Serialize;
 
 use crate::lower::{CompiledModel, LowerError};
 use crate::model::{
-    CoordinateOrder, JumpPart, Library, LibraryChoice, LibraryOrder, ModelError, Phase,
+    CoordinateOrder, JumpPart, Library, LibraryChoice, LibraryOrder, MassCentre, ModelError, Phase,
     ReducedModel, StateMap,
 };
 use crate::mpc::{

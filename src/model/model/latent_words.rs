@@ -56,6 +56,35 @@ impl ReducedModel {
         let words = rows.map(|row| words(&row.transpose(), &rest, robot).scaled(factor));
         words.collect()
     }
+
+    /// The latent coordinates that describe the centre of mass, in the order of the body's coordinates in the state.
+    pub fn mass_centre(&self) -> Vec<MassCentre> {
+        let (words, Ok(factors)) = (self.latent_words(), self.state_factors()) else {
+            return Vec::new();
+        };
+        let axes = BODY.iter().zip(BODY_X..);
+        let found = axes.filter_map(|((name, _), axis)| {
+            let latent = words.iter().position(|words| words.quantity == *name)?;
+            let factor = factors[axis];
+            Some(MassCentre {
+                latent,
+                axis,
+                factor,
+            })
+        });
+        found.collect()
+    }
+}
+
+/// A latent coordinate that is a position of the centre of mass, or a rotation about it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MassCentre {
+    /// Place in `z`.
+    pub latent: usize,
+    /// Row of the state with the body's position along the same axis, or rotation about it.
+    pub axis: usize,
+    /// `z` of 1 m or 1 rad.
+    pub factor: f64,
 }
 
 /// Quantity of a coordinate, and the unit of its SI value if it has one.

@@ -48,7 +48,7 @@ pub use coordinates::{CoordinateNames, ScaleFactors, Scaling};
 pub use error::ModelError;
 pub use identifier::{Identifier, IdentifierError, check_name};
 pub use jump_prior::{FEATURE_DIM, GOAL_DIM, GoalRange, JumpPart, JumpPrior, Landmark, Landmarks};
-pub use latent_words::LatentWords;
+pub use latent_words::{LatentWords, MassCentre};
 pub use library::{
     CandidateTerm, LatentVariable, Library, LibraryChoice, MAX_LATENT_DIM, MAX_TERM_LEN, Step, Tape,
 };
