@@ -2,13 +2,14 @@
 """Numbers and pictures of README.md and docs/, with the commands that make them.
 
     .ci/numbers.py check              the stored outputs are there, belong to the inputs of today, and the pages agree
-    .ci/numbers.py update [NAME ...]  runs commands again and stores their outputs (all that are not kept, without names)
+    .ci/numbers.py update [NAME ...]  runs commands again and stores their outputs (all that are neither kept nor slow, without names)
     .ci/numbers.py keep NAME ...      stores the tables of the pages, for entries that say why they are not run here
     .ci/numbers.py list
 
 docs/numbers/commands.toml has an entry per NAME: `command` (run by bash in the root of the repository), `inputs` (files and
 patterns whose digests are stored with the output), `files` for pictures that the command makes, `kept` with the reason why
-the output is not made anew here, and `known` for constants that a table shows next to the output. docs/numbers/NAME.txt is the stored output. A page refers to it by a line
+the output is not made anew here, `slow` with the time of a command that runs only by its name (PYTHON is then an interpreter
+with the packages of examples/mujoco), and `known` for constants that a table shows next to the output. docs/numbers/NAME.txt is the stored output. A page refers to it by a line
 `<!-- numbers: NAME -->`: every number of the table or block below must be in the output, as printed or after a change of
 unit by a power of ten, rounded.
 """
@@ -158,7 +159,7 @@ def check():
 
 def update(names):
     for name, entry in entries().items():
-        if (names and name not in names) or (not names and entry.get("kept")):
+        if (names and name not in names) or (not names and (entry.get("kept") or entry.get("slow"))):
             continue
         print(f"{name} ...", flush=True)
         run = subprocess.run(["bash", "-e", "-o", "pipefail", "-c", entry["command"]], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -186,7 +187,7 @@ def main():
         raise SystemExit(f"not in docs/numbers/commands.toml: {', '.join(unknown)}")
     if arguments.action == "list":
         for name, entry in entries().items():
-            print(f"{name}: {entry['command']}" + (f"  (kept: {entry['kept']})" if entry.get("kept") else ""))
+            print(f"{name}: {entry['command']}" + "".join(f"  ({how}: {entry[how]})" for how in ("kept", "slow") if how in entry))
     elif arguments.action == "update":
         update(arguments.names)
     elif arguments.action == "keep":

@@ -14,8 +14,14 @@ fn stubs() -> PathBuf {
     root().join("tests/controller_c/ros2")
 }
 
-/// The plugin, its driver and the controller as one program, all with the same macros.
-fn drive(emitted: &Emitted, compiler: &str, flags: &[&str], macros: &[&str]) -> PathBuf {
+/// The plugin, one of its drivers and the controller as one program, all with the same macros.
+fn drive(
+    emitted: &Emitted,
+    driver: &str,
+    compiler: &str,
+    flags: &[&str],
+    macros: &[&str],
+) -> PathBuf {
     let (name, package) = (&emitted.name, emitted.folder().join("ros2_control"));
     let program = emitted.scratch.path().join("drive");
     succeed(
@@ -30,7 +36,7 @@ fn drive(emitted: &Emitted, compiler: &str, flags: &[&str], macros: &[&str]) -> 
             .arg(format!("-I{}", stubs().join("include").display()))
             .arg(format!("-I{}", stubs().join("alone").display()))
             .args(["-I..", "-Isrc", "src/controller.cpp", "src/plan.cpp"])
-            .arg(stubs().join("drive.cpp"))
+            .arg(stubs().join(driver))
             .args(emitted.objects("cc", macros))
             .args(["-lm", "-o"])
             .arg(&program)
@@ -55,7 +61,7 @@ fn check_efforts(compiler: &str, flags: &[&str], macros: &[&str]) {
     }
     let emitted = Emitted::new(&shipped("go1-d4"), Precision::Double);
     let jump = jump_file(emitted.scratch.path());
-    let program = drive(&emitted, compiler, flags, macros);
+    let program = drive(&emitted, "drive.cpp", compiler, flags, macros);
     let text = Emitted::output(Command::new(program).arg(&jump));
     println!("{compiler} {flags:?} {macros:?}: {text}");
     let is_consistent = !macros.contains(&TRANSPOSED_LIFT);
@@ -86,6 +92,16 @@ fn plugin_gives_the_controllers_efforts_under_clang() {
     check_efforts("clang++", &[], &[]);
 }
 
+#[test]
+fn plugin_walks_by_commands_as_the_state_machine_does() {
+    if !has_compiler_with("c++", &SANITIZE) {
+        return;
+    }
+    let emitted = Emitted::new(&shipped("go1-trot-d6"), Precision::Double);
+    let program = drive(&emitted, "drive_walk.cpp", "c++", &SANITIZE, &[]);
+    println!("{}", Emitted::output(&mut Command::new(program)));
+}
+
 /// Debian's ament and pluginlib, which are those of ROS 2.
 fn has_ament() -> bool {
     let mut probe = Command::new("dpkg-query");
@@ -111,17 +127,23 @@ fn package_builds_with_ament_and_pluginlib_loads_and_drives_it() {
     if !has_ament() {
         return;
     }
-    for precision in [Precision::Single, Precision::Double] {
-        let emitted = Emitted::new(&shipped("go1-d2"), precision);
+    for (model, precision) in [
+        ("go1-trot-d6", Precision::Single),
+        ("go1-d2", Precision::Double),
+    ] {
+        let emitted = Emitted::new(&shipped(model), precision);
+        let name = format!("{}_ros2_control", emitted.name);
         let scratch = emitted.scratch.path();
         let package = emitted.folder().join("ros2_control");
         let (built, prefix) = (scratch.join("build"), scratch.join("prefix"));
         build(&package, &built, &prefix, &[]);
         succeed(Command::new("cmake").arg("--install").arg(&built));
         let index = prefix.join("share/ament_index/resource_index");
-        let listed = index.join("controller_interface__pluginlib__plugin/go1_d2_ros2_control");
+        let listed = index
+            .join("controller_interface__pluginlib__plugin")
+            .join(&name);
         let text = fs::read_to_string(listed).expect("installed");
-        assert_eq!(text.trim(), "share/go1_d2_ros2_control/plugin.xml");
+        assert_eq!(text.trim(), format!("share/{name}/plugin.xml"));
         // The driver has numbers in double precision.
         if precision == Precision::Single {
             continue;

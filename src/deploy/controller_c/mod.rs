@@ -97,7 +97,7 @@ pub(crate) fn emit(
         (format!("{name}_controller_selftest.c"), tidy(&self_test)),
     ];
     texts.splice(1..1, made);
-    texts.extend(ros2_control::files(facts, provenance)?);
+    texts.extend(ros2_control::files(facts, plant.robot(), provenance)?);
     let of_model = c::emit(&entries, provenance, precision, options.sines)?;
     let of_model = of_model.into_iter().map(|file| (file.path, file.contents));
     let mut files: Vec<(String, String)> = of_model

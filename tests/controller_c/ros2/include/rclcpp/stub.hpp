@@ -6,6 +6,7 @@
 #include <cstdarg>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -68,6 +69,19 @@ private:
     Value value_;
 };
 
+struct SystemDefaultsQoS
+{
+};
+
+/// A topic's callback; the node keeps none of its own.
+template <class Message>
+struct Subscription
+{
+    using SharedPtr = std::shared_ptr<Subscription>;
+    std::string topic;
+    std::function<void(const Message &)> callback;
+};
+
 }  // namespace rclcpp
 
 namespace rclcpp_lifecycle
@@ -83,7 +97,20 @@ public:
     rclcpp::Logger get_logger() const { return {last.get()}; }
     rclcpp::Parameter get_parameter(const std::string & name) const { return rclcpp::Parameter(values.at(name)); }
 
+    template <class Message, class Callback>
+    std::shared_ptr<rclcpp::Subscription<Message>> create_subscription(
+        const std::string & topic, const rclcpp::SystemDefaultsQoS &, Callback && callback)
+    {
+        auto made = std::make_shared<rclcpp::Subscription<Message>>();
+        made->topic = topic;
+        made->callback = callback;
+        subscription = made;
+        return made;
+    }
+
     std::map<std::string, rclcpp::Value> values;
+    /// The last subscription that was made, of any message.
+    std::weak_ptr<void> subscription;
     std::shared_ptr<std::string> last = std::make_shared<std::string>();
 };
 

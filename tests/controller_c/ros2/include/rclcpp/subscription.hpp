@@ -1,0 +1,2 @@
+// STUB for romc's tests, not ROS: see stub.hpp.
+#include "rclcpp/stub.hpp"
