@@ -162,9 +162,11 @@ def update(names):
         if (names and name not in names) or (not names and (entry.get("kept") or entry.get("slow"))):
             continue
         print(f"{name} ...", flush=True)
-        run = subprocess.run(["bash", "-e", "-o", "pipefail", "-c", entry["command"]], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        # Scripts that run for minutes print their progress to stderr.
+        notes = subprocess.PIPE if entry.get("slow") else subprocess.STDOUT
+        run = subprocess.run(["bash", "-e", "-o", "pipefail", "-c", entry["command"]], cwd=ROOT, stdout=subprocess.PIPE, stderr=notes, text=True)
         if run.returncode:
-            raise SystemExit(f"{name}: {run.stdout}")
+            raise SystemExit(f"{name}: {run.stdout}{run.stderr or ''}")
         write(name, entry, run.stdout, "run")
 
 

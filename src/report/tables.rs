@@ -343,11 +343,11 @@ pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
         .column("failed", "", |(_, run)| run.failed)
         .column("lift R^2 contact", "", |(_, run)| run.lift_r2.contact)
         .column("lift R^2 flight", "", |(_, run)| run.lift_r2.flight)
-        .column("limit violations", "", |(_, run)| run.limit_violations)
-        .column("friction violations", "", |row| row.1.friction_violations)
+        .column("beyond limits", "", |(_, run)| run.limit_violations)
+        .column("beyond friction", "", |row| row.1.friction_violations)
         .column("step, median, p99", "us", |(_, run)| {
             // Of one width, so that the layout does not depend on the machine.
-            format!("{:6.0}, {:7.0}", run.step_us.p50, run.step_us.p99)
+            format!("{:4.0}, {:6.0}", run.step_us.p50, run.step_us.p99)
         })
         .table()
 }

@@ -148,6 +148,34 @@ fn walk_is_written_with_the_settings_of_its_controller_or_refused() {
     );
 }
 
+/// A planned walk begins in motion: no stand leads to its first posture.
+#[test]
+fn example_in_c_follows_a_planned_walk_from_its_first_sample() {
+    let (model, scratch) = (trot(), tempfile::tempdir().expect("a folder"));
+    let folder = scratch.path();
+    let plan = ["--speed", "0.5", "--duration", "2", "--output", "plan.csv"];
+    done(folder, &[&["plan", &model], &plan[..]].concat());
+    let emit = ["--emit", "controller-c", "--plan", "plan.csv"];
+    done(
+        folder,
+        &[&["compile", &model], &emit[..], &["--out-dir", "code"]].concat(),
+    );
+    let code = folder.join("code/go1_trot_d6-controller-c");
+    let built = std::process::Command::new("cc")
+        .args(["-Wall", "-Wextra", "-Werror", "-O1", "-ffp-contract=off"])
+        .args(["go1_trot_d6_example.c", "go1_trot_d6_controller.c"])
+        .args(["go1_trot_d6.c", "-lm", "-o", "example"])
+        .current_dir(&code)
+        .status();
+    assert!(built.expect("a C compiler").success());
+    let ran = std::process::Command::new(code.join("example")).output();
+    let ran = ran.expect("built");
+    let printed = text(&ran.stdout);
+    assert!(ran.status.success(), "{printed}{}", text(&ran.stderr));
+    assert!(printed.matches("solved").count() > 30, "{printed}");
+    assert!(!printed.contains("stand up"), "{printed}");
+}
+
 #[test]
 fn torques_of_planned_walks_grow_with_speed_and_turning_and_the_ends_extrapolate() {
     let model = romc::artifact::read(Path::new(&trot())).expect("shipped");

@@ -33,6 +33,8 @@ struct Facts<'a> {
     rows: &'a StageRows,
     /// Whether the model has strides to walk by.
     walks: bool,
+    /// Whether the trajectory begins in motion, so that no stand leads to it.
+    begins_moving: bool,
     timing: Timing,
     /// Names of the columns of a log.
     log_columns: Vec<String>,
@@ -50,6 +52,9 @@ templates! {
     "CMakeLists.txt": Cmake "controller_c/cmake.askama",
     "README.md": Readme "controller_c/readme.askama",
 }
+
+/// Speed of the body at the beginning of a trajectory up to which the robot stands there.
+const STANDS_M_S: f64 = 0.1;
 
 /// The files of a model's controller in C; `provenance` is the text of each file's first line.
 pub(crate) fn emit(
@@ -122,6 +127,10 @@ impl<'a> Facts<'a> {
             Precision::Single => ("float", "f"),
         };
         let limits = plant.robot().torque_limit_nm();
+        let begins_moving = plan.is_some_and(|plan| {
+            let velocity = plan.dx.fixed_view::<3, 1>(JOINT_DIM, 0);
+            velocity.norm() > STANDS_M_S
+        });
         let switch = |setting: &Setting| match setting.accepts {
             Accepts::LinkRows(name, what) => Some((name, what)),
             _ => None,
@@ -130,6 +139,7 @@ impl<'a> Facts<'a> {
             solver_stage: source::stage(controller.name, &controller.upper, real, walks),
             row_numbers: ROW_NUMBERS,
             walks,
+            begins_moving,
             controller,
             banner: format!("/* {provenance} */"),
             real,

@@ -1,0 +1,82 @@
+"""Runs the controller along recordings it was not trained on and prints the tables of docs/evaluation/control.md.
+
+    cargo build --release && python3 benches/control/along.py
+
+Every row has the ranges over the test jumps of `go1`, or over the jumps of `go1-other`, with the transpose lift. Needs
+Python alone; a few seconds.
+"""
+
+import argparse
+import json
+import pathlib
+import subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MODELS = ("go1-d4", "go1-d7")
+SETS = {"go1": "test_*.csv.gz", "go1-other": "*.csv.gz"}
+BASELINES = {
+    "no dynamics": "no_dynamics",
+    "constant velocity": "constant_velocity",
+    "no feedback": "feedback_off",
+    "replay": "replay",
+}
+# Column, path in the JSON object of a run, factor of its unit, decimals.
+COLUMNS = [
+    ("x, mm", ("prediction_rms", "body.x"), 1e3, 2),
+    ("z, mm", ("prediction_rms", "body.z"), 1e3, 2),
+    ("torque R^2, contact", ("torque_r2", "contact"), 1.0, 2),
+    ("torque R^2, flight", ("torque_r2", "flight"), 1.0, 2),
+    ("after a push, mm", ("recovery_rms_m",), 1e3, 1),
+]
+LIFT = [
+    ("lift R^2, contact", ("lift", "torque_r2", "contact"), 1.0, 2),
+    ("lift R^2, flight", ("lift", "torque_r2", "flight"), 1.0, 2),
+    ("inconsistency", ("lift", "inconsistency"), 1.0, 2),
+]
+
+
+def runs_along(romc, model, name):
+    """The runs of a model along the recordings of a set, from `romc mpc --json`."""
+    recordings = sorted((ROOT / "examples" / "recordings" / name).glob(SETS[name]))
+    command = [romc, "mpc", ROOT / "models" / f"{model}.json", *recordings, "--json"]
+    done = subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True)
+    return json.loads(done.stdout)["runs"]
+
+
+def cell(runs, path, factor, decimals):
+    """The range of a number over runs; empty where they do not have it."""
+    values = []
+    for value in runs:
+        for key in path:
+            value = value.get(key) if value else None
+        if value is None:
+            return ""
+        values.append(factor * value)
+    least, most = (f"{value:.{decimals}f}" for value in (min(values), max(values)))
+    return least if least == most else f"{least} to {most}"
+
+
+def row(title, runs, columns):
+    return "| " + " | ".join([title] + [cell(runs, *column[1:]) for column in columns]) + " |"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target/release/romc", help="the compiler")
+    romc = parser.parse_args().romc.resolve()
+    along, lift = [], []
+    for model in MODELS:
+        for name in SETS:
+            runs = runs_along(romc, model, name)
+            title = f"`{model}`, `{name}`"
+            along.append(row(f"{title} | model", runs, COLUMNS))
+            for baseline, key in BASELINES.items():
+                along.append(row(f"{title} | {baseline}", [run["baseline"][key] for run in runs], COLUMNS))
+            if name == "go1":
+                lift.append(row(f"`{model}`", runs, LIFT))
+    print("\n".join(["| model, jumps | controller | " + " | ".join(column[0] for column in COLUMNS) + " |", *along]))
+    print("\n".join(["", "| model | " + " | ".join(column[0] for column in LIFT) + " |", *lift]))
+
+
+if __name__ == "__main__":
+    main()
