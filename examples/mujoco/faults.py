@@ -136,7 +136,7 @@ def run(module, inputs, jump, fault, fault_s, rate_hz, walks):
 def main():
     arguments = parse_arguments()
     crate = c_controller.build(arguments.model, arguments.out_dir / arguments.model.stem, arguments.romc)
-    inputs = ModelInputs.compiled(arguments.model, arguments.out_dir / "inputs", arguments.romc)
+    inputs = ModelInputs.compiled(arguments.model, arguments.out_dir / f"{arguments.model.stem}-inputs", arguments.romc)
     read = read_walk if arguments.walk else read_jump
     module, jump = c_controller.load(crate), read(arguments.jump)
     rows, missed = [], []

@@ -14,6 +14,9 @@ const LEAST_FLIGHTS: usize = 50; // averaged accelerations in flight that identi
 const LEAST_SHARE: f64 = 0.05; // of all samples that they begin at
 const FLIGHT_RIDGE: f64 = 1e-2; // relative to the mean square of all joints' accelerations
 const RIDGE: f64 = 1e-3; // the same with feet on the ground
+/// The same of x in walks. Feet resist rolling with a force that follows the legs' motion, and a weak ridge would count it
+/// as the legs' momentum. Predictions of validation trots do not depend on it, those of another controller do.
+const ROLLING_RIDGE: f64 = 2e-2;
 const LOAD_RIDGE: f64 = 1e-5; // on the other columns of the regression, relative to the mean square of each
 
 /// The momentum rows of these body coordinates, as columns: `x + c_x^T q`, `pitch + c_t^T q` and so on over the joints
@@ -94,7 +97,11 @@ pub(super) fn momentum_rows(
         if !is_lateral(coordinate) {
             also.push(DVector::from_element(target.len(), 1.0));
         }
-        if let Some(part) = joint_weights(of_joints, also, &target, RIDGE) {
+        let ridge = match coordinate {
+            BODY_X if walks => ROLLING_RIDGE,
+            _ => RIDGE,
+        };
+        if let Some(part) = joint_weights(of_joints, also, &target, ridge) {
             row -= &joints * part.rows(0, joints.ncols());
             if is_sideways {
                 row[ROLL] -= part[joints.ncols()];

@@ -4,7 +4,7 @@ use super::*;
 
 const STRIDE: usize = 5; // samples between the starts of two windows
 pub(super) const FLIGHT_WINDOW: usize = 50; // samples
-const MOTION_WINDOW: usize = 50;
+const MOTION_WINDOW: usize = 100; // about a step of a trot; errors of forces average out over it
 const WHOLE_FLIGHTS: f64 = 10.0; // weight of the errors of whole flights against those of windows
 const LARGEST: f64 = 1e150; // magnitude of a term: sums of its squares stay finite
 
