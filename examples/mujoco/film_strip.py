@@ -41,7 +41,9 @@ def render(robot, states):
     """One picture (height, width, 3) per state (18,), seen from the right, camera at rest."""
     data = mujoco.MjData(robot.mj)
     camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation, camera.distance = 90, -6, 1.35
+    # From so far above that the floor, not the black sky, is behind the robot.
+    camera.azimuth, camera.elevation, camera.distance = 90, -22, 1.35
+    robot.mj.vis.headlight.ambient[:] = robot.mj.vis.headlight.diffuse[:] = 0.5
     camera.lookat[:] = (states[:, 12].mean(), 0.0, 0.22)
     pictures = []
     with mujoco.Renderer(robot.mj, *FRAME) as renderer:
