@@ -54,7 +54,7 @@ pub(super) fn files(
     let walks = controller.walks;
     let defaults = match walks {
         true => Settings::from(&crate::mpc::walk_settings(robot)),
-        false => controller.defaults.clone(),
+        false => controller.defaults,
     };
     let command_every_s = match walks {
         true => WALK_COMMAND_EVERY_S,
