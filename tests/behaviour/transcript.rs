@@ -29,7 +29,7 @@ impl Transcript {
     pub fn of(name: &str, text: &str) -> Self {
         let mut is_timed = false;
         let lines = text.lines().map(|line| {
-            is_timed = line.ends_with(", us") || is_timed && line.len() > 2;
+            is_timed = line.ends_with(" us") || is_timed && line.len() > 2;
             without_times(line, is_timed && line.contains(".csv"))
         });
         Self {
@@ -145,7 +145,9 @@ fn without_times(line: &str, is_timed_row: bool) -> String {
     let is_of_programs = line.contains(" convex programs, ");
     // A table with times has another length in each run.
     let is_of_files = line.ends_with(" bytes)");
+    let is_of_steps = line.contains("time of a step");
     if !is_timed_row
+        && !is_of_steps
         && !is_of_programs
         && !is_of_files
         && !NAMES.iter().any(|name| line.contains(name))
@@ -155,6 +157,7 @@ fn without_times(line: &str, is_timed_row: bool) -> String {
     let parts = tokens(line);
     let is_time = |at: usize| {
         is_timed_row && at + 2 >= parts.len()
+            || is_of_steps && parts.get(at + 1) == Some(&"us")
             || is_of_programs && parts.get(at + 1) == Some(&"ms")
             || is_of_files && parts.get(at + 1) == Some(&"bytes")
             || at > 0 && NAMES.contains(&parts[at - 1])
