@@ -1,5 +1,5 @@
-//! The figures of `romc mpc` fall when the model is wrong: coefficients zeroed, negated, random, ten times as large,
-//! without inputs.
+//! The figures of `romc mpc` become worse when the model is wrong: coefficients zeroed, negated, random, ten times as
+//! large, or no inputs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,15 +13,16 @@ use romc::{artifact, recording};
 use serde_json::Value;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-/// The last turns little: a constant velocity predicts its pitch better than coordinates that have none for it.
+/// The last jump turns little. A constant velocity predicts its pitch better than a model without a coordinate for
+/// pitch.
 const JUMPS: [&str; 3] = [
     "examples/recordings/go1/test_02.csv.gz",
     "examples/recordings/go1-other/jump_03.csv.gz",
     "examples/recordings/go1-other/jump_04.csv.gz",
 ];
 
-/// Counts, times, what maps and lift alone make of recorded inputs, and what others do: named for what they are, and
-/// not figures of the dynamics.
+/// Figures that do not depend on the dynamics: counts, times, the reconstruction of recorded inputs by maps and lift,
+/// and the results of baselines. Their names state this.
 const OTHERS: [&str; 12] = [
     "steps",
     "solved",
@@ -41,7 +42,7 @@ fn shipped(name: &str) -> ReducedModel {
     artifact::read(&Path::new(ROOT).join(format!("models/{name}.json"))).expect("shipped")
 }
 
-/// The model with other coefficients, of term, output and value.
+/// The model with other coefficients; the function gets term, output and value.
 fn with_xi(model: &ReducedModel, change: impl Fn(&str, f64) -> f64) -> ReducedModel {
     let terms = model.library().terms();
     let phases = model.phases().iter().cloned().map(|mut phase| {
@@ -55,7 +56,7 @@ fn with_xi(model: &ReducedModel, change: impl Fn(&str, f64) -> f64) -> ReducedMo
     builder.build().expect("a model")
 }
 
-/// Numbers of normal distribution by a linear congruential generator.
+/// Normally distributed numbers, by a linear congruential generator.
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     let mut uniform = move || {
@@ -97,7 +98,7 @@ fn runs(model: &Path, jumps: &[&str]) -> Vec<Value> {
         .output()
         .expect("the binary runs");
     let error = String::from_utf8_lossy(&output.stderr);
-    // 1 is a verdict on the model.
+    // Exit code 1 is a verdict on the model.
     assert!(matches!(output.status.code(), Some(0 | 1)), "{error}");
     let mut value: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     let Value::Array(runs) = value["runs"].take() else {
@@ -106,7 +107,7 @@ fn runs(model: &Path, jumps: &[&str]) -> Vec<Value> {
     runs
 }
 
-/// All numbers of a value under their paths, but those of [`OTHERS`].
+/// All numbers of a value by their paths, except those of [`OTHERS`].
 fn figures(value: &Value, path: &str, out: &mut BTreeMap<String, f64>) {
     match value {
         Value::Number(number) => {
@@ -174,7 +175,7 @@ fn models_that_carry_torques_have_not_failed_along_right_recordings() {
     }
 }
 
-/// Whether a model was learned with known physics held.
+/// Whether known physics was held fixed when the model was learned.
 fn knows_physics(model: &ReducedModel) -> bool {
     let command = model.provenance().get("command").and_then(Value::as_str);
     command.is_some_and(|command| command.contains("--coordinates named"))
@@ -226,7 +227,7 @@ fn invariance_finds_a_model_that_depends_on_the_place() {
     assert!((at(1.0) - at(0.0)).abs() > 1e-3);
 }
 
-/// Each jump alone, as a user has one; a model of accelerations ten times as large explains none of them.
+/// Each jump alone, as a user may have one. Accelerations ten times as large explain none of them.
 #[test]
 fn shipped_models_have_no_remark_on_a_right_jump_and_wrong_ones_do() {
     let mut wrong_noticed = 0;
@@ -244,7 +245,7 @@ fn shipped_models_have_no_remark_on_a_right_jump_and_wrong_ones_do() {
     assert_eq!(wrong_noticed, 16);
 }
 
-/// Copies that have the right terms with the wrong dynamics.
+/// Copies with the right terms and wrong dynamics.
 fn broken(model: &ReducedModel) -> [(&'static str, ReducedModel); 4] {
     let phases = |change: &dyn Fn(usize) -> DMatrix<f64>| {
         let phases = model.phases().iter().cloned().enumerate();
@@ -323,7 +324,7 @@ fn every_row_that_praises_the_dynamics_falls_with_them() {
         let model = shipped(name);
         let right = verdict_on(&model, &[jump]);
         assert_eq!(right.fit_for, fit, "{name}: {right:?}");
-        // Three of the four phases of the trot have the same equations.
+        // Three of the four phases of the trot have equal equations.
         let is_walk = fit.contains(&"a stride");
         let broken = broken(&model).into_iter();
         for (what, wrong) in broken.filter(|(what, _)| !(is_walk && *what == "phases exchanged")) {
@@ -351,7 +352,7 @@ fn shipped_models_are_fit_for_everything_on_jumps_of_their_robot() {
         for name in ["go1-d4", "go1-d6", "go1-d7"] {
             let verdict = verdict_on(&shipped(name), &paths);
             assert_eq!(verdict.fit_for.len(), 4, "{name}: {verdict:?}");
-            // Only a model with a coordinate for it is judged by its pitch.
+            // Pitch counts only for a model with a coordinate for it.
             let row = |of: &str| {
                 let named = verdict.rows.iter().find(|row| row.name.contains(of));
                 let row = named.expect("of every model");

@@ -1,5 +1,5 @@
-//! The rooms of `src` and of the crates in it import only what the table of ARCHITECTURE.md allows, and only from rows above
-//! their own; a setting of the controller, a kind of rows and an elementary function stand in few files.
+//! The modules of `src` and of its crates import only those that the table of ARCHITECTURE.md allows, all in rows above
+//! their own. A controller setting, a kind of rows and an elementary function each appear in few files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use romc::mpc::problem::RowKind;
 
-/// The sources of a crate by its name in the table: a room is a folder in them, or all of them.
+/// The sources of a crate by its name in the table: a module is one of their folders, or all of them.
 fn sources_of(name: &str) -> String {
     match name {
         "romc" => "src".to_owned(),
@@ -15,7 +15,7 @@ fn sources_of(name: &str) -> String {
     }
 }
 
-/// A row of the table: the crate of a room, and which rooms it may import.
+/// A row of the table: a module, its crate and the modules that it may import.
 struct Row {
     place: String,
     room: String,
@@ -68,7 +68,7 @@ fn table(text: &str) -> Vec<Row> {
     rows
 }
 
-/// A crate with a single room has no folder for it.
+/// A crate with a single module has no folder for it.
 fn is_whole_crate(row: &Row, rows: &[Row]) -> bool {
     rows.iter().filter(|other| other.place == row.place).count() == 1
 }
@@ -274,7 +274,7 @@ fn rooms_import_only_what_the_table_of_architecture_allows() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Files below a folder with an identifier that is looked for, but for unit tests, documentation and what is generated.
+/// Files below a folder that contain a matching identifier. Unit tests, documentation and generated files do not count.
 fn naming(folder: &Path, is_meant: &dyn Fn(&str) -> bool, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a readable folder") {
         let path = entry.expect("an entry").path();
@@ -347,7 +347,7 @@ fn spelled(identifier: &str) -> String {
     out
 }
 
-/// Names that kinds of rows had, and that rows of one kind had in the layouts of the solvers and in the C.
+/// Earlier names of kinds of rows, also in the layouts of the solvers and in the C.
 const EARLIER_NAMES: [&str; 15] = [
     "motor_torque",
     "torque_row",
@@ -366,7 +366,7 @@ const EARLIER_NAMES: [&str; 15] = [
     "has_pyramid",
 ];
 
-/// Quantities of a robot and a count of what left them, in the words that two kinds of rows have too.
+/// Quantities of a robot, and a count of violations, whose names contain those of two kinds of rows.
 const OF_ROBOTS: [&str; 6] = [
     "TORQUE_LIMIT",
     "torque_limit",
@@ -376,9 +376,9 @@ const OF_ROBOTS: [&str; 6] = [
     "beyond_joint_limit_rad",
 ];
 
-/// The files in which one of these names stands in an identifier, in any spelling, from the beginning of a word on: `TorqueRate`,
-/// `torque_rate_nm_s`, `UPPER_TORQUE_RATES`. A flag of the command line and its range are no part of the kind; `data`
-/// knows no control problem, its rows and rates are those of regressions.
+/// The files in which one of these names begins a word of an identifier, in any spelling: `TorqueRate`,
+/// `torque_rate_nm_s`, `UPPER_TORQUE_RATES`. Flags of the command line and their ranges do not count, nor does `data`:
+/// its rows and rates are those of regressions.
 fn naming_rows(names: &[&str]) -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let names: Vec<String> = names.iter().map(|name| spelled(name)).collect();

@@ -1,4 +1,4 @@
-//! The model file: what is accepted, what is refused, and how the refusal reads.
+//! The model file: accepted and refused contents, and the text of each refusal.
 
 #[path = "artifact/maps.rs"]
 mod maps;
@@ -60,7 +60,7 @@ fn model_refusal(name: &str, change: impl Fn(&mut Value)) -> ModelError {
     }
 }
 
-/// Place, what was found and what was expected, of a part that cannot be as it is.
+/// Place, found and expected value of an invalid part.
 fn invalid(name: &str, change: impl Fn(&mut Value)) -> [String; 3] {
     parts_of(model_refusal(name, change))
 }
@@ -360,7 +360,7 @@ fn deeply_nested_file_is_refused() {
     assert!(artifact::describe(&error).contains("recursion limit"));
 }
 
-/// Damages the fixtures in many ways; whatever still reads must be a sound model.
+/// Damages the fixtures in many ways; every file that can still be read must be a sound model.
 #[test]
 fn damaged_files_are_refused_or_sound_but_never_panic() {
     let mut state = 0x9e37_79b9_7f4a_7c15u64;
@@ -406,7 +406,7 @@ fn damaged_files_are_refused_or_sound_but_never_panic() {
             }
         }
     }
-    // Changed digits leave sound models, so both outcomes have been tried.
+    // Changed digits leave sound models, so both outcomes occur.
     assert!((100..11_900).contains(&accepted), "{accepted}");
 }
 
@@ -448,12 +448,12 @@ fn actuators_and_frame_are_read_and_written_with_the_second_schema() {
     let rule = model.input_rule().expect("a robot");
     assert_eq!(rule.robot().name, "go2");
     assert!(artifact::to_text(&model).contains("\"schema\": \"romc-model/2\""));
-    // Without them it is a file of the first schema, which keeps old files byte for byte.
+    // Without losses the file has the first schema, so old files stay the same byte for byte.
     let plain = model.clone().into_builder().actuators(None);
     let plain = plain.wrench_frame(WrenchFrame::Body).build();
     let text = artifact::to_text(&plain.expect("sound"));
     assert!(text.contains("\"schema\": \"romc-model/1\"") && !text.contains("actuators"));
-    // The frame alone needs the second one as well.
+    // The frame alone also needs the second schema.
     let turned = model.into_builder().actuators(None).build().expect("sound");
     let text = artifact::to_text(&turned);
     assert!(text.contains("romc-model/2") && text.contains("\"wrench_frame\": \"world\""));
@@ -662,7 +662,7 @@ fn each_tensor_with_one_row_too_few_or_many_is_refused() {
             let names_itself = place == format!("`{tensor}`")
                 && found == of(rows, expected.1)
                 && wanted == of(expected.0, expected.1) + suffix;
-            // A bias is compared with its weights first: either may be named.
+            // A bias is compared with its weights first: the message may name either.
             let names_bias = tensor.ends_with(".weights")
                 && place == format!("`{}`", tensor.replace("weights", "bias"))
                 && wanted == of(rows, 1) + suffix;
@@ -1138,7 +1138,7 @@ fn written_file_is_whole_and_leaves_nothing_beside_it() {
     artifact::write(&path, &model, Overwrite::Refuse).expect("written");
     assert_eq!(artifact::read(&path).expect("readable"), model);
     assert_eq!(fs::read_dir(folder.path()).expect("folder").count(), 1);
-    // The digest is that of the file's bytes, whatever the layout of the file that was read.
+    // The digest is that of the written bytes. It does not depend on the layout of the file that was read.
     let compact = read_value(&serde_json::from_slice(&fs::read(&path).unwrap()).unwrap());
     let digest = artifact::digest(&compact.expect("same model"));
     assert_eq!(digest, artifact::digest(&model));
@@ -1207,7 +1207,7 @@ fn provenance_reads_back_equal_and_too_many_values_are_refused() {
     let text = with_provenance(&provenance).expect("any JSON");
     let again: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(again["provenance"], provenance);
-    // The object and its list are values as well.
+    // The object and its list count as values as well.
     assert!(with_provenance(&json!({ "v": vec![0; 99_998] })).is_ok());
     let error = with_provenance(&json!({ "v": vec![0; 99_999] })).expect_err("too many");
     assert!(

@@ -1,4 +1,4 @@
-//! The command line from outside: exit codes, JSON, files that appear whole, errors that name the place.
+//! The command line from outside: exit codes, JSON, complete files, errors with their place.
 
 #[path = "cli/bounds.rs"]
 mod bounds;
@@ -21,7 +21,7 @@ fn romc(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_romc"))
         .args(arguments)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .env_remove("COLUMNS") // helps are wrapped at it
+        .env_remove("COLUMNS") // helps are wrapped at this width
         .output()
         .expect("the binary runs")
 }
@@ -48,7 +48,7 @@ fn json(arguments: &[&str]) -> Value {
     value
 }
 
-/// As [`json`], whatever the verdict on the model is: the exit code is 0 or 1.
+/// As [`json`], but a bad verdict on the model is allowed: the exit code is 0 or 1.
 fn judged(arguments: &[&str]) -> Value {
     let output = romc(&[arguments, &["--json"]].concat());
     let code = output.status.code();
@@ -65,7 +65,7 @@ fn failed(arguments: &[&str]) -> String {
     ended_with(1, arguments)
 }
 
-/// As [`failed`], for options that cannot be: exit code 2.
+/// As [`failed`], for invalid options: exit code 2.
 fn refused(arguments: &[&str]) -> String {
     ended_with(2, arguments)
 }
@@ -189,7 +189,7 @@ fn demo_makes_equations_code_and_commands_and_tells_how_well_it_does() {
     ] {
         assert!(table.contains(part), "{table}");
     }
-    // Of a folder with a short name, it fits a terminal.
+    // With a short folder name the table fits a terminal.
     let shown = table.replace(&out, "out/demo");
     let widest = shown.lines().map(|line| line.chars().count()).max();
     assert!(shown.lines().count() <= 45 && widest <= Some(80), "{shown}");
@@ -493,7 +493,7 @@ fn train_takes_what_the_joints_take_off_the_torques_and_says_so() {
     let folder = folder();
     let losses = path(&folder, "losses.toml");
     let model = path(&folder, "net.json");
-    // As `romc identify` writes it: other tables are passed over.
+    // As `romc identify` writes it: other tables are ignored.
     let table =
         "gravity_m_s2 = 9.8\n[actuators]\nviscous = [1.0, 0.6, 0.6]\ndry = [0.2, 0.2, 0.2]\n";
     let whole = format!(
@@ -686,7 +686,7 @@ fn train_tells_implausible_samples_and_leaves_them_out_only_when_asked() {
     assert_eq!(kept["recordings"]["left_out"], 0);
 
     let (clean, stderr) = with(&["--leave-out-implausible"]);
-    // The sample, and the nine after it, which are too few to learn from.
+    // The sample and the nine after it are left out: they are too few to learn from.
     assert_eq!(clean["recordings"]["left_out"], 10);
     assert!(stderr.contains("10 samples are left out"), "{stderr}");
     let torque_r2 = |value: &Value| value["report"]["training"]["torque_r2"].as_f64();
@@ -1061,7 +1061,7 @@ fn named_coordinates_are_refused_where_they_are_not_learned_and_need_no_joint() 
             "{error}"
         );
     }
-    // nothing but the body counts as moving
+    // only the body counts as moving
     let body = ["--mask-std", "10", "--mask-input-share", "1"];
     let trained = train("2", &body);
     assert!(trained.status.success(), "{}", text(&trained.stderr));
@@ -1165,7 +1165,7 @@ fn mpc_limits_how_fast_torques_change_with_either_solver() {
     let folder = folder();
     let largest_change = |more: &[&str]| {
         let table = path(&folder, "commands.csv");
-        // A controller whose torques may hardly change does not bring a pushed body back.
+        // With a tight limit on torque rates the controller cannot bring a pushed body back.
         judged(&[&["mpc", MODEL, JUMP, "--output", &table, "--force"], more].concat());
         let rows = fs::read_to_string(&table).expect("a table");
         let header: Vec<&str> = rows.lines().next().expect("a header").split(',').collect();
@@ -1190,7 +1190,7 @@ fn mpc_limits_how_fast_torques_change_with_either_solver() {
     assert!(free > 4.0, "{free} N m in 10 ms");
     for solver in ["clarabel", "riccati"] {
         let limited = largest_change(&["--torque-rate", "100", "--solver", solver]);
-        // Rows that others imply to within 2 % are left out.
+        // Rows that others imply to within 2 % are omitted.
         assert!(limited < 1.03, "{solver}: {limited} N m in 10 ms");
     }
 }
@@ -1354,7 +1354,7 @@ fn compile_within_zero_tolerance_emits_the_same_bytes() {
     let certificate = fs::read_to_string(Path::new(&zero).join("go1_d4-simplification.md"));
     let certificate = certificate.expect("the certificate is written");
     assert!(certificate.contains("- changes: 0\n"), "{certificate}");
-    // default printing rounds, and the certificate bounds what that costs
+    // default printing rounds, and the certificate bounds the effect
     assert!(
         certificate.contains("## Error due to rounded printing"),
         "{certificate}"
@@ -1404,12 +1404,12 @@ fn compile_within_a_tolerance_tells_each_change_and_saves_the_simplified_model()
     );
     let header = fs::read_to_string(Path::new(&out).join("go1_d6.h")).expect("written");
     assert!(header.contains("/* Simplified within 50% of"), "{header}");
-    // the saved model is one like any other, and knows where it comes from
+    // the saved model is an ordinary one, and contains its origin
     let model: Value =
         serde_json::from_str(&fs::read_to_string(&saved).expect("written")).expect("JSON");
     let flight = &model["phases"][1];
     assert_eq!(flight["name"], "flight");
-    // free fall is no result of learning
+    // free fall is not a learned equation
     assert_eq!(flight["xi"][0][1].as_f64(), Some(-0.981));
     let entry = &model["provenance"]["simplification"];
     assert_eq!(
@@ -1492,7 +1492,7 @@ fn runs_at_the_same_time_into_one_folder_keep_each_others_files() {
                 assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
             }
         });
-        // every file is known as romc's, so that each run may be repeated
+        // romc recognises every file as its own, so each run can be repeated
         for model in models {
             done(&[
                 "compile",
@@ -1562,23 +1562,23 @@ fn sines_of_the_paper_become_linear_over_given_ranges() {
     }
 }
 
-/// Ends the training that it holds, also where a test fails before it does.
+/// Ends its training on drop, also if a test fails earlier.
 #[cfg(unix)]
 struct Training(std::process::Child);
 
 #[cfg(unix)]
 impl Drop for Training {
     fn drop(&mut self) {
-        // A training that has ended is no fault here.
+        // The training may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// What a training prints, and its exit code, when Ctrl-C ends it before its last epoch.
+/// Output and exit code of a training that Ctrl-C ends before its last epoch.
 ///
-/// The handler is there once recordings are read, which takes as long as the machine is slow: a signal
-/// before ends the process, and the next attempt waits longer.
+/// The handler is installed once the recordings are read, later on a slow machine. An earlier signal ends
+/// the process; the next attempt then waits longer.
 #[cfg(unix)]
 fn interrupted_training(model: &Path, extra: &[&str]) -> (Option<i32>, String, String) {
     use std::io::Read as _;
@@ -1597,7 +1597,7 @@ fn interrupted_training(model: &Path, extra: &[&str]) -> (Option<i32>, String, S
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut training = Training(command.spawn().expect("the binary runs"));
         std::thread::sleep(std::time::Duration::from_secs(seconds));
-        let signal = Command::new("sh") // which has `kill` where no package brought a program of that name
+        let signal = Command::new("sh") // a shell has `kill` built in, also where no such program is installed
             .args(["-c", &format!("kill -INT {}", training.0.id())])
             .status();
         assert!(
@@ -1633,7 +1633,7 @@ fn training_that_is_interrupted_says_so_in_text_json_exit_code_and_provenance() 
     assert_eq!(provenance(), true);
 
     fs::remove_file(&model).expect("it was written");
-    // The number of epochs alone asks for the joint method.
+    // The number of epochs alone selects the joint method.
     let (code, said, wrong) = interrupted_training(&model, &["--seeds", "2", "--json"]);
     assert_eq!(code, Some(130), "{said}{wrong}");
     assert!(wrong.contains("note: interrupted"), "{wrong}");

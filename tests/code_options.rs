@@ -1,4 +1,4 @@
-//! Options of generated code: units at the interface, sines of the library, C++ as its language, folders of any name.
+//! Options of generated code: units at the interface, sines of the C library, C++ as language, arbitrary folder names.
 
 mod command_line;
 mod tools;
@@ -16,9 +16,9 @@ use romc::lower::Form;
 use romc::model::{FeetRule, Library, Phase, ReducedModel};
 use romc::typeset::{PrintOptions, Rounding};
 
-/// Trigonometric candidate terms in its dynamics.
+/// A model with trigonometric candidate terms.
 const WITH_SINES: &str = "models/paper-2d.json";
-/// Encoder, decoder, scaling and lift.
+/// A model with encoder, decoder, scaling and lift.
 const WITH_MAPS: &str = "models/go1-d4.json";
 
 fn load(path: &str) -> ReducedModel {
@@ -29,7 +29,7 @@ fn write(folder: &Path, files: &[EmittedFile]) {
     romc::files::write_files(folder, files, romc::files::Overwrite::Refuse).expect("written");
 }
 
-/// A model of one term and its coefficient.
+/// A model with one term and this coefficient.
 fn of_one_term(coefficient: f64, term: &str) -> ReducedModel {
     let library = Library::from_terms(1, &[term.to_owned()]).expect("a term");
     let phase = Phase {
@@ -41,7 +41,7 @@ fn of_one_term(coefficient: f64, term: &str) -> ReducedModel {
     builder.build().expect("a model")
 }
 
-/// Compiles C files strictly and runs the program; its output.
+/// Compiles C files strictly and runs the program; returns its output.
 fn run_c(folder: &Path, sources: &[&str]) -> String {
     let program = folder.join("program");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".to_owned());
@@ -198,7 +198,7 @@ fn printed_command_builds_the_self_test_in_a_folder_of_any_name() {
     }
 }
 
-/// No text of a file acts in what is emitted: on its comments, its pages, or the order in which a reader sees them.
+/// Texts of a file have no effect in emitted files: not on comments, on pages, or on the order of displayed text.
 #[test]
 fn texts_of_a_model_file_are_seen_in_every_emitted_file() {
     use Target::{
@@ -368,7 +368,7 @@ fn physical_units_give_the_accelerations_of_scaled_ones_for_all_shipped_models()
             robot_accelerations(&model, &physical),
         );
         assert_eq!(scaled.len(), physical.len());
-        // A sample's accelerations share the rounding of the sum that all are decoded from.
+        // All accelerations of a sample are decoded from one sum, whose rounding error they share.
         for (scaled, physical) in scaled.chunks(18).zip(physical.chunks(18)) {
             let largest = scaled.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
             assert!(largest > 0.0 && largest.is_finite());

@@ -1,4 +1,4 @@
-//! The generated controller: built, linked into C, C++ and Python, and held against the library.
+//! The generated controller: built, linked into C, C++ and Python, and compared with the library.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ mod programs;
 mod tools;
 use programs::{WARNINGS, root, shipped, succeed, with_losses};
 
-/// What a Rust static library needs from the system.
+/// System libraries that a Rust static library needs.
 const SYSTEM: [&str; 4] = ["-lm", "-lpthread", "-ldl", "-lrt"];
 
 fn emitted(model: &ReducedModel) -> Vec<EmittedFile> {
@@ -28,7 +28,7 @@ fn emitted(model: &ReducedModel) -> Vec<EmittedFile> {
     .expect("a complete model")
 }
 
-/// A generated crate that was built; all share one folder of compiled dependencies.
+/// A built generated crate; all crates share one folder of compiled dependencies.
 struct Built {
     name: String,
     folder: PathBuf,
@@ -48,7 +48,7 @@ impl Built {
         built.remove_all_but(&files);
         for file in files {
             let path = scratch.join(&file.path);
-            // What has not changed is not compiled again.
+            // Unchanged files are not compiled again.
             if fs::read_to_string(&path).ok().as_ref() != Some(&file.contents) {
                 fs::create_dir_all(path.parent().expect("inside the folder")).expect("a folder");
                 fs::write(&path, &file.contents).expect("written");
@@ -58,7 +58,7 @@ impl Built {
             Command::new(env!("CARGO"))
                 .args(["build", "--release"])
                 .current_dir(&built.folder)
-                // The bits are those of full optimisation, and the build takes half the time.
+                // The bits are those of full optimisation, and the build needs half the time.
                 .env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1")
                 .env("CARGO_PROFILE_RELEASE_LTO", "off")
                 .env("CARGO_TARGET_DIR", &built.target),
@@ -68,7 +68,7 @@ impl Built {
         built
     }
 
-    /// Removes what an earlier version emitted and this one does not.
+    /// Removes files of an earlier version that this one does not emit.
     fn remove_all_but(&self, files: &[EmittedFile]) {
         let scratch = Path::new(env!("CARGO_TARGET_TMPDIR"));
         let kept: Vec<PathBuf> = files.iter().map(|file| scratch.join(&file.path)).collect();
@@ -119,7 +119,7 @@ struct Case {
     has_input: bool,
 }
 
-/// A segment's samples as a controller takes them, and every fifth of them as a measurement.
+/// A segment's samples in the controller's form, and every fifth of them as a measurement.
 fn samples<'a>(segment: &'a Segment, input: Option<&'a [f64]>) -> ReferenceSamples<'a> {
     ReferenceSamples {
         time_s: &segment.time_s,
@@ -171,7 +171,7 @@ fn encoded(case: &Case, segment: &Segment, input: &[f64]) -> Vec<u8> {
     bytes
 }
 
-/// What the library commands, as the driver writes it.
+/// The library's commands in the driver's format.
 fn commanded(model: &ReducedModel, case: &Case, segment: &Segment, input: &[f64]) -> Vec<u8> {
     let settings = MpcSettings {
         lift: case.lift,
@@ -237,7 +237,7 @@ fn drive_and_compare(model: &ReducedModel, built: &Built) {
     }
 }
 
-/// A file that the list of sources lacks would leave a crate that does not compile.
+/// A source missing from the list would give a crate that does not compile.
 #[test]
 fn generated_controllers_hold_all_sources_of_the_controller_and_its_solver() {
     let files = emitted(&shipped("go1-d4"));
@@ -313,7 +313,7 @@ fn model_without_a_robot_or_with_activations_is_refused_with_the_reason() {
     let mut layer = manifest["encoder"].take();
     layer["activation"] = "tanh".into();
     manifest["encoder"] = serde_json::json!({ "layers": [layer] });
-    // What predicts jumps needs a linear encoder, too, and would be missed first.
+    // Prior and landmarks also need a linear encoder, and would be reported first.
     let fields = manifest.as_object_mut().expect("an object");
     fields.retain(|name, _| !["prior", "landmarks"].contains(&name.as_str()));
     let folder = tempfile::tempdir().expect("a folder");
@@ -333,7 +333,7 @@ fn model_without_a_robot_or_with_activations_is_refused_with_the_reason() {
 
 #[test]
 fn generated_controllers_command_the_librarys_bits_and_survive_abuse() {
-    // A crate is a minute of compiling: the simpler model only where everything is asked for.
+    // A crate compiles for a minute: the simpler model is built only in thorough runs.
     let mut models = vec![with_losses(shipped("go1-d6"))];
     if tools::is_thorough() {
         models.push(shipped("go1-d4"));
@@ -363,7 +363,7 @@ fn generated_controllers_command_the_librarys_bits_and_survive_abuse() {
     }
 }
 
-/// The Python example on the shared library; told and skipped without a Python, unless required.
+/// The Python example on the shared library; without Python skipped with a message, unless required.
 fn run_python(built: &Built) {
     let script = format!(
         "import {0}_controller as c; s = c.Library({1:?}).default_settings(); assert s.off() == []; \

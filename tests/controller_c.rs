@@ -1,5 +1,5 @@
-//! The generated controller in C99: against the library bit for bit, under strict compilers, as a
-//! project of CMake.
+//! The generated controller in C99: bit for bit compared with the library, under strict compilers, as a project of
+//! CMake.
 
 use std::fs;
 use std::path::Path;
@@ -46,8 +46,8 @@ use programs::{root, shipped, succeed, with_losses};
 use random::Random;
 use tools::{is_asked_for, is_thorough};
 
-/// The shipped model with torques over 0.3 as large for the same latent input: its limits bind as if
-/// they were 30 % of what they are.
+/// The shipped model with torques divided by 0.3 for the same latent input: its limits bind as if they were 30 % of
+/// their values.
 fn with_tight_limits(name: &str) -> ReducedModel {
     changed(name, |manifest| {
         let scale = |value: &mut serde_json::Value| {
@@ -60,7 +60,7 @@ fn with_tight_limits(name: &str) -> ReducedModel {
     })
 }
 
-/// The shipped model without what its states say of its inputs, as one that was imported.
+/// The shipped model without the statistics of inputs given states, like an imported model.
 fn without_given_state(name: &str) -> ReducedModel {
     changed(name, |manifest| {
         let phases = manifest["input_statistics"]
@@ -73,7 +73,7 @@ fn without_given_state(name: &str) -> ReducedModel {
     })
 }
 
-/// The shipped model of four coordinates without its last: the library fills an odd dimension up, the C does not.
+/// The shipped model of four coordinates without its last: the library pads an odd dimension, the C does not.
 fn with_three_coordinates() -> ReducedModel {
     fn rows_of(value: &mut serde_json::Value) -> &mut Vec<serde_json::Value> {
         value.as_array_mut().expect("an array")
@@ -126,7 +126,7 @@ fn push_counts(bytes: &mut Vec<u8>, values: &[i64]) {
     bytes.extend(values.iter().flat_map(|value| value.to_ne_bytes()));
 }
 
-/// Whether most of the runs have limits on torque rates, and whether a supervisor watches them, each with another fault.
+/// Whether most runs have limits on torque rates, and whether a supervisor watches them, each with a different fault.
 #[derive(Clone, Copy, PartialEq)]
 enum Rates {
     Free,
@@ -134,16 +134,15 @@ enum Rates {
     FreeAndWatched,
 }
 
-/// Kinds of faults of the measurements of a supervised run, the last of them none.
+/// Kinds of faults in the measurements of a supervised run; the last is none.
 const FAULTS: usize = 14;
-/// Samples from the beginning of one fault to that of the next, and for how many each lasts.
+/// Samples between the beginnings of two faults, and the duration of each in samples.
 const FAULT_EVERY: usize = 150;
 const FAULT_LASTS: usize = 50;
 
-/// Steps of random measurements along random variations of recorded jumps, with what the library
-/// commands, as `replay.c` reads them; how many latent inputs the estimate of the share that
-/// arrives has changed, and how many consistent lifts are limited and
-/// how many fail. Every second run has that estimate.
+/// Steps of random measurements along random variations of recorded jumps, with the library's commands, as `replay.c`
+/// reads them. Also the numbers of latent inputs changed by the estimate of the share that arrives, of limited
+/// consistent lifts and of failed ones. Every second run has that estimate.
 fn replay_file(
     model: &ReducedModel,
     steps: usize,
@@ -216,15 +215,15 @@ fn replay_file(
         };
         let [mut controller, mut trusting] = [settings, trusting]
             .map(|s| romc::mpc::controller(model, s).expect("a complete model"));
-        // A measurement for each stage, or more: some are then within the first stage of the last plan
-        // although a step without a plan lies between.
+        // A measurement for each stage, or more: some are within the first stage of the last plan although a step
+        // without a plan is between them.
         let is_dense = run % 2 == 1 && seed.is_multiple_of(2);
         let stride = if is_dense { 2 } else { 5 };
         let roughness = match is_watched {
             true => 0.1,
             false => [0.0, 0.3, 1.0, 3.0][run % 4],
         };
-        // The whole jump, then by the same controller its end, near fewer limits of joints.
+        // The whole jump, then its end with the same controller, near fewer joint limits.
         for first in [0, segment.len() * 3 / 5] {
             let reference = ReferenceSamples {
                 time_s: &segment.time_s[first..],
@@ -316,7 +315,7 @@ fn one_step(
     if random.signed() > 0.95 {
         feet = std::array::from_fn(|_| random.signed() > 0.0);
     }
-    // Now and then for so long that the last plan is used up and its torques fade.
+    // Sometimes long enough that the last plan is used up and its torques fade.
     let is_lost = (350..390).contains(&(sample % 400));
     if is_lost || random.signed() > 0.98 {
         dx[sample % 18] = f64::NAN;
@@ -345,7 +344,7 @@ fn one_step(
         trusting.reset();
     }
     if resets && random.signed() > 0.0 {
-        // A stretched knee; the first measurement after a reset is believed.
+        // A stretched knee; the first measurement after a reset is accepted.
         x[5] = 0.0;
     }
     let prepares = random.signed() > 0.0;
@@ -414,7 +413,7 @@ fn is_limited(
     lift.iterations() > 0
 }
 
-/// Steps of the comparison: as many as `ROMC_CONTROLLER_STEPS` says, or some thousands.
+/// Steps of the comparison: `ROMC_CONTROLLER_STEPS`, or some thousands.
 fn step_count() -> usize {
     let asked = std::env::var("ROMC_CONTROLLER_STEPS");
     asked.map_or(4000, |text| text.parse().expect("a number"))
@@ -433,7 +432,7 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
     ];
     let mut unlifted = 0;
     for (number, (model, is_tight)) in models.into_iter().enumerate() {
-        // A model is seconds of compiling.
+        // Each model compiles for seconds.
         if !is_thorough() && ![1, 3, 5].contains(&number) {
             continue;
         }
@@ -559,10 +558,10 @@ fn fast_math_is_refused() {
 
 #[test]
 fn cmake_builds_tests_installs_and_is_found_by_another_project() {
-    // 3.20, as the newest option used here; an older one counts as missing.
+    // 3.20 because of the newest option used here; an older version counts as missing.
     let emitted = Emitted::new(&shipped("go1-d4"), Precision::Double);
     let mut probe = Command::new("ctest");
-    // In a scratch folder, as it writes a log.
+    // In a scratch folder, because it writes a log.
     (probe.args(["--test-dir", ".", "-N"])).current_dir(emitted.scratch.path());
     if !is_asked_for("ctest --test-dir", &mut probe) {
         return;

@@ -1,4 +1,4 @@
-//! Generated C and Rust against the interpreter, and the interpreter against the model.
+//! Generated C and Rust compared with the interpreter, and the interpreter with the model.
 
 #[path = "differential/agreement.rs"]
 mod agreement;
@@ -37,16 +37,15 @@ use romc::lower::{Form, Map, dynamics_jacobian};
 use romc::model::{LatentVariable, ReducedModel};
 use romc::symbolic::{ExprId, ExprPool};
 
-/// Random models of tests that compile nothing.
+/// Random models in tests that compile nothing.
 const SOME_MODELS: u64 = 24;
 
-/// Random models of a comparison that compiles them all for one program.
+/// Random models in a comparison that compiles all of them into one program.
 fn n_models_a_program() -> u64 {
     tools::thorough_or(SOME_MODELS, SOME_MODELS / 3)
 }
 
-/// Random models of the comparison with generated code by the builds that must have the
-/// interpreter's bits; `.ci/run` asks for 200.
+/// Random models in the comparison with builds that must have the interpreter's bits; `.ci/run` sets 200.
 fn n_random_models() -> u64 {
     let asked = std::env::var("ROMC_RANDOM_MODELS").ok();
     asked.map_or(tools::thorough_or(2, 1) * n_models_a_program(), |count| {
@@ -95,7 +94,7 @@ impl Case {
         Workshop::new(&self.models, self.form)
     }
 
-    /// Runs the functions as `build` compiles them and compares every result.
+    /// Runs the functions as compiled by `build` and compares every result.
     fn check(&self, workshop: &Workshop, build: &Build) -> Tally {
         let found = workshop.run(build, &self.functions, &self.points);
         let mut tally = Tally::default();
@@ -111,7 +110,7 @@ impl Case {
     }
 }
 
-/// Every build of every case, compilers side by side; prints what was compared.
+/// Every build of every case, several compilers in parallel; prints counts and differences.
 fn check_all(what: &str, cases: &[Case], builds: impl Fn(usize) -> Vec<Build>) {
     let workshops: Vec<Workshop> = cases.iter().map(Case::workshop).collect();
     let mut jobs: Vec<(usize, Build)> = Vec::new();
@@ -183,7 +182,7 @@ fn generated_code_of_random_models_equals_the_interpreter() {
 #[test]
 fn generated_code_of_a_large_polynomial_equals_the_interpreter() {
     let mut case = Case::new(vec![models::cubic()], 50, Form::Automatic);
-    // Zeros have the sign of the interpreter's.
+    // Zeros have the same sign as the interpreter's.
     for (function, points) in case.functions.iter().zip(&mut case.points) {
         points[..function.input_len()].fill(0.0);
     }

@@ -1,4 +1,4 @@
-//! Faults that were found by attack and by use, each as it was found; the command line from outside.
+//! Faults found by attack and by use, each reproduced from the command line.
 
 #[path = "faults/files.rs"]
 mod files;
@@ -35,7 +35,7 @@ fn done(arguments: &[&str]) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// Expects an exit code; the error.
+/// Expects an exit code; returns the error.
 fn fails(code: i32, arguments: &[&str]) -> String {
     let output = romc(arguments);
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -309,7 +309,7 @@ fn names_that_end_in_an_underscore_are_refused() {
         let error = fails(1, &["inspect", &model]);
         assert!(error.contains("ends with an underscore"), "{error}");
     }
-    // A training refuses its output's name before it begins.
+    // A training rejects the name of its output before it begins.
     let output = folder.path().join("a_.json").display().to_string();
     let error = fails(
         1,
@@ -396,7 +396,7 @@ fn a_bomb_of_blank_lines_is_refused_early() {
         let error = fails(1, &["inspect", path.to_str().expect("UTF-8")]);
         let expected = format!("row {place}: found more than 10000 empty lines");
         assert!(error.contains(&expected), "{error}");
-        // Read by a map of columns, or for one, the text is the same.
+        // Read with a map of columns, or for making one, the text is the same.
         let log = path.to_str().expect("UTF-8");
         let map = "docs/maps/a1-raw.toml";
         for arguments in [
@@ -440,7 +440,7 @@ fn an_encoder_without_rank_is_named_where_invariance_is_asked_of_it() {
     );
     let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert!(told["models"][0]["invariance"].is_null() || told["invariance"].is_null());
-    // A latent-only model has none to tell, which is no fault.
+    // A latent-only model has no invariance; that is not an error.
     let output = romc(&["inspect", MODEL]);
     assert!(
         output.stderr.is_empty(),
@@ -492,7 +492,7 @@ fn rollouts_do_not_depend_on_the_scale_of_the_coordinates() {
         let scaled = figures(factor);
         assert_eq!(scaled.len(), plain.len());
         for (found, expected) in scaled.iter().zip(&plain) {
-            // What is in scaled units changes with them.
+            // Quantities in scaled units change with the units.
             let same = (found - expected).abs() <= 1e-6 * expected.abs().max(1e-6);
             let in_units = (found - factor * expected).abs() <= 1e-6 * (factor * expected).abs();
             let squared = factor * factor * expected;
@@ -510,7 +510,7 @@ fn collect(value: &Value, numbers: &mut Vec<f64>) {
     match value {
         Value::Number(number) => numbers.push(number.as_f64().expect("a number")),
         Value::Array(values) => values.iter().for_each(|value| collect(value, numbers)),
-        // The combined loss adds a loss in scaled units to one that has none.
+        // The combined loss adds a loss in scaled units and a dimensionless loss.
         Value::Object(entries) => (entries.iter())
             .filter(|(name, _)| *name != "combined_loss")
             .for_each(|(_, value)| collect(value, numbers)),

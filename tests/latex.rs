@@ -1,4 +1,4 @@
-//! The LaTeX backend on real models, through a real LaTeX.
+//! The LaTeX backend with real models and a real LaTeX.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use romc::typeset::{Rounding, SymbolTable};
 mod papers;
 mod tools;
 
-/// Equations (25) and (26) as the paper prints them, without spaces and with plain parentheses.
+/// Equations (25) and (26) as printed in the paper, without spaces and with plain parentheses.
 const PAPER_CONTACT: &str = concat!(
     r"\begin{cases}",
     r"\ddot{z}_1=0.36-0.16\dot{z}_1-0.91\dot{z}_2-0.75\sin(\dot{z}_1)+0.11u_1-0.05u_2\\",
@@ -31,7 +31,7 @@ const PAPER_FLIGHT: &str = concat!(
     r"\end{cases}",
 );
 
-/// One term of every kind that the library's grammar allows.
+/// One term of every kind in the library's grammar.
 const EVERY_KIND: [&str; 40] = [
     "1",
     "z1",
@@ -84,7 +84,7 @@ fn model(name: &str) -> ReducedModel {
     .unwrap()
 }
 
-/// Every model file of the repository that is meant to be read.
+/// Every valid model file of the repository.
 fn shipped_models() -> Vec<(PathBuf, ReducedModel)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut found = Vec::new();
@@ -139,7 +139,7 @@ fn every_kind() -> ReducedModel {
         .unwrap()
 }
 
-/// `ddz1 = coefficient * term`, for the look of one term.
+/// `ddz1 = coefficient * term`, as a picture of one term.
 fn one_term(term: &str, coefficient: f64) -> String {
     let library = Library::from_terms(10, &[term.to_owned()]).unwrap();
     let mut xi = DMatrix::zeros(1, 10);
@@ -417,7 +417,7 @@ fn whole_numbers_are_exact_unless_the_model_is_rounded_itself() {
     let default = Rounding::default();
     let learned = text(&[0.123456, 2.0, -1.0], default);
     assert_eq!(learned, r"\ddot{z}_1 = 0.12 + 2z_1 - \sin(\dot{z}_1)");
-    // as printed in a paper: two decimals throughout, so that 1.00 is a rounded one
+    // as printed in a paper: two decimals throughout, so 1.00 is a rounded coefficient
     let printed = text(&[0.29, -1.22, -1.0], default);
     assert_eq!(
         printed,
@@ -437,8 +437,8 @@ fn emission_is_identical_from_run_to_run() {
     );
 }
 
-/// Runs pdflatex on the preview and fails on errors and on lines that stick out; without LaTeX see
-/// [`tools::has_latex`]. With ROMC_KEEP_PDF=DIR the PDF is kept.
+/// Runs pdflatex on the preview; fails on errors and overfull lines; without LaTeX see [`tools::has_latex`]. With
+/// ROMC_KEEP_PDF=DIR the PDF is kept.
 fn typeset(files: &[EmittedFile], stem: &str) {
     typeset_document(files, &format!("{stem}-preview"));
 }
@@ -453,7 +453,7 @@ fn typeset_document(files: &[EmittedFile], name: &str) {
         fs::write(folder.path().join(&file.path), &file.contents).unwrap();
     }
     let preview = format!("{name}.tex");
-    // Twice: longtable and labels settle in the second run.
+    // Twice: longtable and labels are final in the second run.
     for _ in 0..2 {
         let run = Command::new("pdflatex")
             .args([
@@ -470,7 +470,7 @@ fn typeset_document(files: &[EmittedFile], name: &str) {
     }
     let log = fs::read(folder.path().join(format!("{name}.log"))).unwrap();
     let log = String::from_utf8_lossy(&log);
-    // Less than what an eye sees.
+    // Small excess widths are invisible.
     for line in log.lines().filter(|line| line.starts_with("Overfull")) {
         let points = line
             .split('(')

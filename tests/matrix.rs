@@ -1,4 +1,4 @@
-//! Every target, emitted, compiled and run for models at the edge of what is accepted.
+//! All targets, emitted, compiled and run for models at the limits of accepted input.
 
 #[path = "differential/agreement.rs"]
 #[allow(dead_code, reason = "the comparisons of tests/differential.rs")]
@@ -56,7 +56,7 @@ fn succeed(command: &mut Command) -> String {
 fn self_tests_of_c_and_rust_compile_and_pass_in_both_precisions() {
     for precision in [Precision::Double, Precision::Single] {
         for (number, model) in models::all().into_iter().enumerate() {
-            // Coefficients beyond the largest f32 are refused.
+            // Coefficients above the largest f32 are refused.
             if precision == Precision::Single && model.name() == "huge" {
                 continue;
             }
@@ -64,7 +64,7 @@ fn self_tests_of_c_and_rust_compile_and_pass_in_both_precisions() {
             let one = std::slice::from_ref(&model);
             let workshop = Workshop::in_precision(one, Form::default(), precision);
             workshop.run_c_selftest(&Build::c(), &name);
-            // A crate takes seconds to compile.
+            // A crate compiles for seconds.
             if tools::is_thorough() || (precision == Precision::Double && number % 3 == 0) {
                 workshop.run_rust_selftest(&name);
             }
@@ -105,7 +105,7 @@ fn self_tests_meet_roots_and_logarithms_where_they_are_finite() {
     for array in text.split("static const").skip(1) {
         let array = array.split("};").next().unwrap_or_default();
         let is_undefined = |row: &&str| row.contains("NAN") || row.contains("INFINITY");
-        // Two points stand at zero, where a logarithm or a negative power has no value.
+        // Two points are zero, where a logarithm or a negative power has no value.
         let undefined = array.split('{').filter(is_undefined).count();
         assert!(undefined <= 2 && array.split('{').count() > 6, "{array}");
     }
@@ -140,7 +140,7 @@ fn latex_markdown_and_mathml_say_what_the_model_says() {
             let side = Side::from_bytes(&path, file.contents.as_bytes(), &check, &[]);
             let side = side.unwrap_or_else(|error| panic!("{path}: {error}"));
             let comparison = compare(&own, &side, &check);
-            // Sums beyond the largest number leave nothing to compare.
+            // Sums above the largest number cannot be compared.
             let is_undecided =
                 (comparison.verdicts()).all(|verdict| matches!(verdict, Verdict::Undecided(..)));
             let same = comparison.says_the_same() || (name == "huge" && is_undecided);
@@ -158,7 +158,7 @@ fn latex_markdown_and_mathml_say_what_the_model_says() {
     }
 }
 
-/// The preview through pdflatex; told and skipped without it, unless required.
+/// The preview through pdflatex; without it skipped with a message, unless required.
 fn typeset(files: &[EmittedFile], name: &str) {
     if !tools::has_latex() {
         return;
@@ -178,7 +178,7 @@ fn typeset(files: &[EmittedFile], name: &str) {
     assert!(output.status.success(), "{name}: {said}");
 }
 
-/// The files of a controller; `None` for a model that is rightly refused, as it has no robot.
+/// The files of a controller; `None` for a model without a robot, which is rightly refused.
 fn controller(
     model: &ReducedModel,
     target: Target,
@@ -197,14 +197,14 @@ fn controller(
     None
 }
 
-/// A compiler of C that takes no warning.
+/// A C compiler for which every warning is an error.
 fn strict_cc() -> Command {
     let mut cc = Command::new(std::env::var("CC").unwrap_or_else(|_| "cc".to_owned()));
     cc.args(["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]);
     cc
 }
 
-/// What an example says: torques, each a number.
+/// Output of an example: torques, each a number.
 fn says_torques(name: &str, said: &str) {
     assert!(said.contains("N m"), "{name}: {said}");
     assert!(
@@ -232,7 +232,7 @@ fn controllers_compile_and_command_finite_torques() {
         write_files(&folder, &files, Overwrite::Replace).expect("written");
         let folder = folder.join(format!("{name}-controller"));
         let mut cargo = Command::new(env!("CARGO"));
-        // Dependencies as tests/controller.rs compiles them; this crate as fast as the compiler can.
+        // Dependencies as in tests/controller.rs; this crate with the fastest compilation.
         let level = format!("profile.release.package.{name}-controller.opt-level=0");
         cargo
             .args(["build", "--release", "--config", &level])
@@ -259,7 +259,7 @@ fn controllers_in_c_compile_pass_their_self_tests_and_jump() {
             let Some(files) = controller(&model, Target::ControllerC, precision) else {
                 continue;
             };
-            // Each model in one precision, or in both.
+            // Each model in one precision, or in both precisions.
             if !tools::is_thorough() && (number % 2 == 0) != (precision == Precision::Double) {
                 continue;
             }

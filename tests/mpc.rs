@@ -1,4 +1,4 @@
-//! The latent MPC: its solver, its problem, its lifts and what it does when things go wrong.
+//! The latent MPC: its solver, its problem, its lifts and its behaviour under faults.
 
 #[path = "mpc/control.rs"]
 mod control;

@@ -1,5 +1,4 @@
-//! `romc plan` as a user runs it: what it writes and says, what it refuses, and that other commands
-//! take its plan.
+//! `romc plan` from the command line: its files and messages, its refusals, and the use of its plan by other commands.
 
 #[path = "command_line/mod.rs"]
 mod command_line;
@@ -14,7 +13,7 @@ use std::path::Path;
 use command_line::{romc, text};
 use serde_json::Value;
 
-/// A shipped model that plans.
+/// A shipped model for planning.
 fn model() -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     root.join("models/go1-d7.json").display().to_string()
@@ -77,7 +76,7 @@ fn plan_is_a_recording_that_other_commands_take() {
         let (plan, output) = (format!("{name}.csv"), format!("{name}-torques.csv"));
         done(folder, &["mpc", &model, &plan, "--output", &output]);
         let table = fs::read_to_string(folder.join(output)).expect("a table");
-        // Without the name of the recording and the times of the solver.
+        // Without the recording's name and the solver's times.
         let lines = table.lines().map(|line| {
             let fields = line.split(',').enumerate();
             let kept = fields.filter(|(i, _)| ![0, 5].contains(i));
@@ -88,7 +87,7 @@ fn plan_is_a_recording_that_other_commands_take() {
     let own = fs::read_to_string(folder.join("plan.settings.toml")).expect("written");
     assert!(own.contains("input_weight = 8.0 #"), "{own}");
     assert!(own.contains("flight_torque = 1.0 #"), "{own}");
-    // The settings next to a plan are those of its controller: without them, commands are others.
+    // The settings file next to a plan is for its controller: without it, commands are different.
     let [with, without] = [torques("with", &own), torques("without", "")];
     assert_ne!(with, without);
     assert_eq!(

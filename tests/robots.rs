@@ -1,8 +1,6 @@
-//! Robots from files: kinematics beside Pinocchio's, what is said of other trees, models that carry
-//! their robot.
+//! Robots from files: kinematics compared with Pinocchio's, errors about other trees, models that contain their robot.
 //!
-//! `fixtures/robots/reference.json` holds Pinocchio's values, made and checked by
-//! `examples/robots/reference.py`.
+//! `fixtures/robots/reference.json` holds Pinocchio's values, computed and checked by `examples/robots/reference.py`.
 
 mod command_line;
 #[path = "robots/formulas.rs"]
@@ -58,7 +56,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 fn feet_and_jacobians_are_those_of_pinocchio() {
     let text = fs::read_to_string(root().join("tests/fixtures/robots/reference.json"));
     let reference: Value = serde_json::from_str(&text.expect("checked in")).expect("JSON");
-    // The world of `reference.py`, below which Pinocchio's trunk has the same legs.
+    // The world link of `reference.py`; below it Pinocchio's trunk has the same legs.
     let hare = fs::read_to_string(file("hare.urdf")).expect("an example");
     let below_world = hare.replace(
         "</robot>",
@@ -115,8 +113,7 @@ fn legs_are_matched_by_where_they_stand() {
     ] {
         assert_eq!(robot(name).joint_names[0], front_right);
     }
-    // Thighs of the hare turn about y on the left and about -y on the right: mirrored motions of
-    // them read with opposite signs.
+    // The hare's thighs turn about y on the left and about -y on the right: mirrored motions have opposite signs there.
     let signs: Vec<f64> = (0..6)
         .map(|joint| robot("hare.urdf").mirror_sign(joint))
         .collect();
@@ -140,7 +137,7 @@ fn robot_of_a_urdf_comes_back_from_its_own_toml_bit_for_bit() {
     );
 }
 
-/// A latent model on a robot.
+/// A latent model over a robot.
 fn model_on(robot: &'static Robot) -> ReducedModel {
     let library = Library::from_terms(1, &["z1".to_owned()]).expect("a term");
     let builder = ReducedModel::builder("m", library).robot(robot);
@@ -214,7 +211,7 @@ fn generalised_input_of_robots_of_files_is_that_of_the_rule_also_where_it_is_dam
     }
 }
 
-/// Every built-in robot with and without losses of the joints, in every frame; and with the weight of its legs.
+/// Every built-in robot with and without joint losses, in every frame; also with the weight of its legs.
 fn rules() -> Vec<InputRule> {
     let actuators = Actuators::of_leg([1.0, 0.6, 0.5], [0.2, 0.0, 0.3], [0.01; 3]);
     let mut rules = Vec::new();
@@ -294,7 +291,7 @@ fn generalised_input_is_that_of_the_rule_for_every_frame_and_contact_with_losses
     for rule in rules() {
         let mut input = Input::of(&rule);
         for k in 0..40 {
-            // Also knees that are nearly stretched, and feet at the height of their hips.
+            // Includes knees that are nearly stretched, and feet at the height of their hips.
             let knee = if k % 4 == 0 {
                 (-0.2, 0.2)
             } else {
@@ -325,7 +322,7 @@ fn generalised_input_is_that_of_the_rule_for_every_frame_and_contact_with_losses
 fn generalised_input_of_a_stretched_leg_is_bounded_and_zero_in_the_air() {
     for rule in rules() {
         let mut input = Input::of(&rule);
-        // Torques that stretch the legs, so that the feet push.
+        // Torques that stretch the legs, so the feet push.
         let tau: [f64; 12] = std::array::from_fn(|joint| if joint % 3 == 0 { 20.0 } else { -20.0 });
         let mut at = |feet: f64| input.run(&[0.0; 18], &[0.0; 18], &tau, &[feet; 4]);
         let on_ground = at(1.0);
@@ -371,7 +368,7 @@ fn generalised_input_weighs_a_foot_with_its_number() {
     }
 }
 
-/// Numbers that are the same in every run.
+/// Random numbers, equal in every run.
 struct Random(u64);
 
 impl Random {
@@ -565,7 +562,7 @@ fn completions_offer_targets_and_robots() {
     );
 }
 
-/// Names of robots and joints end no comment of the header that lists them, and are seen as they are.
+/// Names of robots and joints cannot end the comment in the header that lists them, and appear unchanged.
 #[test]
 fn names_that_act_on_the_text_around_them_are_refused() {
     let solo12 = robot_file::to_toml(robot("solo12.toml"));
@@ -663,7 +660,7 @@ fn another_robot_of_a_known_name_is_one_of_its_own_and_says_what_differs() {
     let error = open(Some("a1")).unwrap_err().to_string();
     let found = "--name: found \"a1\", romc's own robot with other";
     assert!(error.contains(found), "{error}");
-    // A model file's robot is what it is; it is not renamed.
+    // The robot of a model file is not renamed.
     let entry: RobotEntry = toml::from_str(&a1).expect("an entry");
     let error = entry.robot("robot").unwrap_err().to_string();
     assert!(error.contains("(mass_kg 12.79 instead of 12.78), expected another name"));
@@ -673,7 +670,7 @@ fn another_robot_of_a_known_name_is_one_of_its_own_and_says_what_differs() {
 fn signs_and_offsets_turn_the_same_leg_at_other_angles() {
     let own = romc::robot_file::by_name("go1").unwrap();
     let text = robot_file::to_toml(own).replace("\"go1\"", "\"mine\"");
-    // Knees that count the other way, and read 0.4 where the leg is straight.
+    // Knee angles with the opposite sign, and 0.4 rad for a straight leg.
     let text = text.replace(
         "_calf_joint\", at = [0.0, 0.0, -0.213], axis = \"y\"",
         "_calf_joint\", at = [0.0, 0.0, -0.213], axis = \"y\", sign = -1.0, offset_rad = 0.4",

@@ -1,4 +1,5 @@
-//! Simplification, exact: a table of sums with their simplest forms, and random models; within a tolerance: certificates.
+//! Simplification. Exact: a table of sums with their simplest forms, and random models. Within a tolerance:
+//! certificates.
 
 #[path = "simplification/far_out.rs"]
 mod far_out;
@@ -19,11 +20,11 @@ use romc::typeset::PrintOptions;
 
 const LATENT_DIM: usize = 2;
 
-/// Numbers of a fixed sequence.
+/// A fixed sequence of numbers.
 struct Random(u64);
 
 impl Random {
-    /// From 0 up to 1.
+    /// In [0, 1).
     fn unit(&mut self) -> f64 {
         self.0 = (self.0)
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -79,7 +80,7 @@ fn printed(equations: &Equations<'_>) -> String {
     terms.join(" ; ")
 }
 
-/// The right side of `ddz1` in the emitted LaTeX.
+/// The right-hand side of `ddz1` in the emitted LaTeX.
 fn latex(equations: &Equations<'_>) -> String {
     let options = EmitOptions {
         print: PrintOptions {
@@ -100,7 +101,7 @@ fn latex(equations: &Equations<'_>) -> String {
     right.trim().to_owned()
 }
 
-/// Values of `ddz1` at a point, by the program that code is emitted from.
+/// Values of `ddz1` at a point, by the program from which code is emitted.
 fn value(equations: &Equations<'_>, point: &[f64]) -> f64 {
     let program = lower::dynamics(equations, 0, Form::default()).expect("lowers");
     let mut ddz = vec![0.0; LATENT_DIM];
@@ -109,8 +110,8 @@ fn value(equations: &Equations<'_>, point: &[f64]) -> f64 {
     ddz[0]
 }
 
-/// A bound of |coefficient * term|, summed over the terms: 4 units in the last place of it are what
-/// rounding may change. Sums inside terms count by the sizes of their parts.
+/// A bound of |coefficient * term|, summed over the terms: rounding may change 4 units in its last place. Sums inside
+/// terms count by the magnitudes of their parts.
 fn size(equations: &Equations<'_>, point: &[f64]) -> f64 {
     let pool = &equations.pool;
     let value_of = |symbol: SymbolId| point[symbol.index()];
@@ -220,7 +221,7 @@ fn cases_of_the_table_come_out_simplest() {
     assert!(n_cases >= 30, "{n_cases} cases");
 }
 
-/// The printed simplest form of a sum.
+/// The simplest form of a sum, printed.
 fn shortest(sum: &str) -> String {
     printed(&Equations::of(&model_of(&parsed(sum))))
 }
@@ -260,7 +261,7 @@ fn shorten_finds_the_simplest_form_of_each_family() {
             "1 (z1 + 1)^2 ; -1 z1^2 ; -2 z1 ; 0.3 (z1 + 1)^3",
             "1 1 ; 0.3 (z1 + 1)^3",
         ),
-        // Of equal terms each counts once.
+        // Equal terms each count once.
         (
             "0.5 1 ; -0.5 cos(2*z1) ; 0.5 1*z2 ; 0.5 z2",
             "1 sin(z1)^2 ; 1 z2",
@@ -283,7 +284,7 @@ fn shorten_leaves_what_is_short_already() {
         "0.37 sin(z1)*cos(z2) ; 0.21 sin(dz1)*cos(z1)",
         "1 1/3*z1",
         "1 exp(z1) ; 1 tanh(z2) ; 0.5 sqrt(z1^2 + z2^2)",
-        // Shorter forms of these overflow or underflow where they do not.
+        // Shorter forms of these overflow or underflow at points where they do not.
         "0.4 log(z1) ; 0.4 log(z2)",
         "1 -exp(z1)/(z2 - exp(z1)) ; 1 exp(z1)/(z2 + exp(z1))",
         "1 1/(z1 - z2) ; -1 1/(z1 + z2)",
@@ -312,7 +313,7 @@ fn steps_state_how_many_terms_became_how_many() {
     assert_eq!(printed(&Equations::as_learned(&kept)), "1 1");
 }
 
-/// Terms of all families, in which equal and related ones are frequent.
+/// Terms of all families, with many equal and related ones.
 fn random_sum(random: &mut Random) -> Vec<(f64, String)> {
     const ARGUMENTS: [&str; 8] = ["z1", "z2", "dz1", "u1", "-z1", "z1 + z2", "2*z1", "z1 - z2"];
     const FORMS: [&str; 22] = [
@@ -421,7 +422,7 @@ fn long_products_of_functions_take_little_time() {
         let start = Instant::now();
         let equations = Equations::of(&model);
         let seconds = start.elapsed().as_secs_f64();
-        // As learned and in a release build it is a tenth of a second; builds for tests are slower, and share their cores.
+        // A release build needs as little as for the learned equations, a tenth of a second; test builds share their cores.
         assert!(seconds < 10.0, "{term}: {seconds} s");
         check_values(&term, &Equations::as_learned(&model), &equations, true);
     }

@@ -1,4 +1,4 @@
-//! Training on the checked-in jumps, and on input that cannot be trained on.
+//! Training on the shipped jumps, and on unsuitable input.
 
 #[path = "train/definitions.rs"]
 mod definitions;
@@ -51,7 +51,7 @@ fn jumps_of(folder: &str, set: &str, count: usize) -> Vec<Recording> {
         .collect()
 }
 
-/// Errors of body x and z over 0.1 s and whole jumps are at most these, in mm.
+/// Errors of body x and z over 0.1 s and over whole jumps do not exceed these, in mm.
 fn assert_predictions(test: &SetMetrics, most_mm: [f64; 4]) {
     let whole = [test.rollout_x_m, test.rollout_z_m].map(|error| error.expect("finite"));
     let errors = [test.prediction_x_m, test.prediction_z_m, whole[0], whole[1]];
@@ -194,7 +194,7 @@ fn named_coordinates_predict_jumps_of_another_controller_which_free_ones_do_not(
     );
 }
 
-/// What the simulated Go1's joints take, as the recorder of the jumps has them.
+/// Joint losses of the simulated Go1, as in the recorder of the jumps.
 fn losses_of_the_simulated_go1() -> Actuators {
     Actuators::of_leg([1.0, 0.6, 0.6], [0.2; 3], [0.01; 3])
 }
@@ -229,7 +229,7 @@ fn net_torques_predict_better_and_command_what_was_recorded() {
             after.prediction_z_m < 0.85 * before.prediction_z_m,
             "{before:?} {after:?}"
         );
-        // Simulation and control say the same of the lift as training, and commands have the losses.
+        // Simulation, control and training report the same lift accuracy, and commands include the losses.
         let assessed = Assessment::over(&net.model, &test, 0.1).expect("the model fits");
         let r2 = assessed.lift.torque.r2_all().expect("samples");
         assert!(
@@ -260,7 +260,7 @@ fn net_torques_predict_better_and_command_what_was_recorded() {
     }
 }
 
-/// A jump with 0.2 s of rest before and after it: its first and last state, their torques held.
+/// A jump with 0.2 s of rest before and after it: its first and last state, with constant torques.
 fn with_rest(mut jump: Recording) -> Recording {
     let segment = &mut jump.segments[0];
     let (count, step_s) = (segment.len(), segment.mean_step_s());
@@ -302,7 +302,7 @@ fn model_with_quadratic_drag_is_controlled_at_rest() {
     };
     let trained =
         train_with(&jumps("train", 14), &jumps("validation", 3), &options).expect("trains");
-    // Whether drag is among the terms kept depends on the jumps; a model that has it must be controllable.
+    // Whether drag is among the kept terms depends on the jumps; a model with drag must be controllable.
     let mut phases = trained.model.phases().to_vec();
     for phase in &mut phases {
         (phase.xi[(7, 0)], phase.xi[(8, 1)]) = (-0.4, -0.4);
@@ -375,7 +375,7 @@ fn centre_of_mass_of_an_encoder_falls_freely_where_the_body_does_not() {
     let body = DMatrix::from_fn(2, 18, |row, i| f64::from(i == [12, 14][row]));
     let [_, [_, of_body]] = accelerations_in_flight(&jump, &body);
     assert!(of_body > 2.0 * x_spread, "{of_body}");
-    // No leg is so heavy that a radian of a joint moves the whole robot by more than 2 cm.
+    // Legs are light: one radian of a joint moves the whole robot by at most 2 cm.
     assert!(rows.columns(0, 12).amax() < 0.02, "{rows}");
 }
 
@@ -515,7 +515,7 @@ fn cancelled_training_ends_without_a_model_when_none_is_complete() {
     assert!(matches!(result, Err(TrainError::Cancelled)));
 }
 
-/// Trains on two jumps and cancels at the first news for which `ends` is true.
+/// Trains on two jumps and cancels at the first progress report for which `ends` is true.
 fn cancelled_at(
     method: Method,
     options: &TrainOptions,
@@ -603,7 +603,7 @@ fn joint(training: &[Recording], options: &TrainOptions, news: &mut Vec<String>)
     joint_with([training, &[]], options, news).expect("trains")
 }
 
-/// Trains on recordings, judged by others.
+/// Trains on recordings, with others for validation.
 fn joint_with(
     [training, validation]: [&[Recording]; 2],
     options: &TrainOptions,
@@ -631,7 +631,7 @@ fn few_epochs(activation: Activation) -> TrainOptions {
     options
 }
 
-/// The loss of an epoch, as the progress tells it.
+/// The loss of an epoch in a progress line.
 fn loss(news: &str) -> f64 {
     let after = news.split("loss ").nth(1).expect("the loss is told");
     let number = after.split(',').next().expect("a number");

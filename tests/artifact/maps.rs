@@ -114,7 +114,7 @@ fn maps_refuse_vectors_of_the_wrong_length() {
 
 #[test]
 fn projection_is_exact_where_the_singular_values_converge_slowly() {
-    // nalgebra's singular vectors of this matrix, of condition 2.8, are off by 1e-12.
+    // nalgebra's singular vectors of this matrix, of condition 2.8, have errors of 1e-12.
     let columns = [
         [
             -0.7769688438189468,

@@ -1,4 +1,4 @@
-//! The list of commands, and how one of its entries runs.
+//! The list of commands, and how one entry is run.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -39,7 +39,7 @@ pub fn entries(path: &Path) -> Vec<Entry> {
 }
 
 impl Entry {
-    /// Runs the commands in a fresh folder; returns what they printed and wrote, and the folder.
+    /// Runs the commands in a fresh folder; returns their output and files, and the folder.
     pub fn run(&self) -> (Transcript, TempDir) {
         let place = tempfile::tempdir().expect("a temporary folder");
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -75,7 +75,7 @@ impl Entry {
     }
 }
 
-/// The files that a word with `*` or `[..]` in its last part stands for, in order; the word itself if it has neither.
+/// The files that match a word with `*` or `[..]` in its last part, in order; the word itself if it has neither.
 fn expanded(place: &Path, word: &str) -> Vec<String> {
     let Some((folder, pattern)) = word
         .rsplit_once('/')

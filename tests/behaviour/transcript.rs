@@ -1,4 +1,4 @@
-//! Transcripts of commands: what was printed, the exit code, what was written; and how two of them differ.
+//! Transcripts of commands: output, exit code and written files; and the differences of two transcripts.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -11,14 +11,14 @@ use flate2::Compression;
 use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 
-/// Files whose text is recorded; of others, the digest of their numbers, or of code, the name.
+/// Files whose text is recorded. Of other files the digest of their numbers is recorded, of code only the name.
 const TEXTS: [&str; 7] = ["tex", "md", "html", "toml", "txt", "mathml", "json"];
 const CODE: [&str; 10] = [
     "c", "h", "rs", "py", "m", "cpp", "hpp", "lock", "yaml", "xml",
 ];
 const LONGEST_TEXT: usize = 40_000;
 
-/// Lines of one entry: `$ command`, `1 ` and `2 ` before what went to stdout and stderr, `exit CODE`, `file PATH` with
+/// Lines of one entry: `$ command`, output with `1 ` (stdout) or `2 ` (stderr) before it, `exit CODE`, `file PATH` with
 /// `| ` before its text.
 pub struct Transcript {
     pub name: String,
@@ -38,7 +38,7 @@ impl Transcript {
         }
     }
 
-    /// The transcript with `~` for each token that is another one in a second run.
+    /// The transcript with `~` for each token that differs in a second run.
     pub fn masked(&self, again: &Self) -> Self {
         assert_eq!(
             self.lines.len(),
@@ -51,7 +51,7 @@ impl Transcript {
                 return first.clone();
             }
             let (first, second) = (tokens(first), tokens(second));
-            // A drawing of times has as many ticks and bars as they fill.
+            // The number of ticks and bars in a drawing of times varies.
             if let [_, _, "numbers", _] = first[..] {
                 return "| ~ numbers ~".to_owned();
             }
@@ -73,8 +73,8 @@ impl Transcript {
         }
     }
 
-    /// Lines that differ, numbers by their digits, whatever the space between tokens; `pairs` of texts apply to
-    /// the recorded lines.
+    /// Lines that differ; numbers are compared by their digits, space between tokens is ignored. `pairs` of texts apply
+    /// to the recorded lines.
     pub fn differences(&self, now: &Self, pairs: &[(String, String)]) -> Vec<String> {
         let expected: Vec<String> = self.compared().map(|line| renamed(line, pairs)).collect();
         let found: Vec<&str> = now.compared().collect();
@@ -103,8 +103,8 @@ impl Transcript {
         differences
     }
 
-    /// All lines but the texts of self-tests, which are compared by running them, and the names of a controller's own
-    /// sources, which are romc's; emitted code and files of the controller in C without their sizes.
+    /// All lines except the texts of self-tests, which are compared by running them, and the names of the controller's
+    /// sources copied from romc; emitted code and files of the controller in C without their sizes.
     fn compared(&self) -> impl Iterator<Item = &str> {
         let lines = self.lines.iter().map(String::as_str);
         let lines =
@@ -143,7 +143,7 @@ impl Transcript {
 fn without_times(line: &str, is_timed_row: bool) -> String {
     const NAMES: [&str; 5] = ["\"p50\"", "\"p99\"", "\"max\"", "\"solve_ms\"", "\"bytes\""];
     let is_of_programs = line.contains(" convex programs, ");
-    // A table with times has another length in each run.
+    // A table with times has a different length in each run.
     let is_of_files = line.ends_with(" bytes)");
     let is_of_steps = line.contains("time of a step");
     if !is_timed_row
@@ -216,7 +216,7 @@ pub fn written(place: &Path, folder: &Path, text: &mut String) {
     }
 }
 
-/// Digests of the numbers of a file as they are printed: of a table one per column, since some hold times.
+/// Digests of the numbers of a file as printed; of a table one per column, since some columns are times.
 fn digests(name: &str, bytes: &[u8]) -> Vec<String> {
     let mut unpacked = Vec::new();
     if name.ends_with(".gz") {
@@ -255,7 +255,7 @@ fn digests(name: &str, bytes: &[u8]) -> Vec<String> {
     columns.map(digest).collect()
 }
 
-/// Compiles the C of today with the recorded self-tests, and runs them.
+/// Compiles the present C with the recorded self-tests, and runs them.
 pub fn self_tests_pass(before: &Transcript, place: &Path) -> Vec<String> {
     let mut failures = Vec::new();
     for (path, text) in before.self_tests() {

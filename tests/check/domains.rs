@@ -1,5 +1,5 @@
-//! Where sides have values: constants without one are refused, and equal sides that have values at different points
-//! are equal with a note.
+//! Domains of the two sides: constants without a value are refused; equal sides with values at different points are
+//! equal with a note.
 
 use romc::check::{CheckOptions, Side, Verdict, compare};
 use romc::model::{Library, ModelError};
@@ -22,7 +22,7 @@ impl Random {
     }
 }
 
-/// How many of the random members of a kind are tried.
+/// Number of random members of each kind.
 fn count() -> usize {
     if tools::is_thorough() { 500 } else { 50 }
 }
@@ -73,7 +73,7 @@ fn constant(random: &mut Random, depth: usize) -> (String, Fraction) {
     }
 }
 
-/// Whether each way of reading refuses the term for want of a value.
+/// Whether every way of reading refuses the term because it has no value.
 fn is_refused(term: &str) -> bool {
     let library = Library::from_terms(1, &[term.to_owned()]);
     let by_library = matches!(&library, Err(ModelError::Term { source, .. })
@@ -170,7 +170,7 @@ fn decided(left: &str, right: &str) -> (Verdict, bool) {
 
 #[test]
 fn sides_with_values_at_different_points_are_equal_with_a_note() {
-    // Both sides, with A for an argument that is negative somewhere, and whether one has a value alone.
+    // Both sides, where A is an argument that is negative somewhere, and whether only one side has a value there.
     const PAIRS: [(&str, &str, bool); 16] = [
         ("((A)^3)^(1/3)", "abs(A)", true),
         ("((A)^3)^(1/3)", "A", true),
@@ -205,7 +205,7 @@ fn sides_with_values_at_different_points_are_equal_with_a_note() {
             let factor = random.of(&["", "2*", "0.3*", "1/3*", "-", "-0.7*"]);
             match random.below(2) {
                 0 => format!("{factor}{variable}"),
-                // A root of an odd power of a negative variable with a decimal beside it is not decided.
+                // Undecided: a root of an odd power of a negative variable next to a decimal.
                 _ => {
                     let rest = random.of(&["0.1", "u2/5", "z1/4"]);
                     let is_undecided = rest == "0.1" && left.contains("^3)^(1/3)");
@@ -243,7 +243,7 @@ fn a_side_without_a_value_somewhere_is_noted() {
             assert!(has_note, "{left} and {right}");
         }
     }
-    // Overflow is no lack of a value.
+    // An overflow does not count as a missing value.
     for (left, right) in [
         ("exp(800)*exp(-800)*z1", "z1"),
         ("exp(z1 + 800)*exp(-800)", "exp(z1)"),

@@ -1,4 +1,4 @@
-//! Random models against what romc prints of them, and against models with one coefficient changed.
+//! Random models compared with their printed forms, and with models that differ in one coefficient.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -56,7 +56,7 @@ impl Random {
         self.0.next_u32() as usize % count
     }
 
-    /// A coefficient as trainings leave them: of any size, some with few digits, some whole.
+    /// A coefficient as trainings produce them: of any size, some with few digits, some integers.
     fn coefficient(&mut self) -> f64 {
         let share = f64::from(self.0.next_u32()) / f64::from(u32::MAX);
         let size = [0.02, 0.3, 1.0, 5.0, 60.0][self.below(5)] * (0.3 + share);
@@ -70,7 +70,7 @@ impl Random {
     }
 }
 
-/// A model with up to ten terms a phase, and the seed's own mixture of functions.
+/// A model with up to ten terms per phase; the seed decides which functions occur.
 fn random_model(seed: u64) -> ReducedModel {
     let mut random = Random(ChaCha8Rng::seed_from_u64(seed));
     let latent_dim = 1 + random.below(3);
@@ -225,7 +225,7 @@ fn random_models_are_proven_equal_to_what_romc_prints_of_them() {
             .verdicts()
             .all(|verdict| *verdict == Verdict::Equal);
         exact += usize::from(all_exact);
-        // Text and shortest decimals lose nothing.
+        // Text and shortest decimals are exact.
         assert!(
             all_exact || ![0, 2, 9].contains(&(seed % 10)),
             "{seed}: {comparison:?}\n{text}"

@@ -1,5 +1,5 @@
 //! LaTeX is read as TeX prints it: digits in braces, definitions that end with their group, and text that is not
-//! printed. Random documents, whose numbers a model of TeX's groups in this file foretells; with all tools, TeX itself.
+//! printed. Random documents are checked against a model of TeX's groups in this file and, with all tools, TeX itself.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use romc::import::{Format, SymbolNames, read_equations};
 
 use super::tools;
 
-/// Names of the macros; the body of one may hold those behind it, so that none is endless.
+/// Names of the macros. The body of one may contain only those after it, so every expansion ends.
 const MACROS: [&str; 4] = ["ka", "kb", "kc", "kd"];
 const GROUPS: [(&str, &str); 6] = [
     ("{", "}"),
@@ -22,10 +22,10 @@ const GROUPS: [(&str, &str); 6] = [
 const PREAMBLE: &str =
     "\\newif\\ifdraft\n\\newenvironment{own}[1]{\\begin{center}\\def\\ka{#1}}{\\end{center}}\n";
 
-/// What a macro holds: digits, or the number of another macro.
+/// Body of a macro: digits, or the number of another macro.
 type Body = Vec<Result<char, usize>>;
 
-/// The meanings that hold at a place.
+/// The definitions in force at a place.
 #[derive(Clone)]
 struct Meanings {
     macros: BTreeMap<usize, Body>,
@@ -35,9 +35,9 @@ struct Meanings {
 struct Writer {
     random: u64,
     text: String,
-    /// The innermost group last.
+    /// The innermost group is last.
     groups: Vec<Meanings>,
-    /// Whether what is written is printed.
+    /// Whether the next text is printed.
     is_printed: bool,
     /// Numbers of the equations that are printed.
     numbers: Vec<String>,
@@ -108,7 +108,7 @@ impl Writer {
         self.push(close);
     }
 
-    /// A definition for the group, or for all the rest.
+    /// A definition for the group, or for the rest of the document.
     fn definition(&mut self) {
         let name = self.below(MACROS.len());
         let body: Body = (0..1 + self.below(3))
@@ -163,7 +163,7 @@ impl Writer {
         }
     }
 
-    /// Writes what is not printed, where it is not.
+    /// Writes a branch that is not printed.
     fn dead(&mut self, depth: usize) {
         let (groups, is_printed) = (self.groups.clone(), self.is_printed);
         self.is_printed = false;
@@ -210,12 +210,12 @@ impl Writer {
             "\\verb|\\iffalse $|",
             "\n\\begin{verbatim}\n\\[\\ddot z_1 = 9 z_1\\] % { \\end\n\\end{verbatim}\n",
         ];
-        // TeX knows no environment in a branch that it passes over.
+        // In a skipped branch TeX does not recognise environments.
         let text = text[self.below(if self.is_printed { text.len() } else { 3 })];
         self.push(text);
     }
 
-    /// A display of one equation, with a definition in it at times.
+    /// A display of one equation, sometimes with a definition inside.
     fn equation(&mut self) {
         let (open, close) = [
             ("\\[", "\\]"),
@@ -258,7 +258,7 @@ impl Writer {
         self.push(&format!("\\ddot z_{{{index}}} = "));
     }
 
-    /// A number in digits and macros, with braces, fonts and comments among them, and its factor.
+    /// A number in digits and macros, mixed with braces, fonts and comments, and its factor.
     fn number(&mut self) {
         let mut value = String::new();
         let point = ["0.", "1{,}", "{0}.", "2{.}", "{}3."][self.below(5)];

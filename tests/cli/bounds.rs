@@ -1,4 +1,4 @@
-//! Files without end, and small ones that unpack to much: refused with a place, in little memory.
+//! Endless files, and small ones that unpack to a large size, are refused with a place, in little memory.
 
 #![cfg(target_os = "linux")]
 
@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 
 use super::{JUMP, MODEL, folder, path, text};
 
-/// Runs with so many megabytes of address space.
+/// Runs with this many megabytes of address space.
 fn within(megabytes: usize, arguments: &[&str]) -> Output {
     let script = format!("ulimit -v {} && exec \"$0\" \"$@\"", megabytes * 1024);
     Command::new("sh")
@@ -75,7 +75,7 @@ fn files_without_end_and_files_of_nothing_but_tables_are_refused_in_little_memor
         (&["inspect", values], "more than 100000 values"),
     ];
     for (arguments, reason) in cases {
-        // The binary of a debug build takes a quarter of this by itself.
+        // The binary of a debug build alone needs a quarter of this.
         let output = within(700, arguments);
         let stderr = text(&output.stderr);
         assert!(

@@ -1,4 +1,4 @@
-//! Flags that a command would ignore, and numbers outside the range of their flag: refused by name.
+//! Flags without effect, and numbers outside the range of their flag, are refused by name.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use super::args::Command;
 use romc::Error;
 use romc::limits::{Range, table};
 
-/// Command lines with a flag that does nothing there, and that flag.
+/// Command lines with a flag that has no effect there, and that flag.
 const IDLE: [(&str, &str); 34] = [
     (
         "plan m.json --distance 0.3 --apex 0.1 --output p.csv --yaw-rate 0.1",
@@ -93,7 +93,7 @@ const IDLE: [(&str, &str); 34] = [
     ("import n.npz --output m.json --clock repaired", "--clock"),
 ];
 
-/// The same flags where they do something.
+/// The same flags where they have an effect.
 const USED: [&str; 12] = [
     "compile m.json --out-dir o --emit c --precision f32 --units scaled --sincos library",
     "compile m.json --out-dir o --emit latex --digits 3 --rename z1=x --form align --siunitx",
@@ -133,7 +133,7 @@ fn a_flag_without_effect_is_refused_by_name_and_one_with_effect_is_not() {
     }
 }
 
-/// Flags that always have an effect, or that clap itself or their command refuses where they have none.
+/// Flags that always have an effect, or that clap or the command refuses where they have none.
 const ELSEWHERE: &str = "json help version force output out-dir \
     demo: verbose compile: emit as-learned tolerance domain margin save-model plan \
     inspect: guess robot: name check: domain convert: inputs-of clock columns identify: robot clock columns \
@@ -173,7 +173,7 @@ fn every_flag_is_in_the_table_or_known_to_be_used_or_refused_elsewhere() {
     }
 }
 
-/// Flags that take a number and have no range of the table: any seed will do.
+/// Flags with a number but without a range in the table: any seed is valid.
 const WITHOUT: [&str; 1] = ["seed"];
 
 fn range(command: &str, flag: &str) -> Option<Range> {
@@ -184,7 +184,7 @@ fn range(command: &str, flag: &str) -> Option<Range> {
     }
 }
 
-/// Whether a command refuses the value of a flag as such.
+/// Whether a command refuses this value of a flag.
 fn refuses(command: &str, flag: &str, value: &str) -> bool {
     let flag = format!("--{flag}={value}");
     let found = Arguments::command().try_get_matches_from(["romc", command, &flag]);
@@ -228,7 +228,7 @@ fn every_flag_that_takes_a_number_refuses_what_lies_outside_its_range() {
     assert!(met.len() >= 25, "{met:?}");
 }
 
-/// What a training depends on, given these flags of `romc train`.
+/// All options of a training with these flags of `romc train`, as text.
 fn training(flags: &str) -> String {
     let line = format!("train r.csv --latent-dim 4 --output m.json {flags}");
     let Command::Train(arguments) = parsed(line.trim_end()).command else {
@@ -243,7 +243,7 @@ fn training(flags: &str) -> String {
 
 #[test]
 fn defaults_in_the_help_of_train_are_those_of_the_training() {
-    // Of these the option is another than none, with the same effect.
+    // For these flags another option is stored, with the same effect.
     const SAME: [&str; 3] = ["body", "degree", "clock"];
     let command = Arguments::command();
     let train = command.find_subcommand("train").expect("a command");

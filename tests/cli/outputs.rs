@@ -1,11 +1,11 @@
-//! Outputs: never one of the files that the command reads, always of the format that the name says.
+//! Outputs never overwrite an input of the command, and always have the format of their name.
 
 use std::fs;
 use std::path::Path;
 
 use super::{JUMP, MODEL, done, folder, json, path, refused};
 
-/// Copies of a model, a recording and more, and commands that would write over one of them.
+/// Copies of a model, a recording and other files, and commands that would overwrite one of them.
 #[test]
 fn no_command_replaces_a_file_that_it_reads() {
     let folder = folder();
@@ -160,7 +160,7 @@ fn a_plan_as_mcap_is_the_plan_as_csv() {
     assert_eq!(mcap, csv);
 }
 
-/// Two processes with one output, again and again: one alone makes the file, and the other says so.
+/// Two processes with one output, repeatedly: one of them writes the file, the other fails with an error.
 #[test]
 fn of_two_commands_with_one_output_one_succeeds_and_the_other_names_the_file() {
     let folder = folder();

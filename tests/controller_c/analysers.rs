@@ -101,8 +101,8 @@ fn analysers_find_nothing() {
     ];
     let sources = sources.map(|end| format!("{name}{end}"));
     if has("clang-tidy") {
-        // Vectors of one length follow each other; indices are small (stages by rows); a solver without links, or without
-        // rows on the state, does not read what it prepares for them.
+        // Vectors of one length are adjacent arguments; indices are small (stages by rows); a solver without links, or
+        // without rows on the state, does not read all values prepared for it.
         let checks = "-*,bugprone-*,clang-analyzer-*,-bugprone-easily-swappable-parameters,\
             -bugprone-implicit-widening-of-multiplication-result,-clang-analyzer-deadcode.DeadStores";
         succeed(
@@ -119,7 +119,7 @@ fn analysers_find_nothing() {
             Command::new("cppcheck")
                 .args(["--std=c99", "--quiet", "--error-exitcode=1"])
                 .arg("--enable=warning,performance,portability")
-                // It takes arrays that memcpy fills for uninitialised ones without elements.
+                // It reports arrays filled by memcpy as uninitialised.
                 .arg("--suppress=ctuArrayIndex")
                 .args(&sources)
                 .current_dir(emitted.folder()),

@@ -1,4 +1,4 @@
-//! The generated C on the processors of robots, emulated.
+//! The generated C on emulated processors of robots.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::emitted::Emitted;
 use crate::programs::{root, shipped, succeed};
 use crate::tools::has;
 
-/// Size of the sections that a linked or compiled file puts into code and into memory, bytes.
+/// Section sizes of a linked or compiled file: code and memory, bytes.
 fn sections(size: &str, file: &Path) -> (usize, usize) {
     let output = succeed(Command::new(size).arg(file));
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -21,7 +21,7 @@ fn sections(size: &str, file: &Path) -> (usize, usize) {
     (numbers[0] + numbers[1], numbers[1] + numbers[2])
 }
 
-/// Compiler of the board, with what all its files are compiled with.
+/// Compiler of the board, with the options common to all files.
 const MACHINE: [&str; 8] = [
     "arm-none-eabi-gcc",
     "-std=c99",
@@ -33,7 +33,7 @@ const MACHINE: [&str; 8] = [
     "-mthumb",
 ];
 
-/// What a program of a generated folder prints on the emulated board, and whether it succeeds.
+/// Output of a program of a generated folder on the emulated board, and whether it succeeds.
 fn on_board(emitted: &Emitted, program: &str, flags: &[&str], qemu: &[&str]) -> (String, bool) {
     let board = root().join("tests/controller_c/cortex_m7");
     let (name, image) = (&emitted.name, emitted.scratch.path().join("image"));
@@ -67,7 +67,7 @@ fn cap_for_a_time_holds_on_a_cortex_m7_and_grows_with_the_time() {
         return;
     }
     let emitted = Emitted::new(&shipped("go1-d2"), Precision::Single);
-    // Thousands of instructions in place of microseconds, so that nothing depends on this machine.
+    // Thousands of instructions instead of microseconds, so the result does not depend on this machine.
     let budget = |thousands: f64| {
         let flag = format!("-DGO1_D2_BUDGET_US={thousands}");
         let flags = ["-DGO1_D2_CLOCK_US=clock_us", "-DGO1_D2_REPEATS=1", &flag];

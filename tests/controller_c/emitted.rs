@@ -1,4 +1,4 @@
-//! Generated folders of controllers in C, and programs that are made of them.
+//! Generated folders of controllers in C, and programs built from them.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use romc::model::ReducedModel;
 
 use crate::programs::{root, succeed};
 
-/// Warnings that the sources must not raise.
+/// Warnings that the sources must not cause.
 pub const STRICT: [&str; 10] = [
     "-std=c99",
     "-Wall",
@@ -36,7 +36,7 @@ impl Emitted {
         Self::with(model, precision, SineCosine::default())
     }
 
-    /// With the sines of the C library, which the library of romc takes as well.
+    /// With the sines of the C library, which romc's library uses as well.
     pub fn with_library_sines(model: &ReducedModel) -> Self {
         Self::with(model, Precision::Double, SineCosine::Library)
     }
@@ -64,7 +64,7 @@ impl Emitted {
             .join(format!("{}-controller-c", self.name))
     }
 
-    /// Compiles a source of the folder, or another, unless that was done before; the object.
+    /// Compiles a source of the folder, or another, unless it is compiled already; returns the object.
     pub fn object(&self, compiler: &str, flags: &[&str], source: &str) -> PathBuf {
         let key: String = format!("{compiler} {flags:?} {source}")
             .chars()
@@ -111,7 +111,7 @@ impl Emitted {
         program
     }
 
-    /// What a program of the tests prints that has the controller's source as part of it, fed with a file.
+    /// Output of a program of the tests that includes the controller's source and reads a file.
     pub fn with_source(&self, source: &str, bytes: &[u8]) -> String {
         let file = self.scratch.path().join("samples");
         fs::write(&file, bytes).expect("written");

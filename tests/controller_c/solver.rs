@@ -1,5 +1,5 @@
-//! The structured solver in C that is made from its Rust: fresh, with the Rust's bits on random programs, and another
-//! where the Rust is another.
+//! The structured solver in C is generated from its Rust: it is up to date, has the Rust's bits on random programs, and
+//! changes if the Rust changes.
 
 use std::fs;
 use std::io::Write;
@@ -28,7 +28,7 @@ fn random_program(
     let (input, pairs, soft) = (6 + nu, 2, [3, 0][number / 4 % 2]);
     let counts = [input, soft, links, pairs];
     let mut values: Vec<f64> = counts.map(|count| count as f64).into();
-    // Now and then a cost is not convex, or a number not finite.
+    // Sometimes a cost is not convex, or a number is not finite.
     let curvature = if number % 13 == 12 { -0.3 } else { 0.1 };
     let positive = |random: &mut Random| random.signed().abs();
     values.extend((0..nx).map(|_| 0.5 + positive(random)));
@@ -95,7 +95,7 @@ impl Reader<'_> {
     }
 }
 
-/// What `solve_programs.c` writes for a program, by the library.
+/// Output of `solve_programs.c` for a program, by the library.
 fn solved<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(
     values: &[f64],
 ) -> Vec<f64> {
@@ -174,7 +174,7 @@ fn solved<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(
     out
 }
 
-/// What the C of these files makes of programs, compiled for sizes and precision.
+/// Results of the C of these files for programs, compiled for these sizes and this precision.
 fn solved_in_c(
     folder: &Path,
     files: &[(&str, String)],
@@ -220,7 +220,7 @@ fn solved_in_c(
     numbers.map(number).collect()
 }
 
-/// Compares C and Rust on random programs; how many were solved with iterations.
+/// Compares C and Rust on random programs; returns how many were solved with iterations.
 fn compare<T: Real, const NX: usize, const NU: usize, const LINKED: bool>(real: &str) -> usize {
     let mut random = Random::new(NX as u64);
     let links = if LINKED { 3 } else { 0 };
@@ -326,7 +326,7 @@ fn constructs_outside_the_subset_are_named_with_their_place() {
     }
 }
 
-/// The fault of Rust that C calls functions of.
+/// The error in a piece of Rust whose functions are called by C.
 fn fault_of(text: &str, user: &str) -> Fault {
     let source = |path: &str, text: &str| Source {
         path: path.to_owned(),

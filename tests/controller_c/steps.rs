@@ -1,4 +1,4 @@
-//! The C of the controller's own steps follows their Rust: a change of that changes commands.
+//! The C of the controller's own steps is generated from their Rust: a change of the Rust changes commands.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use crate::emitted::Emitted;
 use crate::programs::{root, shipped, succeed};
 use crate::{Rates, replay_file};
 
-/// Copies what the C is made of, with one piece of text changed in one file.
+/// Copies the sources of the C, with one piece of text changed in one file.
 fn copy_changed(to: &Path, file: &str, from: &str, changed: &str) {
     for folder in [
         "src/control/solver",
@@ -33,7 +33,7 @@ fn copy_changed(to: &Path, file: &str, from: &str, changed: &str) {
     fs::write(&path, text.replace(from, changed)).expect("written");
 }
 
-/// The C that is made with one piece of text changed in one file, as paths and texts.
+/// The C generated with one piece of text changed in one file, as paths and texts.
 pub(crate) fn made_of_changed(
     file: &str,
     from: &str,
@@ -44,7 +44,7 @@ pub(crate) fn made_of_changed(
     controller(copy.path()).expect("in the subset")
 }
 
-/// Lines of the committed C with what is in their place after a change.
+/// Lines of the committed C and their replacements after a change.
 fn changed_lines(file: &str, from: &str, changed: &str) -> Vec<(String, String)> {
     let mut pairs = Vec::new();
     for (path, text) in made_of_changed(file, from, changed) {
@@ -104,7 +104,7 @@ fn changes_of_the_steps_in_rust_change_the_commands_of_the_c() {
         };
         assert_eq!(original.matches(old.as_str()).count(), 1, "{old}");
         fs::write(&source, original.replace(old.as_str(), new)).expect("written");
-        // Another flag is another object.
+        // Another flag gives another object.
         let program = emitted.program("cc", &[&format!("-DCHANGE={number}")], replay);
         let output = Command::new(program).arg(&steps).output().expect("it runs");
         let text = String::from_utf8_lossy(&output.stdout);

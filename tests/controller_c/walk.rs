@@ -1,5 +1,5 @@
-//! The state machine in a walk: stand up, start, change the velocity, turn, stop, stand, in Rust; and the commands of the C
-//! beside them, up to rounding.
+//! The state machine in a walk: stand up, start, change the velocity, turn, stop, stand, in Rust; and its commands
+//! compared with those of the C, up to rounding.
 
 use std::f64::consts::PI;
 use std::fs;
@@ -17,7 +17,7 @@ use crate::programs::{root, shipped, succeed};
 use crate::push_counts;
 
 const STEP_S: f64 = 0.002;
-/// Those of `machine.c`: forwards and to the left, m/s, and yaw, rad/s.
+/// The velocities of `machine.c`: forwards and to the left, m/s, and yaw, rad/s.
 const VELOCITIES: [[f64; 3]; 4] = [
     [0.5, 0.0, 0.3],
     [0.8, 0.05, -0.4],
@@ -43,13 +43,13 @@ enum Request {
     SetAgain = 13,
 }
 
-/// A robot whose joints go where they are sent and whose body moves as commanded, somewhere in the world.
+/// A robot whose joints follow their commands exactly and whose body moves as commanded, at some place in the world.
 struct Robot {
     machine: Machine,
     time_s: f64,
     x: [f64; 18],
     dx: [f64; 18],
-    /// Velocity that the body goes over to, and its present one.
+    /// Target velocity of the body, and its present one.
     velocity: [f64; 3],
     now: [f64; 3],
     gait: Gait,
@@ -94,7 +94,7 @@ impl Robot {
         robot
     }
 
-    /// A step with a request before it; the answer to the request.
+    /// A step after a request; returns the answer to the request.
     fn step(&mut self, request: Request) -> bool {
         self.step_with(request, |_| ())
     }
@@ -171,7 +171,7 @@ impl Robot {
         answer
     }
 
-    /// Feet near the floor: which they are on is what the supervisor compares with their heights.
+    /// Feet near the floor: the supervisor compares the contact flags with their heights.
     fn low_feet(&self) -> [bool; 4] {
         let heights = Leg::ALL.map(|leg| {
             let q: [f64; 3] = std::array::from_fn(|joint| self.x[3 * leg.index() + joint]);
@@ -181,7 +181,7 @@ impl Robot {
         heights.map(|height| height < lowest + 0.015)
     }
 
-    /// Steps for a time, with feedback about a body that goes over to a velocity as late as a command arrives.
+    /// Steps for a time, with feedback about a body that reaches a velocity as late as a command arrives.
     fn pass(&mut self, seconds: f64, velocity: [f64; 3]) {
         for step in 0..(seconds / STEP_S) as usize {
             if step as f64 * STEP_S > 0.3 {
@@ -269,7 +269,7 @@ fn commands_are_kept_within_what_the_strides_reach_and_change_slowly() {
     robot.step(Request::Beyond);
     let (least, most) = (robot.gait.least, robot.gait.most);
     assert!(most[0] > 0.9 && most[0] < 1.1, "{most:?}");
-    // A body as fast as the strides reach stays near the reference; one as fast as asked does not.
+    // A body with the greatest speed of the strides stays near the reference; one with the requested speed does not.
     robot.pass(6.0, [most[0], least[1], most[2]]);
     assert_eq!(
         robot.machine.mode(),

@@ -1,12 +1,12 @@
-//! When a result of generated code counts as the interpreter's.
+//! Conditions under which a result of generated code agrees with the interpreter's.
 //!
-//! - [`Rule::SameBits`]: every operation is rounded as the program says, so every result has the
-//!   interpreter's bits. It holds for C without contraction and for Rust: always without
-//!   transcendental functions; with them because both call one mathematics library.
-//! - [`Rule::UlpsATerm`]: fused operations or another mathematics library; a result differs by
-//!   at most 4 ulp of each term of its sum, and one more for each operation inside the term
-//!   (`terms.rs`). Outputs of curved layers, of the solve behind their inputs' projection, the
-//!   feet's forces and the motors' torques are no such sums: 1e-11 of the largest output.
+//! - [`Rule::SameBits`]: every operation is rounded as in the program, so every result has the interpreter's bits. It
+//!   holds for C without contraction and for Rust: always without transcendental functions; with them because both call
+//!   one mathematics library.
+//! - [`Rule::UlpsATerm`]: fused operations or another mathematics library. A result differs by at most 4 ulp per term
+//!   of its sum, and one more per operation inside the term (`terms.rs`). Outputs of nonlinear layers, of the solve in
+//!   the projection of their inputs, the feet's forces and the motors' torques are not such sums: 1e-11 of the largest
+//!   output.
 
 use romc::ir::{Binary, Program, Statement, Unary};
 use romc::model::ReducedModel;
@@ -14,7 +14,7 @@ use romc::model::ReducedModel;
 use super::functions::Function;
 use super::terms::Terms;
 
-/// Largest difference of maps through curved layers and of feet's forces, relative to the largest output.
+/// Largest difference of maps through nonlinear layers and of feet's forces, relative to the largest output.
 const CURVED: f64 = 1e-11;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,14 +23,14 @@ pub enum Rule {
     UlpsATerm,
 }
 
-/// What was compared, and the largest difference met.
+/// Counts of compared functions and results, and the largest difference.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
     pub functions: usize,
     pub transcendental: usize,
     pub results: usize,
     pub equal_bits: usize,
-    /// As a share of what is allowed, with where it was.
+    /// As a share of the allowance, and its place.
     pub worst: (f64, String),
 }
 
@@ -46,7 +46,7 @@ impl Tally {
     }
 }
 
-/// Compares one function's results at its points; fails the test where `rule` is broken.
+/// Compares one function's results at its points; the test fails if `rule` is broken.
 pub fn compare(
     model: &ReducedModel,
     function: &Function,
@@ -102,7 +102,7 @@ pub fn compare(
     tally
 }
 
-/// Whether a program has functions that a mathematics library rounds, or the kernel of sines.
+/// Whether a program calls a mathematics library, or the kernel of sines.
 fn is_transcendental(program: &Program) -> bool {
     let own = program.statements.iter().any(|statement| match statement {
         Statement::SinCos { .. } => true,

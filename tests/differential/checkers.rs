@@ -1,4 +1,4 @@
-//! Generated code under sanitizers and valgrind, and before static checkers.
+//! Generated code under sanitizers and valgrind, and checked by static analysers.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -11,7 +11,7 @@ use super::drivers::{Build, Workshop, contents, succeed};
 use super::tools::has;
 use super::{Case, SOME_MODELS, check_all, models};
 
-/// Builds with sanitizers and under valgrind, as far as this machine has them.
+/// Builds with sanitizers and under valgrind, if this machine has them.
 fn memory_checkers() -> Vec<Build> {
     Build::sanitized()
         .into_iter()
@@ -68,7 +68,7 @@ fn emitted() -> Vec<Workshop> {
     ]
 }
 
-/// Emitted files whose name ends so.
+/// Emitted files whose name has this ending.
 fn files(workshops: &[Workshop], ending: &str) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for workshop in workshops {
@@ -85,8 +85,7 @@ fn clang_tidy_finds_nothing_bugprone_in_generated_c() {
     if !has("clang-tidy") {
         return;
     }
-    // Functions take the vectors z, dz and u_lat one after the other: nobody can help that
-    // these are swappable.
+    // Functions have the adjacent arguments z, dz and u_lat: swappable arguments cannot be avoided.
     let checks = "-*,bugprone-*,clang-analyzer-*,-bugprone-easily-swappable-parameters";
     let workshops = emitted();
     succeed(
@@ -108,7 +107,7 @@ fn cppcheck_finds_nothing_in_generated_c() {
         Command::new("cppcheck")
             .args(["--std=c99", "--quiet", "--error-exitcode=1"])
             .arg("--enable=warning,style,performance,portability")
-            // log(1 + x) is the model's own term, with the interpreter's rounding.
+            // log(1 + x) is a term of the model, with the interpreter's rounding.
             .arg("--suppress=unpreciseMathCall")
             .args(files(&workshops, ".c")),
     );
@@ -138,8 +137,8 @@ fn clippy_finds_nothing_in_generated_rust() {
     }
 }
 
-/// Lints of the pedantic group about names, digits and length: names and lengths are the
-/// model's, digits are the shortest that read back, inlining was measured.
+/// Pedantic lints about names, digits and length: names and lengths come from the model, digits are the shortest that
+/// read back, inlining was measured.
 const SPELLING: [&str; 12] = [
     "-A",
     "clippy::doc_markdown",

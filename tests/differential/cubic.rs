@@ -1,4 +1,4 @@
-//! A large cubic polynomial, for tests within the crate that lowers it and of what is emitted.
+//! A large cubic polynomial, for unit tests of lowering and for tests of emitted code.
 
 use super::*;
 

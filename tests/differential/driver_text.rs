@@ -1,4 +1,4 @@
-//! The programs that run generated functions on the points of a file.
+//! Programs that run generated functions on the points of a file.
 
 use super::functions::Function;
 
@@ -15,9 +15,8 @@ fn offsets(slots: &[romc::ir::Slot]) -> Vec<(&str, usize, usize)> {
         .collect()
 }
 
-/// A program that reads the points of all functions from its first file and writes their results to
-/// its second. Functions are called through a table: compilers take long for one `main` that
-/// has them all inlined.
+/// A program that reads the points of all functions from its first file and writes their results to its second.
+/// Functions are called through a table, because a `main` that inlines all of them compiles slowly.
 pub fn c_driver(models: &[String], functions: &[Function]) -> String {
     let mut text = String::from("#include <stdio.h>\n#include <stdlib.h>\n#include <string.h>\n");
     for model in models {
@@ -63,8 +62,8 @@ return fclose(file) == 0 ? 0 : 5;
     text
 }
 
-/// How often a driver calls a function, and how many numbers enter and leave each time: a batch
-/// takes all points at once.
+/// How often a driver calls a function, and how many numbers each call reads and writes: a batch reads all points at
+/// once.
 fn calls(function: &Function) -> (usize, usize, usize) {
     let n = function.n_points;
     let (from, to) = (function.input_len(), function.output_len());
@@ -104,8 +103,7 @@ fn c_single(k: usize, function: &Function) -> String {
     )
 }
 
-/// All points in one call; the file has them one after the other, a batch one variable after the
-/// other.
+/// All points in one call: point by point in the file, variable by variable in the batch.
 fn c_batch(k: usize, function: &Function) -> String {
     let (n, d) = (function.n_points, function.output_len());
     let (model, name) = (&function.model, &function.name);

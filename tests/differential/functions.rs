@@ -1,26 +1,26 @@
-//! The generated functions of a model, as the interpreter knows them.
+//! The generated functions of a model, and their results by the interpreter.
 
 use romc::equations::Equations;
 use romc::ir::{Interpreter, Program};
 use romc::lower::{self, Form, JacobianPattern, Map};
 use romc::model::{ModelError, ReducedModel, StateMap};
 
-/// A generated function: its name after the model's, and the program it must equal.
+/// A generated function: its name after the model's name, and the program it must equal.
 pub struct Function {
     pub model: String,
     pub name: String,
     pub program: Program,
     pub kind: Kind,
-    /// Points at which it is compared.
+    /// Number of points at which it is compared.
     pub n_points: usize,
 }
 
-/// What a function computes; phases by their place in the model.
+/// Kind of a function; phases by their index in the model.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
     /// A map whose outputs are sums of weights times inputs.
     Affine,
-    /// A map through curved layers.
+    /// A map through nonlinear layers.
     Curved,
     /// Generalised inputs from torques and contacts, and torques from them.
     Wrench,
@@ -43,12 +43,12 @@ impl Function {
         matches!(self.kind, Kind::Batch(_))
     }
 
-    /// Numbers that enter, all slots one after the other.
+    /// Count of inputs, all slots in sequence.
     pub fn input_len(&self) -> usize {
         self.program.inputs.iter().map(|slot| slot.len).sum()
     }
 
-    /// Numbers that leave, all slots one after the other.
+    /// Count of outputs, all slots in sequence.
     pub fn output_len(&self) -> usize {
         self.program.outputs.iter().map(|slot| slot.len).sum()
     }
@@ -62,7 +62,7 @@ impl Function {
                     points.push(match (slot.name.as_str(), k % 3) {
                         ("h", _) => random.between(1e-4, 1e-2),
                         ("feet", _) => random.below(2) as f64,
-                        // Slow joints, where dry friction changes its sign; bent knees.
+                        // Slow joints, where dry friction changes sign; bent knees.
                         ("dx", 0) => random.between(-0.1, 0.1),
                         ("x", 1) if self.kind == Kind::Wrench => random.between(0.0, 1.2),
                         ("x", 2) if self.kind == Kind::Wrench => random.between(-2.2, -1.0),
@@ -75,7 +75,7 @@ impl Function {
         points
     }
 
-    /// What the interpreter makes of the points.
+    /// The interpreter's results at the points.
     pub fn interpret(&self, points: &[f64]) -> Vec<f64> {
         let mut interpreter = Interpreter::new(&self.program);
         let mut results = Vec::with_capacity(self.n_points * self.output_len());
@@ -101,7 +101,7 @@ impl Function {
     }
 }
 
-/// All functions that are generated for a model.
+/// All functions generated for a model.
 pub fn functions(model: &ReducedModel, n_points: usize, form: Form) -> Vec<Function> {
     let name = model.identifier().as_str();
     let function = |name_of: String, program: Program, kind: Kind, n_points: usize| Function {

@@ -75,7 +75,7 @@ fn polynomials_take_fewer_products_than_their_terms_one_by_one() {
     let program = dynamics(&Equations::of(&model), 0, Form::StraightLine).expect("lowers");
     let is_product = |s: &&Statement| matches!(s, Statement::Binary(Binary::Mul, ..));
     let products = program.statements.iter().filter(is_product).count();
-    // One by one: ten with coefficients, fifteen between variables.
+    // Separately: ten with coefficients, fifteen between variables.
     assert!(products + 4 <= 10 + 15, "{products}");
 }
 
@@ -93,7 +93,7 @@ fn sums_of_vectors_equal_one_operation_after_the_other() {
     }
 }
 
-/// The model of an encoder alone.
+/// A model with only an encoder.
 fn encoder(weights: DMatrix<f64>, activation: Activation) -> ReducedModel {
     let d = weights.nrows();
     let map = AffineMap::new("encoder", weights, DVector::zeros(d)).expect("fits");
@@ -140,7 +140,7 @@ fn projection_by_dependent_rows_gives_no_finite_number() {
     let weights = DMatrix::from_row_slice(2, 3, &[1.0, 2.0, 4.0, -2.0, 1.0, 0.5]);
     let model = encoder(weights, Activation::Relu);
     let program = Map::ProjectInput.lower(&model).expect("lowers");
-    // The second unit is off.
+    // The second unit is inactive.
     let inputs = [vec![1.0, 0.0, 0.0], vec![1.0, 0.5, 0.25]];
     let found: Vec<f64> = Interpreter::new(&program).results(&inputs).remove(0);
     assert!(found.iter().all(|value| !value.is_finite()), "{found:?}");

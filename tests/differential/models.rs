@@ -1,4 +1,4 @@
-//! The models that generated code is tested on: shipped ones, fixtures and random ones.
+//! Models for tests of generated code: shipped ones, fixtures and random ones.
 
 #[path = "cubic.rs"]
 mod cubic;
@@ -38,10 +38,9 @@ pub fn shipped() -> Vec<ReducedModel> {
         .collect()
 }
 
-/// A random model. With the seed vary: one to eight coordinates, the library (standard of degree
-/// 0 to 3 with and without sines, or terms of the syntax), inputs or none, one to three phases,
-/// density of Xi, equations and phases without a term, no maps, affine ones, curved ones.
-/// Models of even seeds have no function that a mathematics library rounds, and no sines.
+/// A random model. The seed varies: one to eight coordinates, the library (standard of degree 0 to 3 with and without
+/// sines, or terms of the syntax), inputs or none, one to three phases, density of Xi, equations and phases without a
+/// term, no maps, affine maps, nonlinear maps. Models of even seeds call no mathematics library and have no sines.
 pub fn random(seed: u64) -> ReducedModel {
     let mut random = Random(seed.wrapping_mul(0x1234_5677) + 1);
     let d = 1 + random.below(8);
@@ -53,7 +52,7 @@ pub fn random(seed: u64) -> ReducedModel {
         random_terms(&mut random, d, polynomial, inputs)
     };
     let mut density = [0.05, 0.15, 0.5, 1.0][random.below(4)];
-    // Compilers take their time for thousands of terms, and learn nothing more from them.
+    // Thousands of terms compile slowly and test nothing more.
     density = f64::min(density, 160.0 / (library.terms().len() * d) as f64);
     let rear = FeetRule::Patterns(vec![
         [false, false, true, true],
@@ -101,7 +100,7 @@ pub fn random(seed: u64) -> ReducedModel {
     builder.build().expect("a valid model")
 }
 
-/// The highest degree from 3 down whose library is not too long.
+/// The highest degree, at most 3, whose library is not too long.
 fn random_standard(random: &mut Random, d: usize, polynomial: bool, inputs: bool) -> Library {
     let mut standard = StandardLibrary {
         degree: random.below(4) as u32,
@@ -151,7 +150,7 @@ pub fn random_nonlinear(seed: u64) -> ReducedModel {
         .expect("a valid model")
 }
 
-/// One of the shapes of networks: one curved layer, hidden layers, a curved last layer.
+/// One of the shapes of networks: one nonlinear layer, hidden layers, a nonlinear last layer.
 fn random_map(random: &mut Random, shape: usize, from: usize, to: usize) -> StateMap {
     use Activation::{Elu, Gelu, GeluTanh, Linear, Relu, Sigmoid, Silu, Softplus, Tanh};
     let activations: &[Activation] = [
@@ -171,7 +170,7 @@ fn random_map(random: &mut Random, shape: usize, from: usize, to: usize) -> Stat
         let rows = if is_last {
             to
         } else {
-            // Half of relu's units are at rest.
+            // Half of relu's units are inactive.
             let share = if activation == Relu { 3 } else { 1 };
             share * from.max(to) + random.below(9)
         };

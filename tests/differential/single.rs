@@ -1,4 +1,4 @@
-//! Generated code in single precision: the interpreter's numbers to the bit.
+//! Generated code in single precision has the interpreter's bits.
 
 use romc::codegen::Precision;
 use romc::ir::Interpreter;
@@ -13,7 +13,7 @@ use super::{models, n_models_a_program};
 /// Magnitudes of the points, in turn.
 const MAGNITUDES: [f64; 2] = [1.0, 10.0];
 
-/// Points whose coordinates single precision represents, up to the magnitudes in turn.
+/// Points with coordinates that single precision represents exactly, up to the magnitudes in turn.
 fn points(function: &Function, random: &mut Random) -> Vec<f64> {
     let mut points = Vec::new();
     for point in 0..function.n_points {
@@ -31,7 +31,7 @@ fn points(function: &Function, random: &mut Random) -> Vec<f64> {
     points
 }
 
-/// What the interpreter makes of the points in single precision.
+/// The interpreter's results at the points in single precision.
 fn interpret_single(function: &Function, points: &[f64]) -> Vec<f64> {
     let mut interpreter = Interpreter::<f32>::new(&function.program);
     let mut results = Vec::new();
@@ -53,8 +53,8 @@ fn interpret_single(function: &Function, points: &[f64]) -> Vec<f64> {
     results
 }
 
-/// Fused operations round less often: at most 16 times the error of the interpreter, or 1e-4 of one plus the largest
-/// result of the point.
+/// Fused operations round less often: the difference is at most 16 times the interpreter's error, or 1e-4 of one plus
+/// the largest result of the point.
 fn assert_near(function: &Function, points: &[f64], found: &[f64], single: &[f64]) {
     let exact = function.interpret(points);
     let n = function.output_len().max(1);

@@ -1,13 +1,12 @@
-//! How large the terms of a function's outputs are at a point: what two correct evaluations that
-//! round differently may differ by.
+//! Magnitudes of the terms of a function's outputs at a point. They bound the difference of two correct evaluations
+//! that round differently.
 //!
-//! An output is a sum of terms: coefficient times candidate term for `ddz`, coefficient times the
-//! candidate term's derivative for the Jacobian, weight times coordinate and bias for affine maps,
-//! and for a step `z`, `h dz` and the terms of each stage's `ddz` times what the stage weighs. A
-//! candidate term that is itself a sum counts as its summands.
+//! An output is a sum of terms: coefficient times candidate term for `ddz`, coefficient times the candidate term's
+//! derivative for the Jacobian, weight times coordinate and bias for affine maps, and for a step `z`, `h dz` and the
+//! terms of each stage's `ddz` times the stage's weight. A candidate term that is itself a sum counts as its summands.
 //!
-//! A term may differ by four ulp, for its coefficient and for adding it, and by one more for each
-//! operation inside its candidate term: `xi1*z1` by four, `xi2*z1*z2` by five ulp.
+//! A term may differ by four ulp (coefficient and addition), and by one more for each operation inside its candidate
+//! term: `xi1*z1` by four, `xi2*z1*z2` by five ulp.
 
 use nalgebra::DVector;
 use romc::lower::JacobianPattern;
@@ -16,7 +15,7 @@ use romc::symbolic::{ExprId, ExprPool, Function as Elementary, Node, SymbolId};
 
 use super::functions::{Function, Kind};
 
-/// Ulp that every term may differ by.
+/// Ulp by which every term may differ.
 const TERM: f64 = 4.0;
 
 /// The distance from `|x|` to the next float.
@@ -30,13 +29,13 @@ pub enum Terms<'m> {
     Step(&'m ReducedModel, usize, Sums),
     Affine {
         constant: Vec<f64>,
-        /// One a coordinate of the input.
+        /// One per input coordinate.
         columns: Vec<Vec<f64>>,
     },
 }
 
 impl<'m> Terms<'m> {
-    /// `None` for maps through curved layers and for feet's forces, which are no sums of terms.
+    /// `None` for maps through nonlinear layers and for feet's forces, which are not sums of terms.
     pub fn new(model: &'m ReducedModel, function: &Function) -> Option<Self> {
         Some(match &function.kind {
             Kind::Curved | Kind::Wrench => return None,
@@ -62,7 +61,7 @@ impl<'m> Terms<'m> {
         })
     }
 
-    /// What each output may differ by at `point`.
+    /// Allowed difference of each output at `point`.
     pub fn allowance(&self, point: &[f64]) -> Vec<f64> {
         match self {
             Terms::Latent(sums) => sums.allowance(point),
@@ -77,7 +76,7 @@ impl<'m> Terms<'m> {
     }
 }
 
-/// The terms of a classical Runge-Kutta step from `(z, dz)` with `u_lat` held; `h` is last.
+/// The terms of a classical Runge-Kutta step from `(z, dz)` with constant `u_lat`; `h` is last.
 fn step_allowance(model: &ReducedModel, phase: usize, sums: &Sums, point: &[f64]) -> Vec<f64> {
     let d = model.latent_dim();
     let part = |k: usize| DVector::from_column_slice(&point[k * d..(k + 1) * d]);
@@ -111,7 +110,7 @@ fn step_allowance(model: &ReducedModel, phase: usize, sums: &Sums, point: &[f64]
 /// Sums of coefficients times expressions over `(z, dz, u_lat)`.
 pub struct Sums {
     pool: ExprPool,
-    /// All parts of all terms, operands first.
+    /// All subexpressions of all terms, operands first.
     order: Vec<ExprId>,
     symbols: Vec<SymbolId>,
     outputs: Vec<Vec<(f64, ExprId)>>,
@@ -213,12 +212,12 @@ impl Sums {
     }
 }
 
-/// A value, and the sum of the magnitudes of what was added up to it.
+/// A value, and the sum of the magnitudes of its summands.
 #[derive(Clone, Copy)]
 struct Sizes {
     value: f64,
     size: f64,
-    /// Operations that round.
+    /// Count of rounding operations.
     operations: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all, folders of emitted files, and texts on their way out.
+//! Files that appear complete or not at all, folders of emitted files, and texts in output.
 
 use std::fs;
 use std::io::{self, Read as _};
@@ -119,7 +119,7 @@ fn an_emitted_file_that_was_changed_is_refused_and_kept() {
     assert_eq!(text(&folder.path().join("m/src/lib.rs")), "one");
     let checked = check_folder(folder.path(), &["m.c"], Overwrite::Refuse);
     assert!(matches!(checked, Err(FolderError::Changed { .. })));
-    // What romc would write anyway is no loss.
+    // A file that equals romc's output may be overwritten.
     fs::write(&own, "two").expect("written");
     write_files(folder.path(), &files("two"), Overwrite::Refuse).expect("the same bytes");
 }
@@ -220,7 +220,7 @@ fn write_whole_leaves_the_old_file_when_filling_fails() {
     assert_eq!(names(folder.path()), ["model.json"]);
 }
 
-/// Parts of processes that have ended go; files of other names, and the part that is being written, stay.
+/// Temporary files of ended processes are removed; files with other names, and the one being written, stay.
 #[test]
 fn parts_of_ended_processes_are_removed_and_others_stay() {
     let folder = folder();

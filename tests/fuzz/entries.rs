@@ -1,6 +1,6 @@
-//! What every fuzz target does with its bytes; `tests/corpus.rs` does the same with every file of the corpus.
+//! The body of every fuzz target; `tests/corpus.rs` runs it with every file of the corpus.
 //!
-//! Nothing here may panic, whatever the bytes are: a panic is a finding.
+//! Nothing here may panic for any bytes: a panic is a finding.
 #![allow(
     dead_code,
     reason = "each target is a program of its own and uses one of these"
@@ -22,7 +22,7 @@ use romc::robot_file;
 use romc::symbolic::ParseErrorKind::{Exponent, TooDeep, TooLong};
 use romc::symbolic::{ExprPool, ParseError};
 
-/// A model that reads is written and reads back equal; small ones are compiled to every target.
+/// A valid model is written and reads back equal; small ones are compiled to every target.
 pub fn model_file(bytes: &[u8]) {
     match artifact::read_from_bytes("fuzz.json", bytes) {
         Ok(model) => {
@@ -44,7 +44,7 @@ fn written_and_read_back(model: &ReducedModel) {
     assert_eq!(artifact::to_text(&again), text);
 }
 
-/// Emission may refuse a model, and is the same twice.
+/// Emission may refuse a model; repeated emission gives equal files.
 fn compiled(model: &ReducedModel) {
     let options = EmitOptions::default();
     let first = emit(&Equations::of(model), Target::all(), &options);
@@ -56,8 +56,8 @@ fn compiled(model: &ReducedModel) {
     }
 }
 
-/// An expression that parses prints to a text that parses back to itself; simpler forms and
-/// derivatives exist and print too.
+/// A parsed expression prints to a text that parses back to itself; its simplified forms and derivatives exist and can
+/// also be printed.
 pub fn expression(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;
@@ -79,7 +79,7 @@ pub fn expression(bytes: &[u8]) {
     }
 }
 
-/// The text of an expression, after reading it.
+/// The text of an expression, after a check that it reads back.
 fn reads_back(pool: &mut ExprPool, expr: romc::symbolic::ExprId, text: &str) -> String {
     let printed = pool.display(expr).to_string();
     match pool.parse(&printed, &|_| true) {
@@ -89,7 +89,7 @@ fn reads_back(pool: &mut ExprPool, expr: romc::symbolic::ExprId, text: &str) -> 
             "{text:?} prints as {printed:?}, which reads as {}",
             pool.display(again)
         ),
-        // Derivatives and simpler forms may be longer and deeper than what may be typed.
+        // Derivatives and simplified forms may be longer and deeper than the limits for typed text.
         Err(ParseError {
             kind: TooLong { .. } | TooDeep(_) | Exponent { .. },
             ..
@@ -99,7 +99,7 @@ fn reads_back(pool: &mut ExprPool, expr: romc::symbolic::ExprId, text: &str) -> 
     printed
 }
 
-/// A recording that reads is finite and ordered, is checked and cut, is written and reads back equal.
+/// A valid recording is finite and ordered; it is checked, cut, written and reads back equal.
 pub fn recording(bytes: &[u8]) {
     let Ok(found) = recording::read_from_bytes("fuzz.csv", bytes) else {
         return;
@@ -166,7 +166,7 @@ pub fn recording_gz(bytes: &[u8]) {
     }
 }
 
-/// A map of columns; behind a line `---` the log that it is for, as text, which is read by it.
+/// A map of columns; after a line `---` a log as text, which is read with the map.
 pub fn column_map(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;
@@ -175,7 +175,7 @@ pub fn column_map(bytes: &[u8]) {
     let Ok(map) = ColumnMap::parse("fuzz.toml", map) else {
         return;
     };
-    // One file: those that a map names stand beside it, and are not there.
+    // One file only: files named by a map would be in its folder, and do not exist.
     if !log.is_empty() && map.files().is_empty() {
         read_from_disk("txt", log.as_bytes(), Some(map));
     }
@@ -186,7 +186,7 @@ pub fn mcap(bytes: &[u8]) {
     read_from_disk("mcap", bytes, None);
 }
 
-/// What reads is sound, with clocks as stamped and mended.
+/// A readable file gives sound recordings, with recorded and with repaired clocks.
 fn read_from_disk(ending: &str, bytes: &[u8], map: Option<ColumnMap>) {
     let name = format!("romc-fuzz-{}.{ending}", std::process::id());
     let path = std::env::temp_dir().join(name);
@@ -199,7 +199,7 @@ fn read_from_disk(ending: &str, bytes: &[u8], map: Option<ColumnMap>) {
     std::fs::remove_file(&path).expect("it was there");
 }
 
-/// A robot as TOML, or as URDF where it begins as XML does; what reads is written and reads back as itself.
+/// A robot as TOML, or as URDF if it begins as XML; a valid one is written and reads back equal.
 pub fn robot_file(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;
@@ -242,7 +242,7 @@ pub fn import_latex(bytes: &[u8]) {
     }
 }
 
-/// A model that is imported is written and reads back equal.
+/// An imported model is written and reads back equal.
 fn imported(format: Format, bytes: &[u8]) {
     let library = parse_standard("degree=1,inputs").expect("a shorthand");
     let options = ImportOptions {

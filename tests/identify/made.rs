@@ -1,4 +1,4 @@
-//! Recordings made from known unknowns: what goes in comes out.
+//! Recordings simulated with known parameters, which the identification must return.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ fn go1() -> &'static Robot {
     crate::robot_file::by_name("go1").unwrap()
 }
 
-/// The unknowns of the made robot, per mass except gravity.
+/// True parameters of the simulated robot, per mass except gravity.
 fn truth() -> [f64; PARAMETER_DIM] {
     let mut truth = [0.0; PARAMETER_DIM];
     for (unknown, value) in [
@@ -60,7 +60,7 @@ fn feet(sample: usize) -> ContactFlags {
     }
 }
 
-/// A hop that obeys the equations of the made robot; `phase` varies it.
+/// A hop that satisfies the equations of the simulated robot; `phase` varies it.
 fn hop(phase: f64) -> Segment {
     const N: usize = 700;
     let mut segment = Segment {
@@ -90,8 +90,8 @@ fn hop(phase: f64) -> Segment {
         }
     }
     let truth = truth();
-    // Directions do not depend on the trunk's position, so its acceleration follows from them in
-    // flight; on the ground it is free.
+    // Directions do not depend on the trunk's position, so in flight they determine its acceleration; on the ground it
+    // is free.
     let motion = Motion::of(&segment, go1());
     let equations = SampleEquations::of(&segment, &motion, go1(), GRAVITY_M_S2, 0.0);
     let mut acceleration = DMatrix::zeros(3, N);
@@ -112,7 +112,7 @@ fn hop(phase: f64) -> Segment {
     for sample in 1..N {
         for axis in 0..3 {
             let row = body + axis;
-            // Central differences return the accelerations.
+            // Central differences return these accelerations.
             segment.dx[(row, sample)] = match sample {
                 1 => STEP_S * acceleration[(axis, 0)],
                 _ => {
@@ -127,8 +127,8 @@ fn hop(phase: f64) -> Segment {
     segment
 }
 
-/// Torques of legs in the air by the joints' equations, of legs on the ground the smallest that
-/// give the trunk its acceleration.
+/// Torques of legs in the air from the joints' equations, of legs on the ground the smallest that give the trunk its
+/// acceleration.
 fn torques(segment: &Segment, truth: &[f64; PARAMETER_DIM]) -> DMatrix<f64> {
     let motion = Motion::of(segment, go1());
     let equations = SampleEquations::of(segment, &motion, go1(), GRAVITY_M_S2, 0.0);
@@ -275,7 +275,7 @@ fn identify_noise_is_inside_three_standard_errors() {
     );
 }
 
-/// The standard error of gravity that hops give which all fall by another one.
+/// The standard error of gravity from hops with different offsets of gravity.
 fn gravity_error(hops: &[Segment], offsets: &[f64]) -> f64 {
     let mut hops = hops.to_vec();
     for (hop, offset) in hops.iter_mut().zip(offsets) {
@@ -291,13 +291,13 @@ fn gravity_error(hops: &[Segment], offsets: &[f64]) -> f64 {
 fn identify_errors_that_a_jump_has_in_common_count_once_a_jump() {
     let offsets = [0.1, -0.2, 0.15, -0.05, 0.1, -0.1];
     let hops = vec![hop(0.0); 6];
-    // Deviation of the mean of independent numbers.
+    // Standard deviation of the mean of independent numbers.
     let mean = offsets.iter().sum::<f64>() / 6.0;
     let squares = offsets.iter().map(|offset| (offset - mean).powi(2));
     let expected = (squares.sum::<f64>() / (6.0 * 5.0)).sqrt();
     let six = gravity_error(&hops, &offsets);
     assert!((0.8..1.6).contains(&(six / expected)), "{six} {expected}");
-    // Of fewer jumps blocks alone are left out.
+    // With fewer jumps only blocks are left out.
     let five = gravity_error(&hops[..5], &offsets);
     assert!(five < 0.8 * six, "{five} {six}");
 }
@@ -374,7 +374,7 @@ fn timed_lost_samples_are_found_and_a_true_clock_stays() {
     let same = timed(&made).unwrap();
     assert!(same.mended.elapsed_ratio.is_none() && same.segment == made);
     assert!((elapsed(&made).1 - 1.0).abs() < 0.01);
-    // Every eighth sample is lost, and the logger counts on.
+    // Every eighth sample is lost, and the logger's count continues.
     let kept: Vec<usize> = (0..made.len()).filter(|sample| sample % 8 != 3).collect();
     let lost = Segment {
         time_s: (0..kept.len()).map(|i| STEP_S * i as f64).collect(),

@@ -79,7 +79,7 @@ fn command_with_wrong_usage_ends_with_two() {
     }
 }
 
-/// Writes the arrays of go1-d4 without what weighs inputs, and the options that import them.
+/// Writes the arrays of go1-d4 without the input statistics, and returns the options that import them.
 fn go1_arrays(folder: &Path) -> Vec<String> {
     let model = model("models/go1-d4.json");
     let (encoder, decoder) = (model.encoder(), model.decoder());
@@ -135,7 +135,7 @@ fn command_takes_input_statistics_from_recordings() {
     let flight = (0..imported.phases().len())
         .find(|&phase| imported.phases()[phase].name == "flight")
         .expect("go1 flies");
-    // In flight there is no force, and the mean torque of a joint is that of the file.
+    // In flight there is no force, and the mean joint torques are those of the file.
     let statistics = imported.input_statistics(flight).expect("given");
     let airborne = (0..segment.len()).filter(|&k| segment.feet[k] == [false; 4]);
     let torques: Vec<f64> = airborne.map(|k| segment.torque_nm[(4, k)]).collect();
@@ -167,7 +167,7 @@ fn report_of_a_model_without_input_statistics_leaves_the_controller_out() {
         folder.path(),
         &["report", "net.json", &jump, "--output", "page.html"],
     );
-    // What it is fit for without a controller is of no matter here.
+    // The verdict of a model without a controller does not matter here.
     assert!(
         matches!(report.status.code(), Some(0 | 1)),
         "{}",

@@ -12,7 +12,7 @@ use romc::symbolic::{ExprId, ExprPool};
 
 use super::store::*;
 
-/// A model's equations as a person would write them.
+/// A model's equations in the usual handwritten form.
 fn text_of(model: &ReducedModel) -> String {
     let mut text = "# written by a test\n".to_owned();
     for (index, phase) in model.phases().iter().enumerate() {
@@ -174,7 +174,7 @@ fn equations_follow_the_order_of_the_phases_given() {
     let names: Vec<&str> = imported.phases().iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["rear", "contact", "flight"]);
     assert_eq!(imported.phase_for([false, false, true, true]), Some(0));
-    // A phase that is not given has its usual rule and comes last.
+    // An omitted phase has its usual rule and comes last.
     let fewer = ImportOptions {
         phases: options.phases[..1].to_vec(),
         ..options
@@ -245,7 +245,7 @@ fn read(text: &[u8]) -> Result<Sections, ImportError> {
     read_equations("eq", Format::Equations, text, &SymbolNames::default(), &[])
 }
 
-/// Place of a fault and what was found there.
+/// Place of a fault and the text found there.
 fn refusal(text: &[u8]) -> String {
     let error = read(text).expect_err("a fault").to_string();
     let found = error.split(", expected ").next();
@@ -316,7 +316,7 @@ fn faults_are_reported_with_line_and_column() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 96, rng_seed: RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
-    /// Whatever the coefficients, they arrive with all their bits.
+    /// Coefficients are imported with all their bits.
     #[test]
     fn coefficients_of_equations_arrive_bit_for_bit(values in proptest::collection::vec(any::<f64>(), 7)) {
         let finite = |value: &f64| value.is_finite() && *value != 0.0;

@@ -1,5 +1,5 @@
-//! Files of other tools that have to be converted first: the refusal says what they are, and the lines that convert
-//! them.
+//! Files of other tools that need a conversion first: the error names their format and prints the lines of code that
+//! convert them.
 
 use std::fs;
 use std::process::Command;
@@ -7,7 +7,7 @@ use std::process::Command;
 use crate::command_line::{romc, text};
 use crate::tools::answers;
 
-/// Names, contents, and words of the refusal.
+/// Names, contents, and words of the error.
 const FILES: [(&str, &[u8], &str, &str); 17] = [
     (
         "net.pt",
@@ -137,7 +137,7 @@ fn files_of_other_tools_are_named_with_the_lines_that_convert_them() {
             }
         }
     }
-    // Named by what its files share, as TensorFlow does.
+    // Named by the common prefix of its files, as in TensorFlow.
     let refused = romc(
         folder.path(),
         &["import", "run/net.ckpt", "--output", "m.json"],
@@ -205,7 +205,7 @@ fn files_that_are_packed_or_another_are_named_with_the_line_for_a_shell() {
         &["import", "net.msgpack", "--output", "m.json"],
     );
     assert!(text(&refused.stderr).contains("flax.serialization.msgpack_restore"));
-    // A network is no log.
+    // A network is not a log.
     fs::write(folder.path().join("net.pt"), b"PK\x03\x04 net/data.pkl").expect("writable");
     let said = romc(folder.path(), &["inspect", "net.pt"]);
     assert!(text(&said.stderr).contains("found a PyTorch file, expected a model file of romc"));

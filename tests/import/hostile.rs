@@ -1,4 +1,4 @@
-//! No bytes make the importer panic, and what it accepts is finite.
+//! The importer never panics, and accepted models are finite.
 
 use nalgebra::DMatrix;
 use proptest::prelude::*;
@@ -37,7 +37,7 @@ fn exercise(format: Format, bytes: &[u8]) {
     }
 }
 
-/// Some bytes changed, then the end cut off.
+/// Some bytes are changed, then the end is cut off.
 fn damaged(bytes: Vec<u8>) -> impl Strategy<Value = Vec<u8>> {
     let length = bytes.len();
     let changes = proptest::collection::vec((0..length, any::<u8>()), 0..6);
@@ -91,7 +91,7 @@ proptest! {
         exercise(Format::Equations, text.as_bytes());
     }
 
-    /// A header may say anything about the bytes that follow.
+    /// A header may make any claim about the following bytes.
     #[test]
     fn any_npy_header_never_panics(header in "[ -~]{0,80}", length in any::<u16>(), version in 0u8..5) {
         let mut npy = b"\x93NUMPY".to_vec();

@@ -1,11 +1,11 @@
-//! Constructs that are read, with what they mean, and constructs that are refused, with their place.
+//! Accepted constructs with their meaning, and refused constructs with their place.
 
 use romc::files::Place;
 use romc::import::equations::Sections;
 use romc::import::{Format, ImportError, SymbolNames, read_equations};
 use romc::symbolic::ExprPool;
 
-/// Phases with the texts of their right sides.
+/// Phases with the texts of their right-hand sides.
 type Phases = Vec<(Option<String>, Vec<String>)>;
 
 fn read(file: &str, text: &str, names: &SymbolNames) -> Result<Sections, ImportError> {
@@ -47,7 +47,7 @@ fn derivatives_may_be_primes_fractions_or_dots_and_stand_in_a_line() {
         let found = named(text, &[]).unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(found, expected, "{text}");
     }
-    // What is no derivative with respect to time stays what it is, and is refused at its place.
+    // Derivatives that are not with respect to time are kept, and refused at their place.
     for (text, column) in [
         (r"\[\ddot z_1 = \frac{d z_1}{dx}\]", 21),
         (r"\[\ddot z_1 = \frac{d^2 z_1}{dt}\]", 21),
@@ -62,14 +62,14 @@ fn derivatives_may_be_primes_fractions_or_dots_and_stand_in_a_line() {
     }
 }
 
-/// The one right side of `\ddot z_1`, with a second equation that makes other variables known.
+/// The one right-hand side of `\ddot z_1`; a second equation introduces the other variables.
 fn right_side(latex: &str) -> String {
     let text = format!("\\[\\ddot z_1 = {latex}\\]\n\\[\\ddot z_2 = 0\\]");
     let found = named(&text, &[]).unwrap_or_else(|error| panic!("{latex}: {error}"));
     found[0].1[0].clone()
 }
 
-/// What is printed, and what it means.
+/// Printed forms and their meaning.
 const MEANINGS: &str = r"
 0.36 - 0.16\dot{z}_1 - 0.75\sin\left(\dot{z}_1\right) + 0.11u_1 => 0.36 - 0.16*dz1 + 0.11*u1 - 0.75*sin(dz1)
 -\sin\dot z_1\cos 2z_2 + \tanh\!\bigl(z_1\bigr) => tanh(z1) - cos(2*z2)*sin(dz1)
@@ -246,7 +246,7 @@ fn documents_are_read_with_their_macros_and_phases() {
     );
 }
 
-/// Documents, and what is read or refused of them.
+/// Documents, and the equations read from them or the reason of refusal.
 const PRINTED: [(&str, &str); 51] = [
     (
         r"\newcommand{\k}{2}\begingroup\renewcommand{\k}{9}\endgroup\[\ddot z_1=\k z_1\]",
@@ -551,7 +551,7 @@ fn comment_that_names_several_phases_gives_each_the_equations() {
         error.contains("phase `flight` again, as in line 2"),
         "{error}"
     );
-    // A sentence that begins alike names none.
+    // A sentence with the same beginning names no phases.
     let sentence = text.replace("Phases rear stance, flight", "Phases follow");
     let found = named(&sentence, &[]).expect("two sections");
     assert_eq!(found[0].0, None);

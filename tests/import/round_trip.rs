@@ -1,4 +1,4 @@
-//! A model stored in any of the usual ways is the same model after its import.
+//! A model stored in any of the usual ways is the same after its import.
 
 use nalgebra::DMatrix;
 use romc::import::role::{Part, Role};
@@ -9,7 +9,7 @@ use zip::CompressionMethod;
 
 use super::store::*;
 
-/// How a test stores a model.
+/// A way to store a model.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     weights: WeightVectors,
@@ -37,7 +37,7 @@ fn ways() -> Vec<Way> {
     ways
 }
 
-/// The tensors of a model, named as `name_of` says.
+/// The tensors of a model, named by `name_of`.
 fn tensors(model: &ReducedModel, way: Way, name_of: impl Fn(&Role) -> String) -> Vec<Stored> {
     let turned = |of: &DMatrix<f64>, turn: bool| if turn { of.transpose() } else { of.clone() };
     let store = |role: Role, of: &DMatrix<f64>| matrix(&name_of(&role), of, way.number, way.order);
@@ -307,7 +307,7 @@ fn import_takes_scale_factors_from_tensors() {
     let imported = import_from_bytes("m.npz", Format::Npz, &bytes, &options).expect("factors");
     assert_same(&imported, &original, NAMES);
 
-    // Tensors named as the parts need no option, and take no other factors beside them.
+    // Tensors named like the parts need no option, and exclude options with other factors.
     for tensor in &mut stored {
         match tensor.name.as_str() {
             "s_x" => tensor.name = "scaling.state".to_owned(),

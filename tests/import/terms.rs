@@ -209,7 +209,7 @@ fn arrays_of_either_order_make_the_same_model() {
     assert!(error.to_string().contains(found), "{error}");
 }
 
-/// Imports an array of NumPy with such a dictionary in its header, of `version`.
+/// Imports an array of NumPy with this dictionary in its header, of `version`.
 fn with_header(version: u8, dictionary: &str, numbers: &[u8]) -> Result<Imported, ImportError> {
     let mut bytes = b"\x93NUMPY".to_vec();
     bytes.extend([version, 0]);
@@ -275,7 +275,7 @@ fn headers_of_numpy_are_read_or_refused() {
     assert!(refusal(9, "{}").contains("found version 9"));
 }
 
-/// Numbers keep their values and places, whatever the order of bytes and of indices.
+/// Numbers keep their values and places for every order of bytes and of indices.
 #[test]
 fn numbers_follow_the_order_of_bytes_and_of_indices() {
     let values = [0.5f64, -2.0];

@@ -1,6 +1,5 @@
-//! Models as trainers leave them: standardised, in another order, under other names. Recordings
-//! find what the files do not say. `fixtures/import/go1-d4.json` is a model of the published input rule, which an import
-//! has.
+//! Models as trainers store them: standardised, in another order, under other names. Recordings determine the missing
+//! information. `fixtures/import/go1-d4.json` is a model of the published input rule, like every import.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,7 +22,7 @@ fn deviation() -> DVector<f64> {
     DVector::from_fn(18, |k, _| 0.2 + 0.05 * (k % 5) as f64)
 }
 
-/// go1-d4 as a trainer that standardises `(x - mean) / deviation` in another order would keep it.
+/// go1-d4 as stored by a trainer that standardises `(x - mean) / deviation` in another order.
 fn standardised(original: &ReducedModel, order: &CoordinateOrder) -> Vec<Stored> {
     let scaling = original.scaling().expect("factors");
     let (s_x, s_u) = (scaling.state.expand(18), scaling.input.expand(18));
@@ -226,7 +225,7 @@ pub fn jump() -> String {
         .to_string()
 }
 
-/// Imports tensors of go1-d4 with a jump to compare with.
+/// Imports tensors of go1-d4 and compares them with a jump.
 fn compared(tensors: &[Stored], more: &[&str]) -> (Output, tempfile::TempDir) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     fs::write(folder.path().join("net.safetensors"), safetensors(tensors)).expect("writable");
@@ -254,7 +253,7 @@ fn own_order() -> CoordinateOrder {
     "joints,body".parse().unwrap()
 }
 
-/// go1-d4 over `x - mean` in SI units (its states all have the factor 0.1) in another order.
+/// go1-d4 over `x - mean` in SI units (all its states have the factor 0.1) in another order.
 fn in_si(mean: &DVector<f64>, order: &CoordinateOrder) -> Vec<Stored> {
     let original = model("tests/fixtures/import/go1-d4.json");
     let (encoder, decoder) = (original.encoder().unwrap(), original.decoder().unwrap());

@@ -1,7 +1,6 @@
-//! Every way to store a model gives the same model, every fault is told.
+//! Every way to store a model gives the same model, and every fault is reported.
 //!
-//! `fixtures/import` holds files that NumPy, safetensors and PySINDy wrote: `make.py` there says
-//! how.
+//! `fixtures/import` contains files written by NumPy, safetensors and PySINDy: see `make.py` there.
 
 mod equations;
 mod faults;

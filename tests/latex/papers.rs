@@ -1,12 +1,12 @@
-//! What authors of papers include: files that fit their columns, tables, units, phases.
+//! Files that authors include in papers: they fit their columns; tables, units, phases.
 
 use super::*;
 
-/// Classes of papers with the width to which equations are broken.
+/// Classes of papers with the width at which equations are broken.
 const PAPERS: [(&str, f64, &str); 3] = [
     ("ieee", 22.0, r"\documentclass[journal]{IEEEtran}"),
     (
-        // Columns of 252 pt as in IEEEtran, whose tables have smaller letters.
+        // Columns of 252 pt as in IEEEtran, with smaller letters in tables.
         "columns",
         22.0,
         "\\documentclass[10pt,twocolumn]{article}\n\\usepackage[textwidth=516pt,columnsep=12pt]{geometry}",
@@ -34,7 +34,7 @@ fn every_file_fits_papers_of_one_and_two_columns() {
                 ..PrintOptions::default()
             };
             let mut files = latex::emit(equations, &options).unwrap();
-            // All but the preview, and but the files of single phases, which have the same labels.
+            // All except the preview and the files of single phases, which have the same labels.
             let stem = model.identifier().as_str();
             let is_input = |path: &str| {
                 let end = path.strip_prefix(stem).unwrap();
@@ -44,7 +44,7 @@ fn every_file_fits_papers_of_one_and_two_columns() {
                 .iter()
                 .map(|file| file.path.as_str())
                 .filter(|path| is_input(path));
-            // Within paragraphs, which classes indent.
+            // Within paragraphs, which are indented by the class.
             let inputs = inputs.map(|path| format!("The model:\n\\input{{{path}}}\nand text.\n\n"));
             let inputs: String = inputs.collect();
             let paper = format!(
@@ -76,7 +76,7 @@ fn coefficients_are_one_table_unless_it_is_wider_than_the_page() {
         assert!(text.contains(r"\label{tab:go1-d4}"), "{text}");
         assert!(!text.contains("tab:go1-d4:1"), "{text}");
     }
-    // two of four columns, and one column each at the least
+    // two of four columns, and at least one column each
     for (width_em, n_parts) in [(7.5, 2), (1.0, 4)] {
         let text = table(width_em);
         assert_eq!(text.matches(r"\begin{tabular}").count(), n_parts, "{text}");

@@ -1,4 +1,4 @@
-//! Models at the edge of what is accepted, each of a kind that generated code has failed on.
+//! Models at the limits of accepted input. Generated code has failed on a model of each kind.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use romc::model::{
     StandardLibrary, StateMap,
 };
 
-/// All of them.
+/// All these models.
 pub fn all() -> Vec<ReducedModel> {
     vec![
         hollow(),
@@ -24,7 +24,7 @@ pub fn all() -> Vec<ReducedModel> {
     ]
 }
 
-/// Whether a model has what a controller needs.
+/// Whether a model has all parts that a controller needs.
 pub fn has_controller(model: &ReducedModel) -> bool {
     model.robot().is_ok()
 }
@@ -34,7 +34,7 @@ fn go1() -> ReducedModel {
     artifact::read(&path).expect("a shipped model")
 }
 
-/// A robot's model whose phase of contact has no term.
+/// A robot's model without terms in its contact phase.
 fn hollow() -> ReducedModel {
     let model = go1();
     let mut phases = model.phases().to_vec();
@@ -83,7 +83,7 @@ fn one_coordinate() -> ReducedModel {
     over_the_robot("one-coordinate", &model, library, phases, 1)
 }
 
-/// The first coordinates of a robot's model with other dynamics.
+/// The first coordinates of a robot's model, with other dynamics.
 fn over_the_robot(
     name: &str,
     model: &ReducedModel,
@@ -107,7 +107,7 @@ fn over_the_robot(
         .robot(model.robot().expect("a robot"))
         .sample_time_s(model.sample_time_s().expect("a period"));
     for (place, phase) in phases.iter().enumerate() {
-        // what is known of inputs given states is in the whole model's coordinates
+        // statistics of inputs given states are in the whole model's coordinates
         let statistics = InputStatistics {
             given_state: None,
             ..model.input_statistics(place).expect("statistics").clone()
@@ -132,7 +132,7 @@ fn empty() -> ReducedModel {
         .expect("a valid model")
 }
 
-/// Sixty coordinates of sixty, and every kind of standard term.
+/// Sixty coordinates out of sixty, and every kind of standard term.
 fn sixty() -> ReducedModel {
     let d = 60;
     let standard = StandardLibrary {
@@ -176,7 +176,7 @@ fn sixty() -> ReducedModel {
         .expect("a valid model")
 }
 
-/// A model of one phase over terms, every coefficient a factor.
+/// A model of one phase with these terms, all coefficients equal to a factor.
 fn over_terms(name: &str, d: usize, terms: &[&str], factor: f64) -> ReducedModel {
     let terms: Vec<String> = terms.iter().map(|term| (*term).to_owned()).collect();
     let library = Library::from_terms(d, &terms).expect("terms of the syntax");
@@ -192,7 +192,7 @@ fn over_terms(name: &str, d: usize, terms: &[&str], factor: f64) -> ReducedModel
     builder.build().expect("a valid model")
 }
 
-/// Functions that are real numbers on a part of the points only.
+/// Functions with real values at only some of the points.
 fn roots() -> ReducedModel {
     let terms = [
         "sqrt(z1)",
@@ -210,7 +210,7 @@ fn roots() -> ReducedModel {
     over_terms("roots", 2, &terms, 0.25)
 }
 
-/// A function that is a real number nowhere, beside terms that are.
+/// A function without a real value at any point, together with terms that have values.
 fn undefined() -> ReducedModel {
     over_terms(
         "undefined",
@@ -220,7 +220,7 @@ fn undefined() -> ReducedModel {
     )
 }
 
-/// Functions and coefficients beyond the largest number at most points.
+/// Functions and coefficients above the largest finite number at most points.
 fn huge() -> ReducedModel {
     over_terms("huge", 1, &["exp(800*dz1)", "z1^1000", "1e300*u1"], 1e7)
 }

@@ -1,4 +1,4 @@
-//! What the controller commands when all is well.
+//! Commands of the controller without faults.
 
 use nalgebra::{DVector, SVector};
 use romc::lower::CompiledModel;
@@ -67,8 +67,8 @@ fn on_a_reference_that_the_model_follows_the_reference_input_is_commanded() {
                 "sample {sample}"
             );
             for joint in 0..12 {
-                // The reference's input over the hold is a mean over samples that are themselves held:
-                // its last interval ramps to the next value.
+                // The reference's input over the hold is a mean over samples that are themselves held: its last
+                // interval is a ramp to the next value.
                 let expected = 0.9 * reference.u[sample * 18 + joint]
                     + 0.1 * reference.u[(sample + 5) * 18 + joint];
                 let error = (command.torque_nm[joint] - expected).abs();
@@ -81,10 +81,10 @@ fn on_a_reference_that_the_model_follows_the_reference_input_is_commanded() {
     }
 }
 
-/// Weight of velocities with which errors of position are made good fast.
+/// Velocity weight with which position errors are corrected fast.
 const STIFF: f64 = 0.02;
 
-/// Motors that deliver a share of their torques, those of their joint PD included.
+/// Motors that deliver a share of their torques, including those of their joint PD.
 #[derive(Clone, Copy)]
 struct Motors {
     share: f64,
@@ -324,7 +324,7 @@ fn plan_of_a_linear_model_is_a_trajectory_of_its_runge_kutta_steps() {
             std::array::from_fn(|i| dz[i]),
         );
         for stage in 0..settings.horizon {
-            // Stages 8 to 17 lie in the flight from 0.4 s to 0.5 s.
+            // Stages 8 to 17 are in the flight from 0.4 s to 0.5 s.
             let phase = usize::from((8..18).contains(&stage));
             dynamics.rk4_step(phase, &mut z, &mut dz, plan.input(stage), 0.01);
             for (found, expected) in plan.end(stage).iter().zip(z.iter().chain(&dz)) {

@@ -1,4 +1,4 @@
-//! The input of a reference that comes without one.
+//! Estimates of the input of a reference without recorded inputs.
 
 use crate::synthetic::unwatched;
 use nalgebra::{DMatrix, DVector};
@@ -8,7 +8,7 @@ use romc::mpc::{
 };
 use romc::robot::{InputRule, WrenchFrame};
 
-/// The height of a body on which forces act with a gain of two, in contact and in flight.
+/// The height of a body with forces of gain two, in contact and in flight.
 #[derive(Debug)]
 struct Hopper;
 
@@ -35,8 +35,8 @@ impl LatentDynamics for Hopper {
     }
 }
 
-/// Commanded inputs from one sample of a motion to the next, for a robot that is where a reference without inputs has it:
-/// the mean of the estimates at both. `given` is what the state says of the input.
+/// Commanded inputs from one sample of a motion to the next, for a robot on a reference without inputs: the mean of the
+/// estimates at both samples. `given` predicts the input from the state.
 fn estimated(
     step_s: f64,
     velocity: &[f64],
@@ -108,8 +108,8 @@ fn estimated(
 
 #[test]
 fn states_set_what_input_is_expected_and_accelerations_within_a_phase_correct_it() {
-    // dz = t^2 before the edge at sample 20, 5 after it, every 2 ms: the slope is 2 t inside, that of the middle of the eight
-    // samples before the edge there, and zero after it.
+    // dz = t^2 before the edge at sample 20, 5 after it, every 2 ms. The slope is 2 t inside, before the edge that of
+    // the middle of the eight samples there, and zero after it.
     let velocity: Vec<f64> = (0..40)
         .map(|k| {
             if k < 20 {
@@ -126,7 +126,7 @@ fn states_set_what_input_is_expected_and_accelerations_within_a_phase_correct_it
         acceleration_error: number(2.0),
     };
     let found = estimated(0.002, &velocity, |k| k < 20, Some(given));
-    // S B / (B S B + R) = 0.5 * 2 / (2 + 2) of what the expected input m leaves of the slope.
+    // S B / (B S B + R) = 0.5 * 2 / (2 + 2), times the part of the slope that the expected input m does not explain.
     let estimate = |k: usize, slope: f64| {
         let expected = 0.5 - 2.0 * velocity[k];
         expected + 0.25 * (slope - 2.0 * expected)
@@ -143,7 +143,7 @@ fn states_set_what_input_is_expected_and_accelerations_within_a_phase_correct_it
 
 #[test]
 fn accelerations_that_inputs_do_not_explain_count_less() {
-    // Samples so far apart that slopes are differences of neighbours: of dz = c t^2 / 2 they are c t.
+    // Samples so far apart that slopes are differences of neighbours: for dz = c t^2 / 2 they are c t.
     for (c, is_explained) in [(60.0, false), (0.0, true)] {
         let velocity: Vec<f64> = (0..12)
             .map(|k| 0.5 * c * (0.02 * f64::from(k)).powi(2))
@@ -153,7 +153,7 @@ fn accelerations_that_inputs_do_not_explain_count_less() {
         let left: Vec<f64> = (0..12).map(|k| slope(k) - 2.0 * 0.5).collect();
         let mean = left.iter().sum::<f64>() / 12.0;
         let variance = left.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / 12.0;
-        // Var(y) = B S B + R with B S B = 4 * 0.04, or three hundredths of that for R where there is nothing else.
+        // Var(y) = B S B + R with B S B = 4 * 0.04; R explains the rest, at least three hundredths of B S B.
         let size = if is_explained { 1.03 * 0.16 } else { variance };
         assert!(is_explained || variance > 1.03 * 0.16);
         let estimate = |k: usize| 0.5 + 2.0 * 0.04 / size * left[k];

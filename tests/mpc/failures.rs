@@ -1,4 +1,4 @@
-//! What the controller commands when something is wrong, and that it comes back by itself.
+//! Commands of the controller under faults, and its recovery without help.
 
 use romc::mpc::{
     Command, Controller, FallbackSettings, Lift, Measurement, MpcSettings, QpSettings, Solver,
@@ -229,7 +229,7 @@ fn without_a_reference_the_posture_measured_first_is_held() {
     assert_eq!(step(0.02, &moved).joint_position_rad, standing[..12]);
 }
 
-/// The largest torque after each of `times_s`, held after a plan whose stages have run out.
+/// The largest torque after each of `times_s`, held after the stages of a plan have run out.
 fn held_torques(times_s: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut bench = Bench::new(unwatched());
     bench.nominal(100);
@@ -255,7 +255,7 @@ fn hold_fades_by_time_and_by_calls_where_the_clock_says_nothing() {
     let fade = |torques: &[f64]| torques[torques.len() - 1] / torques[0];
     let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found}");
     let shifted = (1..5).map(|stage| 0.01 * f64::from(stage));
-    // 100 calls of 1 ms and 10 of 10 ms fade alike; a clock that stands still or runs back, by stages.
+    // 100 calls of 1 ms and 10 of 10 ms fade equally; with a clock that stops or runs back, time is counted in stages.
     let often = held_torques(
         shifted
             .clone()
@@ -272,7 +272,7 @@ fn hold_fades_by_time_and_by_calls_where_the_clock_says_nothing() {
     let back = held_torques(shifted.chain((0..=10).map(|k| 0.06 - 0.001 * f64::from(k))));
     close(fade(&still), (-2.0_f64).exp());
     assert!(fade(&back) < 0.5, "{back:?}");
-    // Without any time the plan's stages run out, too.
+    // Without a time, the plan's stages run out as well.
     let unknown = held_torques([f64::NAN; 20]);
     assert_eq!(unknown.len(), 16);
     close(fade(&unknown), (-3.0_f64).exp());
@@ -291,7 +291,7 @@ fn jump_of_the_measurement_is_disbelieved_for_a_while_and_then_believed() {
     }
     let believed = bench.changed(120, |x, _| x[12] += 5.0);
     assert!(believed.status.has_plan(), "{:?}", believed.status);
-    // And back again, the other way round.
+    // And back again, in the reverse order.
     let mut statuses = Vec::new();
     for step in 0..6 {
         statuses.push(bench.nominal(125 + 5 * step).status);
@@ -350,8 +350,8 @@ fn reference_whose_deviations_overflow_is_a_numerical_failure_until_a_sane_one_c
 
 #[test]
 fn contradicting_constraints_are_infeasible_and_solved_again_when_they_agree() {
-    // Touchdown before schedule: the inputs of the flight, where friction is free, are outside the
-    // cone of the contact, and the rate is too small to bring them into it.
+    // Touchdown before schedule: the inputs of the flight, where friction is free, are outside the contact's friction
+    // cone, and the rate limit is too small to bring them into it.
     for (solver, contradicted) in [
         (Solver::Clarabel, Status::Infeasible),
         (Solver::Riccati, Status::IterationCap),

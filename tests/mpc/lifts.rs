@@ -37,7 +37,7 @@ fn torque_for(forces: [Vector3<f64>; 4]) -> [f64; 12] {
     torque
 }
 
-/// Weight, share of the rear legs and push forwards: three numbers make all torques.
+/// Weight, share of the rear legs and forward push: three numbers determine all torques.
 fn sample_torque(random: &mut Random) -> [f64; 12] {
     let (lift, tilt, push) = (
         30.0 + 8.0 * random.normal(),
@@ -142,7 +142,7 @@ fn cone_violation(torque: &[f64; 12], friction: f64) -> f64 {
     worst
 }
 
-/// The cost of the lift as its documentation states it.
+/// The cost of the lift as documented.
 fn cost(plant: &ControlModel, torque: &[f64; 12], u_lat: &[f64; D], weight: f64) -> f64 {
     let reached = projected(plant, torque);
     let phase = &plant.phases()[0];
@@ -175,7 +175,7 @@ fn consistent_lift_of_a_slipping_push_stays_in_the_cones_and_nothing_near_is_bet
     );
     let best = cost(&plant, &found, &wanted, settings.lift_prior_weight);
     let mut tried = 0;
-    // All four cones are active: neighbours are tried on their inner side.
+    // All four cones are active: neighbours are tried on the inner side.
     let inward = torque_for([Vector3::new(0.0, 0.0, 10.0); 4]);
     for _ in 0..20_000 {
         let size = 10f64.powf(2.0 * random.signed() - 2.0);
@@ -274,7 +274,7 @@ fn consistent_lift_keeps_the_command_with_its_losses_within_the_limits() {
         (0.999..=1.0 + 1e-12).contains(&largest),
         "{largest} of a limit"
     );
-    // What the joints take is missing at the links; hips and thighs are those at their limits.
+    // Joint losses reduce the torques at the links; hips and thighs are the joints at their limits.
     for joint in (0..12).filter(|joint| joint % 3 != 2) {
         assert!(
             (at_rest[joint].abs() - limits[joint]).abs() < 0.01,

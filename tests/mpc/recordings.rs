@@ -162,7 +162,7 @@ fn hardware_jump_gets_torques_within_the_limits_with_either_lift() {
     }
 }
 
-/// Every recording of a Go1 that comes with romc, and the hardware jump where there is one.
+/// Every recording of a Go1 that is shipped with romc, and the hardware jump if present.
 fn go1_recordings() -> Vec<Recording> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folders = ["go1", "go1-noisy"].map(|set| root.join("examples/recordings").join(set));
@@ -244,7 +244,7 @@ fn metrics_along(jump: &str, step_s: f64) -> (ControlMetrics, Option<f64>) {
 
 #[test]
 fn replay_moves_on_at_the_speed_of_the_push_and_feedback_does_not() {
-    // after k of 100 samples of 2 ms the body is 0.1 m/s k 2 ms away, whatever the control step
+    // after k of 100 samples of 2 ms the body has moved 0.1 m/s k 2 ms, for every control step
     let mean_square = (1..=100).map(|k| f64::from(k * k)).sum::<f64>() / 100.0;
     for step_s in [0.005, 0.02] {
         let (metrics, without_push) = metrics_along("go1/test_01", step_s);

@@ -1,4 +1,4 @@
-//! Legs in flight: turned against an error of pitch, under a share of the torques.
+//! Legs in flight: turned against a pitch error, limited by a share of the torques.
 
 use crate::synthetic::unwatched;
 use std::path::PathBuf;
@@ -77,7 +77,7 @@ fn feet(command: &Command, pitch_rad: f64) -> Vec<Vector3<f64>> {
 fn feet_in_flight_are_where_the_reference_has_them_from_the_ground() {
     let segment = jump();
     let sample = in_flight(&segment);
-    // The posture is that of 0.9 of a stage later, whose pitch is the reference's there.
+    // The posture is the reference's 0.9 of a stage later, with its pitch there.
     let later = (sample as f64 + 4.5) as usize;
     let drift = segment.x[(16, sample)] - segment.x[(16, later)];
     let right = command(0.0, sample, 0.0);
@@ -92,7 +92,7 @@ fn feet_in_flight_are_where_the_reference_has_them_from_the_ground() {
             pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).norm()))
         };
         let (without, with) = (off(feet(&stiff, total)), off(feet(&turned, total)));
-        // First order: what is left grows with the square of the angle.
+        // First order: the remainder grows with the square of the angle.
         assert!(with < 0.5 * total * total + 1e-4, "{error}: {with}");
         assert!(without > 0.2 * total.abs(), "{error}: {without}");
     }

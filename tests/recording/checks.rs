@@ -40,7 +40,7 @@ mod implausible {
         })
     }
 
-    /// What is found in the smooth motion after a change.
+    /// Findings in the smooth motion after a change.
     fn found_after(n: usize, change: impl FnOnce(&mut Segment)) -> Vec<Finding> {
         let mut recording = smooth(n);
         change(&mut recording.segments[0]);
@@ -164,7 +164,7 @@ mod implausible {
         recording.segments[0].torque_nm[(7, 32)] = 1e5;
         let found = findings(&recording);
         let (rest, dropped) = without(&recording, &found).unwrap();
-        // Sample 31 stands alone between the two and goes as well.
+        // Sample 31 is isolated between the two and is dropped as well.
         assert_eq!(dropped, 3);
         let lengths: Vec<_> = rest.segments.iter().map(Segment::len).collect();
         assert_eq!(lengths, [30, 67]);
@@ -185,7 +185,7 @@ mod implausible {
     #[test]
     fn check_sensor_noise_is_accepted_but_a_spike_in_it_is_found() {
         let mut recording = smooth(400);
-        // A fixed sequence without pattern stands for noise of 0.5 mm.
+        // A fixed sequence without pattern, as noise of 0.5 mm.
         let mut state = 1_u64;
         for value in recording.segments[0].x.iter_mut() {
             state = state
@@ -211,7 +211,7 @@ mod conditioning {
 
     use super::*;
 
-    /// A robot that stands still, with noise on the accelerations, and one torque that no motor gives.
+    /// A robot at rest, with noise on the accelerations, and one torque beyond every motor's limit.
     fn recording() -> Recording {
         let n = 200;
         let mut torque_nm = DMatrix::from_element(12, n, 1.0);
@@ -230,7 +230,7 @@ mod conditioning {
         })
     }
 
-    /// [`condition`] of a recording with all that is found in it.
+    /// [`condition`] of a recording with all its findings.
     fn conditioned(
         recording: &Recording,
         options: &ConditionOptions,
@@ -363,7 +363,7 @@ mod phases {
                 "10x1111 2x0111 30x0011 1x0010 20x0000",
                 &["0 Launch 0..12", "1 Launch 12..43", "2 Flight 43..63"],
             ),
-            // a trot: feet that leave or land late belong to their pair or, briefly, to the span before
+            // a trot: feet that leave or land late belong to their pair or, briefly, to the previous span
             (
                 PhaseRule::trot().with_min_samples(3),
                 "6x1111 8x1001 1x0001 5x0000 2x0111 7x0110 4x0111 9x1001",

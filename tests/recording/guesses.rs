@@ -1,4 +1,5 @@
-//! Guessed maps where names do not decide: signs, units, thresholds and topics by what the robot can have done.
+//! Guessed maps if names are ambiguous: signs, units, thresholds and topics are guessed from the possible motions of
+//! the robot.
 
 use std::f64::consts::TAU;
 use std::fs;
@@ -28,13 +29,13 @@ const LEGS: [&str; 4] = ["FR", "FL", "RR", "RL"];
 const KINDS: [&str; 3] = ["hip", "thigh", "calf"];
 const DEGREE: f64 = TAU / 360.0;
 
-/// How a log writes what the robot did.
+/// A log's conventions for the robot's motion.
 #[derive(Debug, Clone, Copy)]
 struct Convention {
-    /// Directions of the joints' axes; those of the hips on the left may be mirrored.
+    /// Directions of the joints' axes; the left hips may be mirrored.
     axes: [f64; 3],
     mirrored: bool,
-    /// -1 for the torques of the links on the motors.
+    /// -1 for torques from the links on the motors.
     action: f64,
     angle: f64,
     speed: Option<f64>,
@@ -43,9 +44,9 @@ struct Convention {
     /// 0: wxyz by number, 1: xyzw by number, 2: by name, 3: angles in rad, 4: angles in degrees.
     attitude: usize,
     gyro: Option<f64>,
-    /// Forces at the feet: in the air, and on the ground on top of that; none for flags.
+    /// Forces at the feet: in the air, and the increase on the ground; none for flags.
     force: Option<(f64, f64)>,
-    /// What each sensor shows in the air more than that of the foot before it.
+    /// Offset of each sensor in the air relative to that of the previous foot.
     zero: f64,
     milliseconds: bool,
 }
@@ -94,7 +95,7 @@ impl Convention {
         }
     }
 
-    /// The log, its columns in any order.
+    /// Writes the log, with columns in random order.
     fn write(&self, path: &Path, s: &Segment, dice: &mut Dice) {
         let mut log = Log::default();
         let row = |m: &DMatrix<f64>, i: usize, factor: f64| -> Vec<f64> {
@@ -218,8 +219,8 @@ fn signs_and_units_of_any_convention_are_found() {
     );
 }
 
-/// MIT's Mini Cheetah and others have their hips' and knees' axes along -y: knees are positive, and their torques
-/// negative while it stands.
+/// MIT's Mini Cheetah and others have hip and knee axes along -y: knee angles are positive, and knee torques negative
+/// in stance.
 #[test]
 fn axes_to_the_other_side_are_turned_with_their_torques() {
     let folder = tempfile::tempdir().unwrap();
@@ -239,7 +240,7 @@ fn axes_to_the_other_side_are_turned_with_their_torques() {
     }
 }
 
-/// Parts of jumps, as a loss of power leaves them, in romc's own MCAP files: a second of a stance says little of signs.
+/// Parts of jumps, as after a loss of power, in romc's own MCAP files: one second of a stance determines signs poorly.
 #[test]
 fn short_parts_of_jumps_keep_their_signs() {
     let folder = tempfile::tempdir().unwrap();
@@ -318,7 +319,7 @@ fn forces_show_contact_whatever_their_sign_zeros_and_flights() {
     }
 }
 
-/// In flight nothing stands, so that the joints' limits show the unit.
+/// In flight no foot is on the ground, so the joints' limits determine the unit.
 #[test]
 fn units_of_joints_in_flight_are_those_of_their_limits() {
     let folder = tempfile::tempdir().unwrap();
@@ -425,7 +426,7 @@ fn columns_of_one_family_are_taken_and_the_others_named() {
             guess.text
         );
     }
-    // Plain names before those with further words.
+    // Plain names before those with additional words.
     let mut plain = Log::default();
     let names = log.names.iter().map(|name| name.replace("_real", ""));
     (plain.names, plain.columns) = (names.collect(), log.columns.clone());
@@ -452,7 +453,7 @@ fn columns_of_one_family_are_taken_and_the_others_named() {
     }
 }
 
-/// A log of these columns with others that say nothing, and the guess of its map.
+/// A log of these columns and of others without information, and the guess of its map.
 fn guess_of_names(names: &[String]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
@@ -466,8 +467,8 @@ fn guess_of_names(names: &[String]) -> String {
     guess(&path, go1).unwrap().text
 }
 
-/// `{leg}` with the words for legs behind a bar, `{joint}` with those for joints, `{axis}` for axes or angles; `{n}` for
-/// numbers from the one behind the bar on.
+/// `{leg}` stands for the words for legs after a bar, `{joint}` for those for joints, `{axis}` for axes or angles;
+/// `{n}` for numbers from the one after the bar.
 fn names_of(pattern: &str, count: usize) -> Vec<String> {
     let (pattern, words) = pattern.split_once(" | ").unwrap();
     let words: Vec<&str> = words.split(' ').collect();

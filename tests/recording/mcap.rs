@@ -1,4 +1,4 @@
-//! MCAP logs as recorders leave them: names in any order, damaged, cut, split, out of order, packed without end.
+//! MCAP logs as recorders write them: names in any order, damaged, cut, split, out of order, deeply compressed.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,7 +13,7 @@ use romc::robot::JOINT_NAMES;
 use super::foreign::{difference, gyro, jump, quaternion};
 use super::tools::is_thorough;
 
-/// The topic of what joints do, by ROS 2's custom.
+/// The usual topic of joint states in ROS 2.
 const JOINT_TOPIC: &str = "/joint_states";
 
 /// A message of a topic with its time of recording.
@@ -95,7 +95,7 @@ impl Bag {
     }
 }
 
-/// A message in CDR, little endian; or packed, as ROS 1 has it.
+/// A message in CDR, little endian; or packed, as in ROS 1.
 #[derive(Default)]
 struct Cdr(Vec<u8>, bool);
 
@@ -128,7 +128,7 @@ impl Cdr {
     }
 }
 
-/// A joint state, as `sensor_msgs/JointState` has it.
+/// A joint state as in `sensor_msgs/JointState`.
 fn joint_state(time_ns: u64, names: &[String], lists: [&[f64]; 3]) -> Vec<u8> {
     joint_state_in(Cdr::default(), time_ns, names, lists)
 }
@@ -153,7 +153,7 @@ const LOW_STATE: &str = "uint8 KIND=3 # a constant\nIMUState imu_state\nMotorSta
      float32 ddq\nfloat32 tau_est\nfloat32 q_raw\nfloat32 dq_raw\nfloat32 ddq_raw\nint8 temperature\n\
      uint32 lost\nuint32[2] reserve\n";
 
-/// A low-level state of Unitree's, as `unitree_go/LowState` has it in its main parts.
+/// The main parts of Unitree's low-level state, as in `unitree_go/LowState`.
 fn low_state(s: &Segment, sample: usize) -> Vec<u8> {
     let mut out = Cdr::default();
     quaternion(s, sample)
@@ -214,7 +214,7 @@ impl Dice {
     }
 }
 
-/// The messages with joint states written anew: `state` has sample, names and values of the twelve joints.
+/// The messages with new joint states: `state` gets sample, names and values of the twelve joints.
 fn with_joints(
     bag: &Bag,
     segment: &Segment,
@@ -260,7 +260,7 @@ fn refused(path: &Path) -> String {
         .to_string()
 }
 
-/// The jump to the last bit that its messages have, and the notes of reading it.
+/// Checks that a file gives the jump to the last bit of its messages; returns the notes of reading it.
 fn is_the_jump(path: &Path, jump: &Segment) -> String {
     let reading = read(path).unwrap_or_else(|error| panic!("{error}"));
     let (state, velocity, contact) = difference(&reading.recording, jump);
@@ -271,7 +271,7 @@ fn is_the_jump(path: &Path, jump: &Segment) -> String {
     reading.notes.join("\n")
 }
 
-/// Names of joints as programs write them, by leg and joint in romc's order.
+/// Names of joints as in other programs, by leg and joint in romc's order.
 const STYLES: [([&str; 4], [&str; 3], &str); 5] = [
     (["fr", "fl", "rr", "rl"], ["hx", "hy", "kn"], "."),
     (
@@ -304,7 +304,7 @@ fn joints_go_by_the_names_of_each_message() {
         let mut dice = Dice(seed);
         let (legs, kinds, cut) = STYLES[dice.below(STYLES.len())];
         let is_own = legs[0] == "fr" && legs[2] == "rr";
-        // Other joints of the robot are no leg's.
+        // Other joints of the robot belong to no leg.
         let wheels = dice.below(3);
         let messages = with_joints(&bag, &jump, |_, time_ns, mut joints| {
             for (i, (name, _)) in joints.iter_mut().enumerate() {
@@ -444,7 +444,7 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
         notes.contains("60 of 120 messages have other names"),
         "{notes}"
     );
-    // Messages with further joints, or without values that nothing needs, are of the same robot.
+    // Messages with additional joints, or without values that are not needed, are of the same robot.
     for further in [0, 20, 59] {
         let messages = with_joints(&bag, &jump, |sample, time_ns, mut joints| {
             if sample >= further {
@@ -458,7 +458,7 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
             "{notes}"
         );
     }
-    // Two topics of the same names and rate with other numbers.
+    // Two topics with the same names and rate and other numbers.
     let mut two = Bag::of(&jump);
     let schema = two.schemas[JOINT_TOPIC].clone();
     two.schemas.insert("/a/joint_states".to_owned(), schema);
@@ -518,7 +518,7 @@ fn joints_that_are_not_the_robots_are_refused_or_left_out() {
             .collect();
         is_the_jump(&bag.file(folder.path(), &messages), &jump);
     }
-    // Lists that do not go with the names.
+    // Lists that do not match the names.
     let messages = with_joints(&bag, &jump, |_, time_ns, joints| {
         let names: Vec<String> = joints.iter().map(|(name, _)| name.clone()).collect();
         vec![joint_state(time_ns, &names[1..], [&[0.0; 12], &[], &[]])]
@@ -554,12 +554,12 @@ fn changed_bytes_are_refused_with_chunk_and_place() {
         error.contains("chunk 2 at byte") && error.contains("checksum"),
         "{error}"
     );
-    // Outside of chunks: the index behind the data.
+    // Outside of chunks: the index after the data.
     let error = changed(right.len() - 60, 1);
     assert!(error.contains("at byte"), "{error}");
 }
 
-/// A chunk's checksum of zero is one that is absent.
+/// A chunk checksum of zero means that it is absent.
 #[test]
 fn absent_checksums_are_not_compared() {
     let folder = tempfile::tempdir().unwrap();
@@ -646,7 +646,7 @@ fn files_that_end_early_give_their_whole_chunks() {
             fs::write(&path, [&right[..cut], &vec![0; zeros]].concat()).unwrap();
             let result = read(&path);
             if zeros > 0 && result.is_err() {
-                continue; // zeros that complete a record make a damaged one
+                continue; // zeros that complete a record make it damaged
             }
             let reading = result.unwrap_or_else(|error| panic!("{cut}: {error}"));
             let notes = reading.notes.join("\n");
@@ -710,7 +710,7 @@ fn folders_of_bags_are_one_recording() {
     let error = refused(&own);
     assert!(error.contains("bag_3.mcap: no such file"), "{error}");
     fs::rename(folder.path().join("elsewhere"), own.join("bag_3.mcap")).unwrap();
-    // A last file that a loss of power left empty, and one that the list does not have.
+    // An empty last file after a loss of power, and one that is missing in the list.
     for bytes in [&[][..], &[0; 4096], b"\x89MC"] {
         fs::write(own.join("bag_11.mcap"), bytes).unwrap();
         let notes = is_the_jump(&own, &jump);
@@ -737,7 +737,7 @@ fn folders_of_bags_are_one_recording() {
     }
 }
 
-/// A zstd frame of so many zeros, in blocks that repeat one byte: 32 kB for 1 GiB.
+/// A zstd frame of this many zeros, in blocks that repeat one byte: 32 kB for 1 GiB.
 fn zeros_in_zstd(count: usize) -> Vec<u8> {
     const BLOCK: usize = 1 << 17;
     let mut out = b"\x28\xb5\x2f\xfd\x00\x58".to_vec(); // a window of 2 MiB
@@ -777,7 +777,7 @@ fn small_files_that_unpack_to_gigabytes_are_refused_at_once() {
         assert!(error.contains("expected at most"), "{error}");
         assert!(start.elapsed().as_secs() < 2, "{:?}", start.elapsed());
     }
-    // The same of gzip: a text that unpacks to more than two hundred times its size.
+    // The same for gzip: a text that unpacks to more than two hundred times its size.
     let path = folder.path().join("bomb.csv.gz");
     let line = format!("{}\n", "1".repeat(60_000));
     let best = flate2::Compression::best();
@@ -853,7 +853,7 @@ fn logs_of_other_formats_are_named_with_the_line_that_converts_them() {
             .to_string();
         assert!(error.contains(words), "{name}: {error}");
     }
-    // An MCAP log under another name is one all the same.
+    // An MCAP log with another file name is still recognised.
     let jump = jump();
     let path = folder.path().join("jump.bag");
     recording::write_mcap(&path, &jump, None, Overwrite::Replace).unwrap();
@@ -931,7 +931,7 @@ fn whole_numbers_of_messages_have_their_signs() {
          [body.orientation]\ntopic = \"/odom\"\norder = \"xyzw\"\ncolumns = [\"pose.pose.orientation.x\", \
          \"pose.pose.orientation.y\", \"pose.pose.orientation.z\", \"pose.pose.orientation.w\"]\n\
          [feet]\ntopic = \"/foot_contacts\"\ncolumns = \"{leg}\"\nthreshold = LEVEL\n";
-    // Below the least of the positive numbers, and between the negative ones of one byte and of more.
+    // Below the smallest positive number, and between negative numbers of one byte and of more.
     for (level, expected) in [
         ("0.5", jump.feet.clone()),
         (

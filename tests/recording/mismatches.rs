@@ -1,4 +1,4 @@
-//! Wrong recordings are noticed, right ones are not.
+//! Wrong recordings are reported, right ones are not.
 
 use nalgebra::DMatrix;
 use romc::recording::mismatch::{mismatches, notes};
@@ -14,7 +14,7 @@ type Spoil = fn(&mut Segment);
 
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// Factors on rows of position, velocity and acceleration.
+/// Multiplies rows of position, velocity and acceleration by a factor.
 fn scale(segment: &mut Segment, rows: impl IntoIterator<Item = usize>, factor: f64) {
     for row in rows {
         for matrix in [&mut segment.x, &mut segment.dx, &mut segment.ddx] {
@@ -43,7 +43,7 @@ fn joints(kind: usize) -> impl Iterator<Item = usize> {
     (0..12).filter(move |joint| joint % 3 == kind)
 }
 
-/// The wrong recordings of one right one.
+/// Ways to make a right recording wrong.
 const SPOILED: [(&str, Spoil); 30] = [
     ("joint and body angles in degrees", |s| {
         scale(s, (0..12).chain(15..18), DEGREES);
@@ -134,7 +134,7 @@ const RIGHT: [(&str, &str, usize); 4] = [
     ("go2-asynchronous", "go2", 10),
 ];
 
-/// The same of walks.
+/// The same for walks.
 const WALKS: [(&str, &str, usize); 3] = [
     ("go1-trot", "go1", 18),
     ("go1-trot-other", "go1", 6),
@@ -182,7 +182,7 @@ fn wrong_readings_of_every_jump_are_noticed() {
         }
     }
     println!("{} of {made} missed:\n{}", missed.len(), missed.join("\n"));
-    // Two jumps whose feet leave the ground almost at once say too little of which column is whose.
+    // Two jumps whose feet leave the ground almost at once do not determine which column belongs to which foot.
     let of_feet = |missed: &String| missed.starts_with("columns of the feet");
     assert!(missed.len() <= 2 && missed.iter().all(of_feet));
 }
@@ -201,13 +201,13 @@ fn real_jumps_have_no_mismatch() {
     for (path, robot) in jumps {
         let jump = recording::read(&path).unwrap();
         let mut found = mismatches(&jump, romc::robot_file::by_name(robot).unwrap());
-        // Their torques are not all that moved them.
+        // Their torques do not include all forces that moved them.
         found.retain(|found| found.kind != "carried");
         assert!(found.is_empty(), "{}: {found:?}", path.display());
     }
 }
 
-/// The one note on a recording that is spoiled so.
+/// The only note on a recording spoiled in this way.
 fn note_of(spoil: impl Fn(&mut Segment)) -> String {
     let right = recording::read(&jumps_in("go1", 20)[0]).unwrap();
     let mut wrong = right;
@@ -234,7 +234,7 @@ fn rates_in_other_units_are_named_with_their_factor() {
 
 #[test]
 fn a_robot_that_lies_on_the_ground_is_no_jump() {
-    // It topples over after it has landed.
+    // It topples over after the landing.
     let found = note_of(|s| {
         let n = s.len();
         for i in n - 150..n {
@@ -266,7 +266,7 @@ fn a_quaternion_in_another_order_is_named() {
             }
         })
     };
-    // A log of xyzw read as wxyz, and the other way round.
+    // A log in xyzw read as wxyz, and the reverse.
     for (order, words) in [
         ([1, 2, 3, 0], "xyzw instead of wxyz"),
         ([3, 0, 1, 2], "wxyz instead of xyzw"),

@@ -1,4 +1,4 @@
-//! No bytes make the reader panic, and what it accepts is finite.
+//! The reader never panics, and accepted recordings are finite.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -10,7 +10,7 @@ use romc::robot::InputRule;
 
 use crate::sheet::{Sheet, gzip};
 
-/// Reads, and if that succeeds runs everything that follows.
+/// Reads and, if successful, runs everything that follows.
 fn exercise(bytes: &[u8]) {
     let Ok(recording) = read_from_bytes("random.csv", bytes) else {
         return;
@@ -44,7 +44,7 @@ fn require_finite(recording: &Recording) {
     }
 }
 
-/// Where and how to damage the text.
+/// Place and kind of the damage to the text.
 #[derive(Debug, Clone)]
 enum Damage {
     Replace(usize, u8),

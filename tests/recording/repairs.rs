@@ -1,4 +1,4 @@
-//! Faults of loggers and spreadsheets that `--clock repaired` mends, each made on purpose.
+//! Faults of loggers and spreadsheets that `--clock repaired` corrects, each made on purpose.
 
 use std::path::Path;
 
@@ -34,7 +34,7 @@ fn error(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     (a - b).amax()
 }
 
-/// Legs that swing in the air for 0.2 s, with knees on both sides of -1 rad and rates on both sides of 1 rad/s.
+/// Legs that swing in the air for 0.2 s; knee angles cross -1 rad and rates cross 1 rad/s.
 fn swing() -> Segment {
     let mut segment = Segment::still("swing", (0..101).map(|i| 0.002 * f64::from(i)).collect());
     segment.feet.fill([false; 4]);
@@ -56,7 +56,7 @@ fn swing() -> Segment {
     segment
 }
 
-/// A number as a spreadsheet reads it that separates thousands by points, divided by 1000.
+/// A number divided by 1000, as read by a spreadsheet with points as thousands separators.
 fn without_point(value: f64) -> f64 {
     let text = format!("{:.5e}", value.abs());
     let (digits, exponent) = text.split_once('e').unwrap();
@@ -264,7 +264,7 @@ fn sound_jumps_stay_as_they_are() {
     assert_eq!((&found.x, &found.dx), (&right.x, &right.dx));
 }
 
-/// Rates that are a tenth too small all over would say that the clock runs slow; the fall says that it does not.
+/// If all rates are a tenth too small, the clock seems to run slow; the free fall proves that it does not.
 #[test]
 fn clock_under_which_bodies_fall_as_they_do_stays() {
     let mut slow = jump();
@@ -281,7 +281,7 @@ fn stance_that_torques_do_not_carry_is_named_with_its_times() {
         found.into_iter().find(|found| found.kind == "carried")
     };
     assert!(carried(&segment).is_none());
-    segment.torque_nm.columns_mut(200, 60).fill(0.0); // from 0.4 s on, up to the thrust
+    segment.torque_nm.columns_mut(200, 60).fill(0.0); // from 0.4 s to the thrust
     let found = carried(&segment).expect("a stance without torques");
     assert!(found.words.contains("0.39 to 0.5"), "{}", found.words);
 }

@@ -1,11 +1,11 @@
-//! What is done with samples after they are read: inputs, preprocessing, smoothing, writing, notes.
+//! Operations on samples after reading: inputs, preprocessing, smoothing, writing, notes.
 
 use nalgebra::DMatrix;
 use romc::files::Overwrite;
 use romc::recording::{Recording, RecordingFault, Segment};
 use romc::robot::{JOINT_DIM, STATE_DIM};
 
-/// A segment whose entries all differ, of a robot that stands.
+/// A segment of a standing robot; all its entries differ.
 pub fn sample_segment(n: usize) -> Segment {
     let fill = |rows: usize, offset: f64| {
         DMatrix::from_fn(rows, n, |i, j| offset + 0.01 * i as f64 + 0.001 * j as f64)
@@ -72,7 +72,7 @@ mod inputs {
             let rule = with_losses(frame);
             let u = segment.input(&rule).unwrap();
             let (dq, ddq) = (segment.dx[(4, 15)], segment.ddx[(4, 15)]);
-            // Accelerations rise linearly here, so that their average is their value.
+            // Accelerations rise linearly here, so their average equals their value.
             let expected = segment.torque_nm[(4, 15)] - 0.6 * dq - 0.2 - 0.01 * ddq;
             assert!((u[(4, 15)] - expected).abs() < 1e-12);
             let net = std::array::from_fn(|i| u[(i, 15)]);
@@ -91,7 +91,7 @@ mod inputs {
             let noise = if j % 2 == 0 { 11.0 } else { -11.0 };
             noise + if j < 30 { 0.0 } else { 500.0 }
         });
-        // Of joints that lose an inertia of one times their acceleration.
+        // Joints with a rotor inertia of one.
         let rotors = Actuators::of_leg([0.0; 3], [0.0; 3], [1.0; 3]);
         let robot = published().robot();
         let smooth = segment.losses(&InputRule::new(robot, Some(rotors), WrenchFrame::World));

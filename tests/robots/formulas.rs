@@ -1,4 +1,4 @@
-//! Joints, legs, forces and inputs of robots: formulas against differences, virtual work and a physics engine.
+//! Joints, legs, forces and inputs of robots: formulas compared with differences, virtual work and a physics engine.
 
 use nalgebra::{Matrix3, Rotation3, SVector, Unit, Vector3, Vector6};
 use romc::robot::LEG_JOINT_DIM;
@@ -54,7 +54,7 @@ fn losses_oppose_the_motion_and_are_dry_friction_alone_when_slow() {
         let slow = world(0.5, &still, down)[3];
         assert!((slow - 0.5).abs() < 1e-8, "{slow}");
     }
-    // In flight the rotors belong to the legs.
+    // In flight the rotors are part of the legs.
     assert_eq!(ground(-2.0, &fast, true), world(-2.0, &fast, true));
     assert_eq!(ground(-2.0, &fast, false), world(-2.0, &still, false));
 }
@@ -62,8 +62,8 @@ fn losses_oppose_the_motion_and_are_dry_friction_alone_when_slow() {
 /// A leg of point masses: in the plane of the leg at the hip, on the thigh and on the calf.
 const POINTS: [(f64, f64); 3] = [(0.5, 0.0), (0.9, 0.11), (0.3, 0.15)];
 
-/// Torques of a leg by d'Alembert's principle: of each mass its weight and acceleration, times how its position moves with
-/// each joint. Positions along a motion are differentiated by differences.
+/// Torques of a leg by d'Alembert's principle: weight and inertial force of each mass, times the derivative of its
+/// position by each joint. Positions along a motion are differentiated by differences.
 fn torques_of_points(
     robot: &Robot,
     leg: Leg,
@@ -173,7 +173,7 @@ fn feet_that_would_pull_add_nothing_by_the_rule_of_the_ground() {
     for (leg, down) in Leg::ALL.into_iter().zip(&mut pulling) {
         *down = world.wrench(&x, &tau, alone(leg)).unwrap()[2] < 0.0;
     }
-    // A leg that pushes, turned into one that pulls by its opposite torques.
+    // Opposite torques turn a pushing leg into a pulling one.
     let pushing = Leg::ALL
         .into_iter()
         .find(|leg| !pulling[leg.index()])
@@ -188,11 +188,11 @@ fn feet_that_would_pull_add_nothing_by_the_rule_of_the_ground() {
     let all = world.wrench(&x, &tau, [true; 4]).unwrap();
     assert_eq!(world.input_wrench(&x, &tau, [true; 4]).unwrap(), all);
     assert!((all - expected).norm() > 1.0);
-    // What a change of torques does is linear, whichever feet push.
+    // Changes of torques have a linear effect, whichever feet push.
     assert_eq!(ground.wrench(&x, &tau, [true; 4]).unwrap(), all);
 }
 
-/// A leg of the usual shape, with its hip to one side and its foot before the calf.
+/// A leg of the usual shape, with its hip to one side and its foot in front of the calf.
 fn usual(hip_m: f64, forward_m: f64) -> LegGeometry {
     let [x, y] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     let links = [
@@ -266,7 +266,7 @@ fn foot_and_jacobian_are_those_of_turns_about_one_axis_after_the_other() {
 fn damping_begins_where_the_exact_inverse_ends() {
     for leg in legs() {
         let exact = |q: &[f64; 3]| -leg.foot_jacobian(q).transpose().try_inverse().unwrap();
-        // From bent to stretched: the first damped posture is still almost undamped.
+        // From bent to stretched: the first damped posture is almost undamped.
         let mut last = None;
         for k in 0..4000 {
             let q = [
@@ -448,7 +448,7 @@ fn damped_force_map_is_the_exact_one_away_from_singularities() {
 
 #[test]
 fn damped_force_map_is_continuous_and_bounded_through_both_singularities() {
-    // Down to a stretched knee, and a folded leg that swings its foot past the hip's height.
+    // To a stretched knee, and a folded leg that swings its foot past the hip's height.
     let stretch = |t: f64| [0.1, 0.5, -0.6 * (1.0 - t)];
     let swing = |t: f64| [0.1, 1.6 + 1.6 * t, -2.6];
     let paths: [&dyn Fn(f64) -> [f64; 3]; 2] = [&stretch, &swing];
@@ -460,7 +460,7 @@ fn damped_force_map_is_continuous_and_bounded_through_both_singularities() {
             let q = path(f64::from(k) / 4000.0);
             let map = go1().damped_force_map(Leg::RearLeft, &q).unwrap();
             assert!((map - before).norm() < 0.2, "{q:?}: {map} {before}");
-            // 30 N m of each joint: some 1 kN along a stretched leg, not more anywhere.
+            // 30 N m of each joint: about 1 kN along a stretched leg, and no more anywhere.
             assert!((map * Vector3::repeat(30.0)).norm() < 1500.0, "{q:?}");
             nearest = nearest.min(geometry.spans(&q)[singular]);
             before = map;
@@ -579,7 +579,7 @@ fn world_and_body_force_agree_for_a_level_robot_that_looks_along_x() {
     let body = InputRule::published(romc::robot_file::by_name("go1").unwrap());
     let body = body.wrench(&x, &torques(), [true; 4]).unwrap();
     assert!((world - body).rows(0, 3).norm() < 1e-12 * body.norm());
-    // The arms differ: about the body's origin a front foot that pushes up pitches it back.
+    // The lever arms differ: about the body's origin a front foot that pushes up pitches the body back.
     assert!((world - body).rows(3, 3).norm() > 1.0);
 }
 

@@ -1,4 +1,5 @@
-//! URDFs made from numbers, and the kinematics of these numbers computed apart from romc: one transform for each joint.
+//! URDFs made from numbers, and the kinematics of these numbers computed independently of romc: one transform per
+//! joint.
 
 use std::collections::BTreeMap;
 
@@ -18,14 +19,14 @@ pub struct Joint {
     pub inside: String,
 }
 
-/// A robot as its URDF will say it: one link or joint per line, links first.
+/// A robot in the form of its URDF: one link or joint per line, links first.
 #[derive(Clone)]
 pub struct Made {
     pub links: Vec<(String, Option<f64>)>,
     pub joints: Vec<Joint>,
 }
 
-/// A joint that holds a link.
+/// A joint that fixes a link.
 pub fn fixed(name: &str, parent: &str, child: &str, xyz: [f64; 3], rpy: [f64; 3]) -> Joint {
     let [name, parent, child] = [name, parent, child].map(str::to_owned);
     let (kind, inside) = ("fixed".to_owned(), String::new());
@@ -87,7 +88,7 @@ impl Made {
         made
     }
 
-    /// The same below a chain of massless links, each on a joint of a kind.
+    /// The same robot below a chain of massless links, each on a joint of the given kind.
     pub fn below(mut self, above: &[(&str, &str, [f64; 3], [f64; 3])]) -> Self {
         let parents = above.iter().map(|(link, ..)| *link);
         let children = parents.clone().skip(1).chain(["trunk"]).collect::<Vec<_>>();
@@ -141,7 +142,7 @@ impl Made {
         text + "</robot>\n"
     }
 
-    /// Links from one that has no joint above it to `link`, with the joint above each.
+    /// Links from the root to `link`, each with the joint above it.
     pub fn path<'a>(&'a self, link: &'a str) -> Vec<(&'a str, Option<&'a Joint>)> {
         let mut path = Vec::new();
         let mut at = Some(link);
@@ -154,7 +155,7 @@ impl Made {
         path
     }
 
-    /// The frame of a link in that of one above it, at angles of joints by name.
+    /// The frame of a link relative to one above it, at joint angles by name.
     pub fn frame(&self, above: &str, link: &str, angles: &BTreeMap<&str, f64>) -> Isometry3<f64> {
         let path = self
             .path(link)

@@ -1,4 +1,4 @@
-//! What is read of URDFs: frames and masses of their trees, faults with element and line, numbers that cannot be true.
+//! Reading of URDFs: frames and masses of their trees, faults with element and line, impossible numbers.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ fn read(text: &str) -> RobotReading {
     from_text("t.urdf", text, &RobotOptions::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The robot of a URDF with feet at these links, if any are named.
+/// The robot of a URDF; the feet are these links, if any are named.
 fn from_urdf(file: &str, text: &str, feet: &[String]) -> Result<&'static Robot, RobotFileError> {
     let options = RobotOptions { feet, name: None };
     from_text(file, text, &options).map(|read| read.robot)
@@ -46,7 +46,7 @@ impl Random {
     }
 }
 
-/// Feet of the robot at random angles are those of the numbers that the file was made of, from `trunk`.
+/// At random angles the robot's feet have the positions given by the file's numbers, relative to `trunk`.
 fn assert_feet(made: &Made, robot: &Robot, trunk: &str, random: &mut Random) {
     for leg in Leg::ALL {
         let names = &robot.joint_names[3 * leg.index()..3 * leg.index() + 3];
@@ -148,7 +148,7 @@ fn body_is_the_trunk_whatever_it_hangs_below() {
 
 #[test]
 fn frame_of_a_trunk_without_mass_is_its_own_and_the_mass_is_named() {
-    // KDL wants no mass in the root: legs are on `base`, the mass is beside it, at its centre.
+    // KDL requires a massless root: the legs are on `base`, and a second link at its centre has the mass.
     let mut made = Made::quadruped();
     made.links[0].1 = None;
     made.links.push(("inertia".to_owned(), Some(5.0)));
@@ -163,20 +163,20 @@ fn frame_of_a_trunk_without_mass_is_its_own_and_the_mass_is_named() {
             "the trunk's mass is in link `inertia`, 0.02 0 -0.01 m from `trunk`, whose"
         )
     );
-    // A massless frame between the trunk and its legs is not the body's.
+    // A massless frame between the trunk and its legs is not the body's frame.
     let mut made = Made::quadruped().below(&[("body", "fixed", [0.1, 0.0, 0.05], [0.0; 3])]);
     made.links[0].1 = None;
     made.links.last_mut().expect("body").1 = Some(5.0);
     let found = read(&made.urdf());
     assert_feet(&made, found.robot, "body", &mut Random(5));
     assert_eq!(found.notes, [""; 0]);
-    // Masses below a world are the robot's, those of the world are not.
+    // Masses below a world link belong to the robot; the mass of the world link does not.
     let mut made = Made::quadruped().below(&[("world", "floating", [0.0; 3], [0.0; 3])]);
     made.links.last_mut().expect("world").1 = Some(1000.0);
     assert!((read(&made.urdf()).robot.mass_kg() - 11.24).abs() < 1e-12);
 }
 
-/// What each change of the usual quadruped is refused with; lines count the robot's first line as 1.
+/// The error for each change of the usual quadruped; lines count the robot's first line as 1.
 #[test]
 fn faults_name_line_element_and_remedy() {
     let edit = |from: &str, to: &str| {
@@ -261,7 +261,7 @@ fn declarations_comments_and_extensions_change_nothing() {
     );
     let read = read(&text);
     assert!(std::ptr::eq(read.robot, plain.robot) && read.notes.is_empty());
-    // Axes of any length.
+    // Axes of arbitrary length.
     let mut scaled = made.clone();
     scaled
         .joints
@@ -347,7 +347,7 @@ fn robots_of_other_joints_and_feet_get_their_own_hints() {
         !error.contains("--feet")
             && error.contains("found 4 limbs on `trunk`: FR_thigh_joint (2 joints)")
     );
-    // Six legs of three joints.
+    // Six legs with three joints each.
     let mut six = Made::quadruped();
     for (from, to) in [("FR", "MR"), ("FL", "ML")] {
         let rename = |name: &str| name.replace(from, to);
@@ -376,7 +376,7 @@ fn robots_of_other_joints_and_feet_get_their_own_hints() {
         error.contains("found 6 limbs") && !error.contains("--feet"),
         "{error}"
     );
-    // Without links of feet, points of the calves.
+    // Without foot links, points on the calves.
     let mut made = Made::quadruped();
     made.links.retain(|(name, _)| !name.ends_with("foot"));
     made.joints.retain(|joint| !joint.name.contains("foot"));
@@ -534,7 +534,7 @@ fn files_in_place_of_robots_are_named() {
     }
 }
 
-/// A deep tree is read without deep recursion.
+/// A deep tree does not need deep recursion.
 #[test]
 fn long_chains_of_fixed_joints_are_read() {
     let mut text = Made::quadruped().urdf().replace("</robot>", "");
@@ -551,7 +551,7 @@ fn long_chains_of_fixed_joints_are_read() {
     assert!((read(&(text + "</robot>")).robot.mass_kg() - 11.24).abs() < 1e-12);
 }
 
-/// Changes of a random robot: each is refused, or read as the numbers say that the file was made of.
+/// Changes of a random robot: each is refused, or read as the numbers in the changed file.
 #[test]
 fn changed_robots_are_read_as_they_are_or_refused() {
     let count = if is_thorough() { 500 } else { 50 };
@@ -634,7 +634,7 @@ fn varied(random: &mut Random) -> Made {
     made.below(&above[..random.below(3)])
 }
 
-/// One thing that goes wrong in files: dropped, doubled, zero, negative, not a number, moved.
+/// One typical mistake in files: dropped, doubled, zero, negative, not a number, moved.
 fn change(made: &mut Made, random: &mut Random) {
     let at = random.below(made.joints.len());
     let link = random.below(made.links.len());

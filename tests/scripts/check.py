@@ -48,7 +48,7 @@ def check_numpy(case, functions):
             else:
                 assert result.shape == (0,)
         assert all(np.array_equal(a, b) for a, b in zip(arguments, before)), "an argument was changed"
-    # All points at once, one a column.
+    # All points at once, one per column.
     if not case["is_step"]:
         stacked = [np.array(rows).T for rows in zip(*case["inputs"])]
         for k, result in enumerate(as_tuple(function(*stacked))):
@@ -81,7 +81,7 @@ def check_casadi(case, functions):
                 compare(case["function"], found, expected)
             else:
                 compare(case["function"], found.ravel(), np.array(outputs[k]))
-    # The stated Jacobian is the one that CasADi derives, except at kinks.
+    # The stated Jacobian equals CasADi's derivative, except at kinks.
     if case["function"].endswith("_jacobian") and case["is_smooth"]:
         dynamics = getattr(functions, case["function"].removesuffix("_jacobian"))
         symbols = [casadi.SX.sym(name, functions.LATENT_DIM) for name in case["names"]]

@@ -1,4 +1,4 @@
-//! Generated modules run by the checkers beside this file, on results of the interpreter.
+//! Generated modules, run by the checkers in this folder and compared with results of the interpreter.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,12 +17,12 @@ use super::tools;
 /// Points at which each function is compared.
 const N_POINTS: usize = 5;
 
-/// Points that are drawn where some have results that are not finite, which JSON cannot hold.
+/// Most points drawn to replace those with non-finite results, which JSON cannot represent.
 const MAX_DRAWN: usize = 4000;
 
-/// Compares the functions that a target of Python, CasADi or MATLAB has for models; without the language says so
-/// and returns, unless everything is asked for. The functions that were left out because no point was found at which
-/// they are finite; `None` without the language.
+/// Compares the functions of a target (Python, CasADi or MATLAB) for models. Without the language it prints a message
+/// and returns `None`, except in thorough runs, which fail. Returns the functions omitted because no point with finite
+/// results was found.
 pub fn check(target: Target, models: Vec<(ReducedModel, Form)>) -> Option<Vec<String>> {
     let models = models.into_iter();
     check_at(
@@ -33,7 +33,7 @@ pub fn check(target: Target, models: Vec<(ReducedModel, Form)>) -> Option<Vec<St
     )
 }
 
-/// The same with points `(z, dz, u_lat)` for the Jacobian of each model, random ones if there are none.
+/// The same with points `(z, dz, u_lat)` for the Jacobian of each model; an empty list stands for random points.
 pub fn check_at(
     target: Target,
     models: Vec<(ReducedModel, Form, Vec<Vec<f64>>)>,
@@ -78,7 +78,7 @@ pub fn check_at(
     }
 }
 
-/// Emits all models, and returns every function with points and expected results, and the names of those that are
+/// Emits all models. Returns every function with points and expected results, and the names of functions that are
 /// finite nowhere.
 fn cases(
     folder: &Path,
@@ -98,7 +98,7 @@ fn cases(
         write_files(&own, &files, Overwrite::Refuse).expect("written");
         let file = own.join(format!("{name}{ending}"));
         let functions = functions_of(&model, N_POINTS, options.form);
-        // Arrays of points are the caller's loop in these languages.
+        // In these languages the caller loops over arrays of points.
         for function in functions.into_iter().filter(|f| !f.is_batch()) {
             let full_name = format!("{name}_{}", function.name);
             let points = match &function.kind {
@@ -115,7 +115,7 @@ fn cases(
     (cases, left_out)
 }
 
-/// A function at points where its results are finite, if there are any.
+/// A function at points with finite results, if there are any.
 fn case(file: &Path, mut function: Function, given: &[Vec<f64>]) -> Option<Value> {
     let (from, to) = (function.input_len(), function.output_len());
     let mut random = Random(31);
@@ -193,7 +193,7 @@ fn run(
     Some(left_out)
 }
 
-/// The Python to use: of the environment that `ROMC_PYTHON` names, or of the path.
+/// The Python to use: from the environment named by `ROMC_PYTHON`, or from the path.
 fn python() -> Command {
     tools::python()
 }

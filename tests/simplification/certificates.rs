@@ -1,4 +1,4 @@
-//! Random models and boxes: no point of a box may be off by more than its certificate says.
+//! Random models and boxes: at no point of a box may the error exceed the certificate's bound.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ use serde_json::json;
 const CASES: u64 = 150;
 const POINTS: usize = 200;
 
-/// Terms of every kind, over two latent coordinates; the last is not defined everywhere.
+/// Terms of every kind, over two latent coordinates; the last term has values at only some of the points.
 const TERMS: &str = "1; z1; z2; dz1; dz2; u1; u2; sin(z1); cos(dz2); sin(z1 + 0.5*dz1); z1*dz2; z2^2; \
     tanh(u1); exp(z2); z1*sin(z2); 1/(3 + z1); u1*u2; cos(z1/3); 2*z1; log(2.5 + dz1)";
 
-/// What simplification makes of a model's equations over a domain without samples.
+/// A model's equations, simplified over a domain without samples.
 fn made_of(model: &ReducedModel, domain: &Domain, tolerance: f64) -> Simplified {
     let tolerance = Tolerance::Absolute(tolerance);
     simplify(&Equations::of(model), domain, None, tolerance).expect("certified")
@@ -31,7 +31,7 @@ fn boxed(model: &ReducedModel, ranges: [(f64, f64); 3]) -> Domain {
     Domain::new(model, vec![Some(ranges)]).expect("a box")
 }
 
-/// The box of a phase as the certificate has it.
+/// The box of a phase in the certificate.
 fn ranges(made: &Simplified, phase: usize) -> Vec<Interval> {
     let domain = &made.certificate.phases[phase].domain;
     let ranges = domain.as_ref().expect("a box").iter();
@@ -137,7 +137,7 @@ fn no_point_of_a_random_box_is_off_by_more_than_certified() {
                         continue;
                     }
                     let error = full - simple;
-                    // some thirty summands of size at most 100 were rounded
+                    // some thirty summands of at most 100 were rounded
                     let slack = 1e-12;
                     let enclosures = [equation.bound, equation.sum_of_bounds];
                     for bound in enclosures {
@@ -240,7 +240,7 @@ fn simplified(sum: &str, ranges: [(f64, f64); 3], tolerance: f64) -> Simplified 
     made_of(&model, &boxed(&model, ranges), tolerance)
 }
 
-/// The equation that is left, as [`single`] takes it.
+/// The remaining equation, in the form of [`single`].
 fn left(model: &ReducedModel) -> String {
     let terms = terms_of(model, 0, 0).into_iter();
     let terms: Vec<String> = terms.map(|(text, xi)| format!("{xi} {text}")).collect();
@@ -316,7 +316,7 @@ fn rounding_spends_the_tolerance_where_it_saves_most_digits() {
     let sum = "3.2358 z1; 2.7137 dz1; 1.4137 u1";
     let made = simplified(sum, [UNIT, (-0.1, 0.1), UNIT], 0.06);
     let equation = &made.certificate.phases[0].equations[0];
-    // 0.0137 for 1.4, 0.0286 for 3 and 0.0042 for 3.24 leave nothing for 3.2, which costs 0.0358
+    // 0.0137 for 1.4, 0.0286 for 3 and 0.0042 for 3.24 use up the tolerance; 3.2 would cost another 0.0358
     assert_eq!(left(&made.model), "3.24 z1; 3 dz1; 1.4 u1");
     assert_eq!(equation.digits.after, 6);
     assert!(equation.bound.magnitude() <= 0.06);

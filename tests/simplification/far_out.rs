@@ -1,5 +1,5 @@
-//! Random sums of rational and exponential terms, simplified, against numbers without overflow: wherever the terms as
-//! learned are accurate, so is the shorter form, in double and in single precision.
+//! Random sums of rational and exponential terms, simplified and compared with numbers without overflow. Wherever the
+//! learned terms are accurate, the shorter form is too, in double and in single precision.
 
 use std::fs;
 use std::process::Command;
@@ -12,7 +12,7 @@ use serde_json::json;
 
 use super::{LATENT_DIM, Random, model_of, parsed, printed, tools};
 
-/// Models in each run, and where everything is asked for.
+/// Models in each run, and in thorough runs.
 const COUNT: usize = 50;
 const COUNT_OF_ALL: usize = 500;
 const POINTS: usize = 60;
@@ -114,7 +114,7 @@ impl Wide {
             self.error * 2_f64.powi(self.exponent.clamp(-1_000, 1_000) as i32),
         );
         if value.abs() > 1e12 || !error.is_finite() {
-            // Far beyond the range of floats: zero, or no number.
+            // Far outside the range of floats: zero, or not a number.
             let mantissa = if value < 0.0 { 1.0 } else { f64::INFINITY };
             return Self::new(mantissa, -1_000_000, 0.0);
         }
@@ -131,10 +131,10 @@ impl Wide {
     }
 }
 
-/// The sum of the terms as learned, and the sum of the sizes of the terms.
+/// The sum of the learned terms, and the sum of their magnitudes.
 fn reference(equations: &Equations<'_>, point: &[f64]) -> (Wide, f64) {
     let pool: &ExprPool = &equations.pool;
-    // What the inputs' last digits change is not asked for.
+    // The effect of the inputs' last digits is allowed.
     let input = |symbol: SymbolId| {
         let exact = Wide::of(point[symbol.index()]);
         Wide::new(exact.mantissa, exact.exponent, f64::EPSILON)
@@ -177,7 +177,7 @@ fn single(program: &Program, point: &[f64]) -> f64 {
     f64::from(ddz[0])
 }
 
-/// A value of a variable: ordinary, where exponentials overflow, or as far out as numbers of a precision reach.
+/// A value of a variable: ordinary, where exponentials overflow, or near the limit of the precision.
 fn far(random: &mut Random, is_single: bool) -> f64 {
     let (largest, edge) = if is_single {
         (36.0, 88.0)
@@ -218,7 +218,7 @@ struct Compared {
     simplified: f64,
 }
 
-/// Random models at random points; those in single precision where `is_single`.
+/// Random models at random points; in single precision if `is_single`.
 fn compared(count: usize, is_single: bool) -> (Vec<Compared>, usize) {
     let mut random = Random(if is_single { 11 } else { 5 });
     let (mut all, mut n_simplified) = (Vec::new(), 0);
@@ -361,7 +361,7 @@ fn jacobians_of_shorter_forms_are_numbers_where_those_of_the_learned_terms_are()
     }
 }
 
-/// The same with many more models, and mpmath as the judge.
+/// The same with many more models, compared with mpmath.
 #[test]
 fn shorter_forms_are_accurate_by_mpmath() {
     if !tools::is_thorough() {

@@ -1,4 +1,4 @@
-//! Expressions as they are built, ordered, printed, evaluated and differentiated.
+//! Expressions: construction, order, printing, evaluation and differentiation.
 
 use std::cmp::Ordering;
 
@@ -138,7 +138,7 @@ fn constructors_give_canonical_expressions() {
             ("(x^a)^0.3", "(x^a)^0.3"),
             ("sqrt(4*x)", "2*sqrt(x)"),
             ("sqrt(3*x)", "sqrt(3*x)"),
-            // Powers of numbers extract what is exact.
+            // Exact factors are extracted from powers of numbers.
             ("sqrt(8)", "2*sqrt(2)"),
             ("2^(3/2)", "2*sqrt(2)"),
             ("1/sqrt(2)", "1/2*sqrt(2)"),
@@ -148,7 +148,7 @@ fn constructors_give_canonical_expressions() {
             ("sqrt(9/16)", "3/4"),
             ("sqrt(2.5)", "1.5811388300841898"),
             ("10^400*10^-399", "10"),
-            // Functions know symmetries and inverses.
+            // Symmetries and inverses of functions are applied.
             ("sin(-x) + cos(-x)", "-sin(x) + cos(x)"),
             ("cos(y - x)", "cos(x - y)"),
             ("abs(-2*x)", "2*abs(x)"),
@@ -303,7 +303,7 @@ fn order_of_deep_expressions_needs_no_stack() {
     assert_eq!(pool.compare(a, b), Ordering::Less);
 }
 
-/// Texts that are their own canonical form.
+/// Texts that equal their own canonical form.
 const CANONICAL: &[&str] = &[
     "0.36 - 0.16*dz1 - 0.91*dz2 - 0.75*sin(dz1)",
     "-x",

@@ -1,4 +1,4 @@
-//! The algebra by its public functions, and the table of identities `tests/fixtures/identities.txt`.
+//! The public functions of the algebra, and the table of identities `tests/fixtures/identities.txt`.
 
 mod bounds;
 mod expressions;
@@ -16,7 +16,7 @@ fn parse(pool: &mut ExprPool, text: &str) -> ExprId {
         .unwrap_or_else(|error| panic!("{text}: {error}"))
 }
 
-/// `function` of its own value plus `x`, or of that alone, so many levels deep.
+/// `function` of its own value plus `x`, or of its value alone, nested to this many levels.
 fn nested(pool: &mut ExprPool, function: Function, levels: usize, plus_x: bool) -> ExprId {
     let x = pool.symbol("x");
     (0..levels).fold(x, |deep, _| {
@@ -25,7 +25,7 @@ fn nested(pool: &mut ExprPool, function: Function, levels: usize, plus_x: bool) 
     })
 }
 
-/// The text of what `rewrite` makes of the expression of a text.
+/// The result of `rewrite` for the expression in a text, as text.
 fn rewritten(text: &str, rewrite: impl FnOnce(&mut ExprPool, ExprId) -> ExprId) -> String {
     let mut pool = ExprPool::new();
     let expr = parse(&mut pool, text);
@@ -33,14 +33,14 @@ fn rewritten(text: &str, rewrite: impl FnOnce(&mut ExprPool, ExprId) -> ExprId) 
     pool.display(result).to_string()
 }
 
-/// Asserts that `rewrite` makes the right text of each left one.
+/// Asserts that `rewrite` turns each left text into the right one.
 fn assert_rewritten(rewrite: impl Fn(&mut ExprPool, ExprId) -> ExprId, cases: &[(&str, &str)]) {
     for (text, expected) in cases {
         assert_eq!(rewritten(text, &rewrite), *expected, "{text}");
     }
 }
 
-/// The pairs that stand left and right of `operator`.
+/// The texts left and right of `operator`.
 fn pairs(operator: &str) -> Vec<(&'static str, &'static str)> {
     let pairs: Vec<_> = TABLE
         .lines()
@@ -56,7 +56,7 @@ fn pairs(operator: &str) -> Vec<(&'static str, &'static str)> {
     pairs
 }
 
-/// Whether the normal forms of two expressions prove them equal.
+/// Whether equal normal forms prove two expressions equal.
 fn is_proven(pool: &ExprPool, a: ExprId, b: ExprId) -> bool {
     let mut forms = CanonicalForms::new(pool, &[a, b]);
     let difference = &forms.of(a) - &forms.of(b);
@@ -64,7 +64,7 @@ fn is_proven(pool: &ExprPool, a: ExprId, b: ExprId) -> bool {
     cleared.is_some_and(|form| form.is_zero())
 }
 
-/// What failed, one per line.
+/// The failures, one per line.
 fn assert_none(failures: &[String]) {
     assert!(failures.is_empty(), "\n{}\n", failures.join("\n"));
 }

@@ -1,4 +1,4 @@
-//! Texts of candidate terms: what is read, and how faults are reported.
+//! Texts of candidate terms: accepted texts, and reports of faults.
 
 use crate::{ExprPool, ParseError, ParseErrorKind};
 
@@ -82,14 +82,14 @@ fn faults_have_their_place_and_what_was_found() {
     };
     let operand = |token| found(token, "a number, a name, `(` or a sign");
     for (text, position, kind) in [
-        // Code and TeX are refused by their characters.
+        // Code and TeX are refused because of their characters.
         ("x; system(\"x\")", 2, ParseErrorKind::Character(';')),
         ("\\input{x}", 1, ParseErrorKind::Character('\\')),
         ("z1 /* c */ \u{0}", 12, ParseErrorKind::Character('\u{0}')),
         ("z1 = 2", 4, ParseErrorKind::Character('=')),
         ("z1 # note", 4, ParseErrorKind::Character('#')),
         ("z1\u{202e}", 3, ParseErrorKind::Character('\u{202e}')),
-        // Names and functions are told apart.
+        // Names and functions are distinguished.
         ("z1  + z9", 7, ParseErrorKind::UnknownName("z9".into())),
         ("z_1", 1, ParseErrorKind::UnknownName("z_1".into())),
         (

@@ -79,7 +79,7 @@ fn leaf() -> impl Strategy<Value = Tree> {
     ]
 }
 
-/// Expressions of all operations and functions.
+/// Expressions with all operations and functions.
 fn tree() -> impl Strategy<Value = Tree> {
     leaf().prop_recursive(4, 24, 4, |inner| {
         let boxed = || inner.clone().prop_map(Box::new);
@@ -105,7 +105,7 @@ fn point() -> impl Strategy<Value = [f64; 3]> {
 struct Approximate {
     value: f64,
     error: f64,
-    /// There is surely no value: rounding cannot have caused it.
+    /// Surely without a value: rounding cannot be the cause.
     undefined: bool,
 }
 
@@ -118,12 +118,12 @@ impl Approximate {
         }
     }
 
-    /// Marks the result of an operation of which an operand has no value.
+    /// Marks the result of an operation on an operand without a value.
     fn undefined_if(self, undefined: bool) -> Approximate {
         Approximate { undefined, ..self }
     }
 
-    /// Whether the argument is below zero whatever its error.
+    /// Whether the argument is below zero for every error within its bound.
     fn is_surely_negative(self) -> bool {
         self.value.is_finite() && self.value < -2.0 * self.error
     }
@@ -273,7 +273,7 @@ fn approximate(pool: &ExprPool, expr: ExprId, point: &[f64; 3]) -> Approximate {
     })[0]
 }
 
-/// Asserts that two expressions have the same value wherever the first has a reliable one.
+/// Asserts that two expressions have the same value wherever the first value is reliable.
 fn same_value(
     pool: &ExprPool,
     before: ExprId,
@@ -345,7 +345,7 @@ proptest! {
         (trees, shuffled) in prop::collection::vec(tree(), 2..7)
             .prop_flat_map(|trees| (Just(trees.clone()), Just(trees).prop_shuffle())),
     ) {
-        // Different pools: the order of creation differs as well.
+        // Different pools: their order of creation also differs.
         let text = |trees: &[Tree], make: fn(&mut ExprPool, &[ExprId]) -> ExprId| {
             let mut pool = ExprPool::new();
             let operands: Vec<ExprId> = trees.iter().map(|tree| tree.build(&mut pool)).collect();
@@ -469,7 +469,7 @@ proptest! {
     }
 }
 
-/// The value of a recipe, without any canonical form in between.
+/// The value of a recipe, without canonical forms in between.
 fn direct_value(tree: &Tree, point: &[f64; 3]) -> Approximate {
     let value = |tree: &Tree| direct_value(tree, point);
     let exact = Approximate::exact;
@@ -497,7 +497,7 @@ fn direct_value(tree: &Tree, point: &[f64; 3]) -> Approximate {
                 power
             }
         }
-        // Whole powers are defined for every base, others for bases that are not negative.
+        // Integer powers are defined for every base, others only for non-negative bases.
         Tree::Root(base, thirds) if thirds % 3 == 0 => {
             let power = Tree::PowerOf(base.clone(), i32::try_from(thirds / 3).expect("small"));
             value(&power)
@@ -505,7 +505,7 @@ fn direct_value(tree: &Tree, point: &[f64; 3]) -> Approximate {
         Tree::Root(base, thirds) => value(base).power(Approximate::new(*thirds as f64 / 3.0, 0.0)),
         Tree::Exponential(base, exponent) => {
             let (base, exponent) = (value(base), value(exponent));
-            // An exponent that comes out whole by rounding decides about the domain: no test.
+            // If an exponent is an integer only by rounding, the domain is undecided: no test.
             if base.value <= 0.0 {
                 return Approximate::new(f64::NAN, f64::INFINITY);
             }

@@ -1,4 +1,4 @@
-//! Tools of the machine that some tests need, and how much of a comparison is asked for.
+//! Tools of the machine that some tests need, and the thoroughness of comparisons.
 #![allow(dead_code, reason = "each test binary uses a part")]
 
 use std::collections::BTreeSet;
@@ -7,23 +7,23 @@ use std::io::Write as _;
 use std::process::Command;
 use std::sync::{Mutex, OnceLock};
 
-/// Whether everything is asked for, all tools included: with ROMC_REQUIRE_TOOLS=1, as `.ci/run` does.
+/// Whether the run is thorough, with all tools: ROMC_REQUIRE_TOOLS=1, as in `.ci/run`.
 pub fn is_thorough() -> bool {
     std::env::var("ROMC_REQUIRE_TOOLS").is_ok_and(|value| value == "1")
 }
 
-/// `all` where everything is asked for; otherwise `few`, with which the test command stays within minutes.
+/// `all` in a thorough run; otherwise `few`, with which all tests finish within minutes.
 pub fn thorough_or<T>(all: T, few: T) -> T {
     if is_thorough() { all } else { few }
 }
 
-/// The Python to use: of the environment that `ROMC_PYTHON` names, or of the path.
+/// The Python to use: from the environment named by `ROMC_PYTHON`, or from the path.
 pub fn python() -> Command {
     Command::new(std::env::var("ROMC_PYTHON").unwrap_or_else(|_| "python3".to_owned()))
 }
 
-/// Whether a tool answers to `probe`. Where it does not, the calling test says so and is skipped, or fails if
-/// everything is asked for.
+/// Whether the tool command `probe` succeeds. If not, the calling test is skipped with a message, or fails in a
+/// thorough run.
 pub fn answers(probe: &mut Command) -> bool {
     let found = probe.output().is_ok_and(|output| output.status.success());
     if !found {
@@ -33,13 +33,13 @@ pub fn answers(probe: &mut Command) -> bool {
     found
 }
 
-/// Whether a program that knows `--version` is there, see [`answers`].
+/// Whether a program with the flag `--version` exists, see [`answers`].
 pub fn is_there(tool: &str) -> bool {
     answers(Command::new(tool).arg("--version"))
 }
 
-/// Whether checks with a tool that takes minutes are asked for, which is where everything is; `probe` must succeed then.
-/// Elsewhere a line says that they are not.
+/// Whether checks with a tool that needs minutes should run: only in a thorough run, where `probe` must succeed. In
+/// other runs a message is printed.
 pub fn is_asked_for(tool: &str, probe: &mut Command) -> bool {
     if is_thorough() {
         return answers(probe);
@@ -50,12 +50,12 @@ pub fn is_asked_for(tool: &str, probe: &mut Command) -> bool {
     false
 }
 
-/// The same for a program that knows `--version`.
+/// The same for a program with the flag `--version`.
 pub fn has(tool: &str) -> bool {
     is_asked_for(tool, Command::new(tool).arg("--version"))
 }
 
-/// Whether the C compiler finds the libraries that `flags` need, such as those of sanitizers, where everything is asked for.
+/// Whether the C compiler finds the libraries that `flags` need, such as those of sanitizers; in thorough runs only.
 pub fn has_compiler_with(compiler: &str, flags: &[&str]) -> bool {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let source = folder.path().join("probe.c");
@@ -66,8 +66,8 @@ pub fn has_compiler_with(compiler: &str, flags: &[&str]) -> bool {
     is_asked_for(&format!("{compiler} {}", flags.join(" ")), &mut probe)
 }
 
-/// Whether pdflatex is there with every package that emitted documents load: with some of them missing, LaTeX counts
-/// as a missing tool.
+/// Whether pdflatex is installed with all packages of the emitted documents: if some are missing, LaTeX counts as
+/// missing.
 pub fn has_latex() -> bool {
     static FOUND: OnceLock<bool> = OnceLock::new();
     *FOUND.get_or_init(|| {
@@ -85,12 +85,12 @@ pub fn has_latex() -> bool {
     })
 }
 
-/// Whether a document class of LaTeX is there.
+/// Whether a document class of LaTeX is installed.
 pub fn has_latex_class(name: &str) -> bool {
     answers(Command::new("kpsewhich").arg(format!("{name}.cls")))
 }
 
-/// What `tests/latex.rs` and the emitted previews load.
+/// Packages that `tests/latex.rs` and the emitted previews load.
 const LATEX_PACKAGES: [&str; 9] = [
     "[T1]{fontenc}",
     "[utf8]{inputenc}",

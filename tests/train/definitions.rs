@@ -1,4 +1,4 @@
-//! Trained models against definitions: of the losses, of the row space, of what is known of the dynamics.
+//! Trained models compared with definitions: of the losses, of the row space, of the known physics.
 
 use nalgebra::{DMatrix, DVector};
 use romc::artifact;
@@ -10,7 +10,7 @@ use romc::train::{Coordinates, TrainError, TrainOptions, Trained, Transfer};
 
 use super::{few_epochs, go1, joint, joint_with, jumps, train_with, trained};
 
-/// Samples of a batch in columns: `x`, `dx`, `ddx` and `u` (scaled), and `z`, `dz`, `u_lat` below one another.
+/// Samples of a batch in columns: `x`, `dx`, `ddx` and `u` (scaled), and `z`, `dz`, `u_lat` stacked.
 struct Batch {
     phase: usize,
     step_s: f64,
@@ -75,7 +75,7 @@ fn batches(model: &ReducedModel, options: &TrainOptions, jump: &Recording) -> Ve
     all
 }
 
-/// `ddz` of a phase by the library's own evaluation, for variables in columns.
+/// `ddz` of a phase, evaluated by the library, for variables in columns.
 fn accelerations(model: &ReducedModel, phase: usize, variables: &DMatrix<f64>) -> DMatrix<f64> {
     let theta = model.library().evaluate_points(variables).expect("fits");
     (theta * &model.phases()[phase].xi).transpose()
@@ -268,7 +268,7 @@ fn coordinates_that_rest_without_torque_do_not_enter_the_encoder() {
         for (name, column) in Robot::state_names().iter().zip(first.column_iter()) {
             assert_eq!(column.amax() > 0.0, report.encoded.contains(name), "{name}");
         }
-        // A hip that a torque holds at rest stays.
+        // A hip that a torque holds at rest is kept.
         assert!(report.encoded.len() < 18 && report.encoded.contains(&"fr.hx".to_owned()));
     }
 }
@@ -361,7 +361,7 @@ fn named_coordinates_obey_what_is_known_of_them() {
         "nothing pushes in flight"
     );
     assert_eq!(flight.rows(u, 2).amax(), 0.0, "{flight}");
-    // The own force of every coordinate stays, and upwards what the ground carries.
+    // Kept: the own force of every coordinate, and the constant vertical term for the weight carried by the ground.
     assert!(
         (0..4).all(|k| contact[(u + k, k)] != 0.0) && contact[(0, 1)] != 0.0,
         "{contact}"

@@ -1,4 +1,4 @@
-//! A trained model refined on other recordings.
+//! A trained model refined with other recordings.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use romc::train::{Origin, TrainError, refine_from};
 use super::whole_body::FLEXIONS_AND_KNEES;
 use super::{go1, jumps};
 
-/// The jumps with torques of zero in flight, as where a position control that moves the legs is not recorded.
+/// The jumps with zero torques in flight, like recordings that omit the torques of a position control moving the legs.
 fn without_torques_in_flight(recordings: Vec<Recording>) -> Vec<Recording> {
     let mut recordings = recordings;
     for segment in recordings.iter_mut().flat_map(|of| &mut of.segments) {
@@ -24,8 +24,8 @@ fn without_torques_in_flight(recordings: Vec<Recording>) -> Vec<Recording> {
     recordings
 }
 
-/// Root mean square of flexions and knees at touchdown, without a restart in flight, of the model and of a constant
-/// velocity, rad.
+/// Root mean square error of flexions and knees at touchdown, without a restart in flight, of the model and of a
+/// constant velocity, rad.
 fn legs_at_touchdown(model: &ReducedModel, recordings: &[Recording]) -> [f64; 2] {
     let assessment = Assessment::over(model, recordings, 0.1).expect("of its robot");
     let horizons = Horizon::all(model, &assessment).expect("the same");
@@ -45,7 +45,7 @@ fn error_m(model: &ReducedModel) -> f64 {
     fit.expect("samples").rms
 }
 
-/// A robot that is 15 % heavier than the model says, and gravity in contact that is 5 % less.
+/// A robot 15 % heavier than in the model, and gravity in contact 5 % smaller.
 #[test]
 fn wrong_mass_is_found_again_with_its_standard_errors() {
     let right = artifact::read(Path::new("models/go1-d7.json")).expect("shipped");
@@ -89,7 +89,7 @@ fn wrong_mass_is_found_again_with_its_standard_errors() {
         wrong_m > 2.5 * right_m && refined_m < 1.1 * right_m,
         "{wrong_m} {refined_m} {right_m}"
     );
-    // Free fall is physics.
+    // Free fall is fixed by physics.
     assert_eq!(
         refined.model.phases()[1].xi.column(1),
         right.phases()[1].xi.column(1)
@@ -121,7 +121,7 @@ fn recordings_without_information_are_refused_with_the_reasons() {
     );
 }
 
-/// Recorded torques that are twice what the motors gave make an equation half of what it is, all of its terms alike.
+/// If recorded torques are twice the motors' torques, all terms of an equation are halved.
 #[test]
 fn equation_that_counts_twice_is_multiplied_by_about_half() {
     let right = artifact::read(Path::new("models/go1-d7.json")).expect("shipped");
@@ -147,7 +147,7 @@ fn equation_that_counts_twice_is_multiplied_by_about_half() {
     }
 }
 
-/// Legs whose torques in flight are not recorded follow a joint control that the refinement finds.
+/// Legs whose torques in flight are not recorded follow a joint control, which the refinement identifies.
 #[test]
 fn joint_control_that_torques_do_not_show_is_found_in_flights() {
     let model = artifact::read(Path::new("models/go1-d7.json")).expect("shipped");
@@ -175,7 +175,7 @@ fn joint_control_that_torques_do_not_show_is_found_in_flights() {
         after < 0.5 * before && after < 0.5 * constant_velocity,
         "{before} {after} {constant_velocity}"
     );
-    // Without the found rate legs coast.
+    // Without the identified rate the legs coast.
     let mut phases = refined.model.phases().to_vec();
     for term in model
         .library()
@@ -189,7 +189,7 @@ fn joint_control_that_torques_do_not_show_is_found_in_flights() {
     let coasting = refined.model.clone().into_builder().phases(phases).build();
     let [coasting, _] = legs_at_touchdown(&coasting.expect("sound"), &test);
     assert!(coasting > 2.0 * after, "{coasting} {after}");
-    // Recorded torques that move the legs leave nothing to a control.
+    // If recorded torques move the legs, no control is identified.
     let complete = refine_from(&model, &jumps("train", 4), go1(), losses, &origin);
     let changed = complete.map_or(Vec::new(), |of| of.coefficients);
     assert!(

@@ -1,11 +1,11 @@
-//! Phases of walks: usual ones by a name, others one by one, and what contacts look like.
+//! Phases of walks: usual ones by a name, others individually, and patterns of contacts.
 
 use std::path::PathBuf;
 use std::process::Command;
 
 use serde_json::Value;
 
-/// Trains on recordings of a folder; the model's phases as `name=feet`, none without a model, and what was noted.
+/// Trains on recordings of a folder. Returns the model's phases as `name=feet`, none without a model, and the notes.
 fn trained(folder: &str, first: &str, flags: &[&str]) -> (Vec<String>, String) {
     let scratch = tempfile::tempdir().expect("a folder");
     let output = scratch.path().join("m.json");

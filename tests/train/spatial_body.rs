@@ -1,4 +1,4 @@
-//! Models with momentum rows of all body coordinates, mirror images, equations of the body for all phases.
+//! Models with momentum rows of all body coordinates, mirror images, equations of the body common to all phases.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -21,7 +21,7 @@ use super::{go1, jumps, jumps_of, losses_of_the_simulated_go1, train_with};
 const Y: usize = JOINT_DIM + 1;
 const ROLL: usize = JOINT_DIM + 3;
 const YAW: usize = JOINT_DIM + 5;
-/// Entries of a state or an input that change sign in a mirror image, those of joints apart.
+/// Entries of a state or an input that change sign in a mirror image, except joints.
 const LATERAL: [usize; 3] = [Y, ROLL, YAW];
 
 fn options_of_all(latent_dim: usize) -> TrainOptions {
@@ -43,7 +43,7 @@ static SPATIAL: LazyLock<ReducedModel> = LazyLock::new(|| {
 #[test]
 fn rows_of_all_of_the_body_are_those_of_mechanics() {
     let weights = weights(&SPATIAL);
-    // By the mass matrix at the mean posture of the training jumps: row, joint (front right, rear right), weight.
+    // From the mass matrix at the mean posture of the training jumps: row, joint (front right, rear right), weight.
     let mechanics = [
         (4, 0, 0.156),
         (4, 1, -0.039),
@@ -61,7 +61,7 @@ fn rows_of_all_of_the_body_are_those_of_mechanics() {
             "{row} {joint}: {found} {expected}"
         );
     }
-    // The same rows in a mirror: those in the plane stay, the others change sign.
+    // The same rows mirrored: rows in the plane are equal, the others change sign.
     for (row, parity) in [1.0, 1.0, 1.0, -1.0, -1.0, -1.0].into_iter().enumerate() {
         let x: DVector<f64> = weights.row(row).transpose();
         for joint in 0..JOINT_DIM {
@@ -108,7 +108,7 @@ fn equations_of_all_of_the_body_obey_what_is_known() {
             assert_eq!(flight[(index, k)] != 0.0, falls, "{text} of z{}", k + 1);
         }
     }
-    // Forces push a mass alike in all directions.
+    // Forces accelerate a mass equally in all directions.
     let gain = |k: usize| {
         let term = texts.iter().position(|text| *text == format!("u{}", k + 1));
         contact[(term.expect("a term"), k)]
@@ -150,7 +150,7 @@ fn mirror_image_of_a_mirror_image_is_the_recording() {
     assert_eq!(mirrored(&image), *recording);
 }
 
-/// Forces and moments computed of a mirror image are the mirror images of those of the recording.
+/// Forces and moments computed from a mirror image are the mirror images of the recording's.
 #[test]
 fn inputs_of_a_mirror_image_are_mirrored() {
     for frame in WrenchFrame::ALL {
@@ -171,8 +171,8 @@ fn inputs_of_a_mirror_image_are_mirrored() {
     }
 }
 
-/// With mirror images, what changes sign in a mirror image is decoded from the rows that do so. Models in the plane see
-/// the same data twice.
+/// With mirror images, coordinates that change sign are decoded only from rows that change sign. Models in the plane
+/// get the same data twice.
 #[test]
 fn mirror_images_count_where_left_and_right_may_differ() {
     let (training, validation) = (jumps("train", 5), jumps("validation", 1));
@@ -240,7 +240,7 @@ fn more_rows_than_latent_coordinates_are_refused() {
     );
 }
 
-/// Mass and response to a moment come from the recordings: another mass in the robot's file changes nothing.
+/// Mass and response to a moment are identified from the recordings: another mass in the robot's file changes nothing.
 #[test]
 fn mass_and_rotation_do_not_come_from_the_file_of_the_robot() {
     let text = robot_file::to_toml(go1());
@@ -271,7 +271,7 @@ fn mass_and_rotation_do_not_come_from_the_file_of_the_robot() {
     assert!((found[0].0 / 12.74 - 1.0).abs() < 0.1, "{found:?}");
 }
 
-/// The recordings up to the first take-off.
+/// The recordings before the first flight.
 fn launches(recordings: &[Recording]) -> Vec<Recording> {
     let launch = |recording: &Recording| {
         let segment = &recording.segments[0];
@@ -282,8 +282,8 @@ fn launches(recordings: &[Recording]) -> Vec<Recording> {
     recordings.iter().map(launch).collect()
 }
 
-/// Without flights the rows come from forces and moments: mass and rotation are those of the simulated robot, and all of the
-/// body is predicted.
+/// Without flights the rows are fitted to forces and moments: mass and rotation are those of the simulated robot, and
+/// the whole body is predicted.
 #[test]
 fn robot_that_does_not_fly_is_learned_from_forces_and_moments() {
     let (training, validation) = (

@@ -1,5 +1,4 @@
-//! Printed equations mean what the model computes: the typeset tree is evaluated as a reader
-//! would and compared with the model.
+//! Printed equations have the model's values: the typeset tree is evaluated as by a reader and compared with the model.
 
 mod names;
 mod numbers;
@@ -32,7 +31,7 @@ fn sum(terms: &[Signed], values: &Values) -> f64 {
     terms.iter().map(value).sum()
 }
 
-/// The value of a typeset tree, by the rules of mathematical notation.
+/// The value of a typeset tree by the rules of mathematical notation.
 fn value_of(math: &Math, values: &Values) -> f64 {
     let of = |math: &Math| value_of(math, values);
     match math {
@@ -41,7 +40,7 @@ fn value_of(math: &Math, values: &Values) -> f64 {
         Math::Sum(terms) => sum(terms, values),
         Math::Product(factors) => {
             for pair in factors.windows(2) {
-                // Side by side, digits would be read as one number and signs as subtraction.
+                // Adjacent digits would be read as one number and signs as subtraction.
                 assert!(
                     pair[0] == Math::Dot || !pair[1].starts_with_digit(),
                     "{pair:?}"
@@ -110,7 +109,7 @@ fn models() -> Vec<ReducedModel> {
         .collect()
 }
 
-/// Values between 0.2 and 1.2, so that roots and logarithms exist; `seed` tells vectors apart.
+/// Values between 0.2 and 1.2, where roots and logarithms exist; `seed` makes vectors different.
 fn point(dim: usize, seed: f64) -> DVector<f64> {
     DVector::from_fn(dim, |row, _| {
         0.7 + 0.5 * (3.7 * seed + 1.9 * row as f64).sin()
@@ -174,7 +173,7 @@ fn rounded_equations_stay_within_the_stated_relative_error() {
         let dim = model.latent_dim();
         let (z, dz, u) = (point(dim, 0.0), point(dim, 0.3), point(dim, 0.6));
         let values = latent_values(&z, &dz, &u);
-        // The size in `assert_close` is that of the printed terms, up to 5 % off itself.
+        // `assert_close` uses the size of the printed terms, which itself has an error of up to 5 %.
         let tolerance = 1.06 * typeset.rounding.largest_relative + 1e-12;
         for (phase, system) in typeset.systems.iter().enumerate() {
             let ddz = model.ddz(phase, &z, &dz, &u).unwrap();
@@ -226,7 +225,7 @@ fn term() -> impl Strategy<Value = String> {
             pair.clone().prop_map(|(a, b)| format!("({a}) - ({b})")),
             pair.clone().prop_map(|(a, b)| format!("({a})*({b})")),
             pair.clone().prop_map(|(a, b)| format!("({a})/({b})")),
-            // A negative base has a value only where rounding leaves the exponent whole.
+            // A negative base has a value only if rounding keeps the exponent an integer.
             pair.prop_map(|(a, b)| format!("abs({a})^({b})")),
             (inner.clone(), -3i32..5).prop_map(|(a, power)| format!("({a})^({power})")),
             (inner.clone(), 1i32..5, 2i32..5).prop_map(|(a, n, d)| format!("({a})^({n}/{d})")),
@@ -241,7 +240,7 @@ proptest! {
 
     #[test]
     fn typeset_terms_have_the_value_of_the_expression(text in term()) {
-        // Terms that are too large or constant without a value are refused by the library.
+        // The library refuses terms that are too large or are constants without a value.
         let library = Library::from_terms(2, std::slice::from_ref(&text));
         prop_assume!(library.is_ok());
         let library = library.unwrap();

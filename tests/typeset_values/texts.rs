@@ -4,7 +4,7 @@ use crate::typeset::latex::math::tex_text;
 use crate::typeset::markdown::markdown_text;
 use crate::typeset::mathml::{HtmlProse, HtmlText};
 
-/// Characters that change how TeX reads what follows.
+/// Characters with a special meaning in TeX.
 const ACTIVE: &str = "$&#%_^~";
 
 #[test]
@@ -23,7 +23,7 @@ fn text_escape_leaves_no_active_character_bare() {
             assert!(!ACTIVE.contains(character) || previous == '\\', "{text}");
             previous = character;
         }
-        // Every backslash begins one of the commands of the table.
+        // Every backslash begins a command of the table.
         for piece in text.split('\\').skip(1) {
             let known =
                 piece.starts_with("text") || piece.starts_with(['{', '}', '$', '&', '#', '%', '_']);

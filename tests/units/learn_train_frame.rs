@@ -1,4 +1,4 @@
-//! Of `src/learn/train/frame.rs`.
+//! Tests of `src/learn/train/frame.rs`.
 
 use super::*;
 use crate::recording::PhaseRule;
@@ -19,7 +19,7 @@ fn all() -> BodyRows {
     "all".parse().expect("known rows")
 }
 
-/// Weights of the joints in the momentum of each body coordinate, `18 x 6`: any that a mirror image allows.
+/// Weights of the joints in the momentum of each body coordinate, `18 x 6`: random, and symmetric under mirroring.
 fn true_rows() -> DMatrix<f64> {
     let joints: Vec<usize> = (0..JOINT_DIM).collect();
     let mut random = Random::new(7);
@@ -33,7 +33,7 @@ fn true_rows() -> DMatrix<f64> {
     rows
 }
 
-/// A robot whose legs move at random, with these rows: in free fall, or pushed by random forces and moments.
+/// A robot with these rows whose legs move at random: in free fall, or pushed by random forces and moments.
 fn moving(rows: &DMatrix<f64>, is_pushed: bool) -> Dataset {
     let mut random = Random::new(8);
     let factors = ScaleOptions::in_frame(WrenchFrame::Ground).factors();
@@ -96,7 +96,7 @@ fn momentum_of_six_coordinates_is_found_in_flights_and_without_them() {
         let missed = error(&found, &rows);
         assert!(missed < 0.03, "{is_pushed}: {missed}");
     }
-    // Without the loads in the regression, their effect would be the joints'.
+    // Without the loads in the regression, their effect would be attributed to the joints.
     let mut unseen = moving(&rows, true);
     unseen.jumps[0].u.fill(0.0);
     let found = momentum_rows(&unseen, &all().coordinates, robot());
@@ -127,7 +127,7 @@ fn rows_of_all_of_the_body_leave_room_for_all_joints() {
     assert_eq!(dim("x,z,yaw"), 18);
 }
 
-/// Whatever basis a search finds, its rows end as those that a mirror leaves alone and those that it turns around.
+/// For any basis of the space, the rows become those that a mirror keeps and those whose sign it changes.
 #[test]
 fn space_that_a_mirror_leaves_alone_has_rows_that_stay_or_change_sign() {
     let joints: Vec<usize> = (0..JOINT_DIM).collect();

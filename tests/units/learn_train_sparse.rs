@@ -1,4 +1,4 @@
-//! Of `src/learn/train/sparse.rs`.
+//! Tests of `src/learn/train/sparse.rs`.
 
 use super::*;
 use crate::train::random::Random;
@@ -42,7 +42,7 @@ fn gains_of_terms_are_what_a_fit_with_them_explains_more() {
     let mut support = DMatrix::from_column_slice(5, 1, &[true, false, true, false, false]);
     let gains = regression.gains(0, &support, 1e-2);
     assert!(gains.iter().map(|(row, _)| *row).eq([1, 3, 4]));
-    // Taking a term out again loses what it gave.
+    // Removing an added term loses its gain.
     support[(3, 0)] = true;
     let losses = regression.losses(0, &support, 1e-2);
     let (_, loss) = losses[2]; // of rows 0, 2 and 3
