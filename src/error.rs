@@ -1,4 +1,4 @@
-//! One error for the whole library: each stage's own, told apart by variant.
+//! One error for the whole library: the errors of all stages as variants.
 
 #![allow(missing_docs, reason = "each variant's message names its fields")]
 
@@ -12,7 +12,7 @@ use crate::robot_file::RobotFileError;
 use crate::simplify::SimplifyError;
 use crate::train::TrainError;
 
-/// What can go wrong between a recording and a torque.
+/// Errors of all stages, from a recording to a torque.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {

@@ -66,7 +66,7 @@ pub fn statuses() -> Vec<(&'static str, String)> {
     .collect()
 }
 
-/// A controller; threads take turns.
+/// A controller, used by one thread at a time.
 #[pyclass(frozen, module = "romc._romc")]
 pub struct Controller {
     controller: Mutex<romc::mpc::Controller>,

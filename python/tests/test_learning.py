@@ -45,7 +45,7 @@ def test_recordings_in_memory_train_as_their_files():
     model = romc.train(arrays, latent_dim=2)
     for phase, xi in learnt().xi.items():
         assert np.array_equal(model.xi[phase], xi), phase
-    # Four recordings of one name are told apart.
+    # Four recordings with one name get different names.
     assert "romc train arrays arrays-2 arrays-3 arrays-4 " in model.to_dict()["provenance"]["command"]
 
 
@@ -126,7 +126,7 @@ def test_study_has_the_table_of_the_command_line(command_line, tmp_path):
     for row, of in zip(table, expected):
         for name in ("decoder_mse", "active", "combined_loss", "torque_r2", "prediction_z_m"):
             assert (row[f"{name}_mean"], row[f"{name}_std"]) == (of[name]["mean"], of[name]["std"]), name
-    # More coordinates reconstruct better; two leave out the inputs that act on the joints.
+    # More coordinates reconstruct better; with two, the inputs that act on the joints are lost.
     assert table[1]["decoder_mse_mean"] < 0.1 * table[0]["decoder_mse_mean"]
     assert table[1]["torque_r2_mean"] > 0.9 > table[0]["torque_r2_mean"]
     frame = romc.study(TRAINING, **options, per="training", out_dir=tmp_path / "kept")
@@ -189,7 +189,7 @@ def test_inspection_of_a_recording_finds_what_cannot_be(jump, command_line):
     assert found.ranges["body.z"]["position"] == [jump.x[:, 14].min(), jump.x[:, 14].max()]
     assert [segment["samples"] for segment in found.segments] == [len(jump.t)]
     assert str(found) == command_line.run("inspect", TEST[0]).stdout
-    # Torques in other units, and a velocity that the motors cannot reach.
+    # Torques in other units, and a velocity beyond the motors' limits.
     dx = jump.dx.copy()
     dx[100, 4] = 500.0
     wrong = romc.Recording.from_arrays(jump.t, jump.x, dx, 0.001 * jump.torque, jump.feet, ddx=jump.ddx)

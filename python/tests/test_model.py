@@ -278,7 +278,7 @@ def test_actuators_are_a_mapping_or_a_file_and_checked(parts, tmp_path):
         assert model.to_dict()["actuators"] == given
     without = romc.Model.from_arrays(**{**parts, "actuators": None})
     assert "actuators" not in without.to_dict()
-    # The torques of the motors are not what the equations were learned with.
+    # The equations were learned with other torques than those of the motors.
     with pytest.warns(romc.RomcWarning, match="below that of a constant"):
         romc.Model.from_arrays(**{**parts, "actuators": None}, inputs_from=RECORDED)
     with pytest.raises(romc.RomcError, match="actuators.dry: found 2 numbers, expected 12"):
@@ -301,7 +301,7 @@ def test_actuators_are_a_mapping_or_a_file_and_checked(parts, tmp_path):
 
 
 def test_mean_and_order_of_a_trainer(parts):
-    # A trainer that took (x - mean) with the body's coordinates first.
+    # A trainer that subtracted the mean, with the body's coordinates first.
     (W, b), (D, c), s = parts["encoder"], parts["decoder"], parts["scaling"]
     mean = np.linspace(-0.4, 0.5, 18)
     order = np.r_[12:18, 0:12]

@@ -1,9 +1,9 @@
-//! Numbers of the algebra: exact rationals, and floats where exactness has ended. A learned coefficient is a float and
-//! keeps its bits; an integer exponent or the `1/2` of a derivative is exact. One float makes a sum or product a float,
-//! and so does a rational that outgrows `i64`. A float of at most 15 digits stands for the decimal fraction that is
-//! written for it, so that `0.1 + 0.2` is `0.3`. Only correctly rounded operations are folded (`+ - * /`, square roots,
-//! integer powers as multiplication chains), so that results are the same on every machine. An operation whose result
-//! would be infinite, undefined or denormal is refused ([`None`]) and stays symbolic.
+//! Numbers of the algebra: exact rationals, and floats where exactness ends. A learned coefficient is a float and keeps
+//! its bits; an integer exponent or the `1/2` of a derivative is exact. A sum or product with a float is a float, and
+//! so is a rational beyond the range of `i64`. A float of at most 15 digits represents the decimal fraction that is
+//! written for it, so `0.1 + 0.2` is `0.3`. Only correctly rounded operations are folded (`+ - * /`, square roots,
+//! integer powers as multiplication chains), so results are equal on every machine. An operation whose result would be
+//! infinite, undefined or denormal is refused ([`None`]) and stays symbolic.
 
 use super::*;
 
@@ -222,7 +222,7 @@ impl Number {
     }
 }
 
-/// The sum, rounded once: none is lost between large ones that cancel; `None` for fewer than three and overflow.
+/// The sum, rounded once: cancelling large numbers keep small ones; `None` for fewer than three and overflow.
 pub(super) fn exact_sum(numbers: &[Number]) -> Option<Number> {
     if numbers.len() < 3 || numbers.iter().all(|number| number.is_exact()) {
         return None;
@@ -243,7 +243,7 @@ pub fn sum_of_floats(values: &[f64]) -> f64 {
     if values.len() < 3 || !plain.is_finite() {
         return plain;
     }
-    // Parts that do not overlap, the smallest first.
+    // Parts without overlap, the smallest first.
     let mut parts: Vec<f64> = Vec::new();
     for &value in values {
         let mut sum = value;
@@ -293,7 +293,7 @@ fn gcd(a: i128, b: i128) -> i128 {
     }
 }
 
-/// The integer whose `root`-th power is `value`, for a non-negative `value`.
+/// The integer whose `root`-th power is `value`, which is not negative.
 fn exact_root(value: i64, root: u32) -> Option<i64> {
     let floor = value.nth_root(root);
     (floor.checked_pow(root) == Some(value)).then_some(floor)

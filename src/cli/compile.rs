@@ -71,7 +71,7 @@ fn inputs(arguments: &CompileArguments) -> Result<Inputs<'_>> {
         .and(&arguments.plan)
         .and(&simplification.domain)
         .into_folder(Some(&arguments.out_dir))?;
-    // What would be the same file again may stay; it is compared once there is a model.
+    // A file that would be written unchanged may stay; it is compared once there is a model.
     match simplification.save_model.as_deref() {
         Some(path) if path.parent() == Some(&arguments.out_dir) => {
             inputs.check_name(path, Format::MODEL)?;

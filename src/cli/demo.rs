@@ -1,4 +1,4 @@
-//! `romc demo`: the main job on the shipped model and recordings, which are part of the binary.
+//! `romc demo`: the main task with the shipped model and recordings, which are part of the binary.
 
 use super::*;
 use crate::mpc::Solver;
@@ -7,7 +7,7 @@ const MODEL: (&str, &[u8]) = ("go1-d4.json", include_bytes!("../../models/go1-d4
 const JUMP_1: &[u8] = include_bytes!("../../examples/recordings/go1/test_01.csv.gz");
 const JUMP_2: &[u8] = include_bytes!("../../examples/recordings/go1/test_02.csv.gz");
 const JUMP_3: &[u8] = include_bytes!("../../examples/recordings/go1/test_03.csv.gz");
-/// Names and files of jumps that no shipped model was trained on.
+/// Names and files of jumps that were not used to train any shipped model.
 pub static JUMPS: [(&str, &[u8]); 3] = [
     ("test_01", JUMP_1),
     ("test_02", JUMP_2),
@@ -106,7 +106,7 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     Ok(Answer::new(text, json).failed_if(is_failed))
 }
 
-/// Errors of the body with the best of all baselines, and the height of the body over the first jump.
+/// Errors of the body compared with the best of all baselines, and the height of the body over the first jump.
 fn predictions(model: &ReducedModel, evaluation: &Assessment<'_>) -> Result<String> {
     let [whole, short] = &evaluation.constant_velocity;
     let [latent_whole, latent_short] = &evaluation.constant_latent_velocity;
@@ -158,7 +158,7 @@ fn predictions(model: &ReducedModel, evaluation: &Assessment<'_>) -> Result<Stri
     ))
 }
 
-/// Torques and deviations after a push of the controller and its baselines, and the time of a step with both solvers.
+/// Torques of the controller and its baselines, deviations after a push, and the time of a step with both solvers.
 fn controllers(model: &ReducedModel, jumps: &[Recording], runs: &[NamedRun]) -> Result<String> {
     let metrics: Vec<&ControlMetrics> = mpc::judged(runs);
     let mean = |of: &dyn Fn(&ControlMetrics) -> Option<f64>| {
@@ -215,7 +215,7 @@ fn controllers(model: &ReducedModel, jumps: &[Recording], runs: &[NamedRun]) -> 
     ))
 }
 
-/// The files by use, and where to go on.
+/// The files by use, and further steps.
 fn made_text(model: &ReducedModel, self_test: &str) -> String {
     let name = model.identifier();
     let files = [
@@ -233,7 +233,7 @@ fn made_text(model: &ReducedModel, self_test: &str) -> String {
         .concat()
 }
 
-/// Compiles the emitted C with the machine's compiler and runs its self-test: what became of it, or why it failed.
+/// Compiles the emitted C with the machine's compiler and runs its self-test; its outcome, or why it failed.
 fn self_test(model: &ReducedModel, folder: &Path) -> Result<String, String> {
     let name = model.identifier().as_str();
     let scratch = tempfile::tempdir().map_err(|_| "no temporary folder")?;

@@ -25,7 +25,7 @@ pub(super) fn run(arguments: &IdentifyArguments) -> Result<Answer> {
     Ok(Answer::new(text, report(&found, arguments)))
 }
 
-/// Tables of what was found in so many recordings.
+/// Tables of the parameters identified from this number of recordings.
 pub fn text(found: &Identification, robot: &Robot, recordings: usize) -> String {
     let error = &found.standard_error;
     let delays = [found.delay_s, error.delay_s].map(|delay| 1e3 * delay);

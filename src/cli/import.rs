@@ -1,4 +1,4 @@
-//! `romc import`: a model trained elsewhere in, a model file out.
+//! `romc import`: a model trained elsewhere becomes a model file.
 
 use super::*;
 use crate::import::import;
@@ -66,9 +66,9 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer> {
 pub struct Compared {
     /// With the statistics of the recorded inputs.
     pub imported: Imported,
-    /// What the recordings show.
+    /// Result of the comparison.
     pub check: Option<RoundTrip>,
-    /// No reason to refuse it.
+    /// Reason to refuse the model; `None` if it is accepted.
     pub fault: Option<String>,
 }
 
@@ -112,7 +112,7 @@ pub fn import_compared(
         options.library_order = decided;
         (imported, check) = compared(&options)?;
     } else if is_open && decided.is_none() && (unchecked || !check.is_refused()) {
-        // The importer asks for the order, unless all are the same.
+        // Without an order the importer reports an error, unless all orders are equal.
         options.library_order = None;
         read(&options)?;
     }

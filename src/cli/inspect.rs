@@ -1,4 +1,4 @@
-//! `romc inspect`: what a recording or a model holds, and what is implausible in it.
+//! `romc inspect`: contents of a recording or a model, and implausible values in it.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use super::*;
 use crate::recording::check::check;
 use crate::recording::mismatch::{Figures, notes as mismatches};
 
-/// Endings of models; those of other tools are refused with the lines that convert them.
+/// Endings of models; for those of other tools the error shows the lines that convert them.
 const OF_MODELS: &str = "json safetensors pt pth ckpt keras onnx tflite msgpack";
 
 pub(super) fn run(arguments: &InspectArguments) -> Result<Answer> {
@@ -228,7 +228,7 @@ fn dominant_coordinates(model: &ReducedModel) -> Option<Dominant> {
 
 const BAR_WIDTH: usize = 60;
 const STRIDES_SHOWN: f64 = 3.0;
-/// Shorter spans are feet that leave or land one after the other, part of the span before them.
+/// Shorter spans count as part of the previous span: feet leave or land one after the other.
 const CHATTER: usize = 10;
 const FINDINGS_SHOWN: usize = 12;
 
@@ -309,7 +309,7 @@ fn time_bar(segment: &Segment) -> String {
     feet.map(character).collect()
 }
 
-/// When each foot is down in the middle of a motion, over a few strides.
+/// The feet on the ground over a few strides in the middle of a motion.
 fn feet_strips(segment: &Segment, stride_s: f64) -> String {
     let (first, last) = (segment.time_s[0], segment.time_s[segment.len() - 1]);
     let lasts_s = (STRIDES_SHOWN * stride_s).min(last - first);

@@ -1,6 +1,6 @@
 //! The command line. Each command is a file with one function from its arguments to an `Answer`, text or one JSON
 //! object; [`run`] prints it and picks the exit code (0 done, 1 the run failed, 2 wrong usage). Human text and JSON go
-//! to stdout; progress, warnings, errors to stderr. Start with `args`. All commands import what this file imports
+//! to stdout; progress, warnings, errors to stderr. Start with `args`. All commands share the imports of this file
 //! (`use super::*`).
 
 mod args;
@@ -111,11 +111,11 @@ type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, Clone)]
 pub(crate) struct Answer {
     pub text: String,
-    /// The same as one JSON object; that of a command gets the command's name before these entries.
+    /// The same as one JSON object; a command's object gets the command's name before these entries.
     pub json: Value,
-    /// The exit code of a command that ran: 0, 130 for a training that Ctrl-C cut short, or 1 where its own purpose
-    /// fails: files that `check` finds different; torques or control for `mpc`, predictions of body x or z for
-    /// `simulate` and `demo`, every use for `report`.
+    /// The exit code of a command that ran: 0, 130 for a training ended by Ctrl-C, or 1 if its own purpose failed:
+    /// files that `check` finds different; torques or control for `mpc`, predictions of body x or z for `simulate` and
+    /// `demo`, every use for `report`.
     pub code: u8,
 }
 
@@ -136,15 +136,15 @@ pub fn run() -> ExitCode {
     ExitCode::from(run_with(std::env::args_os()))
 }
 
-/// The same with the arguments of another program, the first of them its name; returns the exit code.
+/// The same with the arguments of another program, including its name; returns the exit code.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = match Arguments::read(arguments) {
         Ok(arguments) => arguments,
         Err(refusal) => {
-            // Help and the version are refusals of clap that go to stdout; a reader that has gone away is no failure.
+            // clap returns help and version as errors that go to stdout; a closed pipe is no failure.
             let text = refusal.to_string();
             match printable(&text) {
-                // Colours stay where what was typed has no controls of its own.
+                // Colours are kept if the arguments contain no control characters.
                 Cow::Borrowed(_) => drop(refusal.print()),
                 Cow::Owned(text) => eprint!("{text}"),
             }
@@ -231,7 +231,7 @@ fn coloured(text: &str) -> String {
     text.split_inclusive('\n').map(line).collect()
 }
 
-/// Prints to stdout, and says whether that worked; a reader that has gone away (`| head`) is no failure.
+/// Prints to stdout, and returns whether that succeeded; a closed pipe (`| head`) is no failure.
 fn print(text: &str) -> bool {
     let mut stdout = io::stdout().lock();
     let written = stdout.write_all(text.as_bytes());

@@ -1,4 +1,4 @@
-//! `romc plan`: a jump or a walk that nobody recorded, as a recording.
+//! `romc plan`: a new jump or walk, written as a recording.
 
 use super::convert::write_recording;
 use super::*;
@@ -70,7 +70,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     let planned = planned?;
     trusted(&planned.verdict, arguments.force)?;
     let mut answer = answer(arguments, &planned);
-    // Figures first: a folder that is refused leaves no plan behind.
+    // Figures first: if their folder is refused, no plan is written.
     let drawn = || Ok(plan_figures(&planned, model.robot()?));
     inputs.write_figures(figures, drawn, arguments.force, &mut answer)?;
     if let Some(path) = output {
@@ -80,7 +80,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<Answer> {
     Ok(answer)
 }
 
-/// Refuses a plan that is not to be trusted unless it is forced, and warns of what is beyond the recordings.
+/// Refuses an untrustworthy plan unless it is forced, and warns of extrapolation beyond the recordings.
 fn trusted(verdict: &Verdict, force: Overwrite) -> Result<()> {
     match verdict {
         Verdict::Refused(reasons) if force == Overwrite::Refuse => {
@@ -201,7 +201,7 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     Answer::new(text, json)
 }
 
-/// How far the plan is from the recordings and from the limits.
+/// Distances of the plan from the recordings and from the limits.
 fn margins_table(planned: &Plan) -> Table {
     let margins = &planned.margins;
     let [[slip, lift], [drift, sink]] =

@@ -1,4 +1,4 @@
-//! Recordings on their way into a training: divided into sets, checked, conditioned.
+//! Recordings for a training: divided into sets, checked, conditioned.
 
 use super::inspect::finding_json;
 use super::*;
@@ -39,7 +39,7 @@ impl RecordedSets {
         Ok(recorded)
     }
 
-    /// Whole files; clocks are repaired unless told otherwise, or to train as published.
+    /// Whole files. Clocks are repaired by default, except with the settings of the paper.
     pub(super) fn whole(
         paths: [&[PathBuf]; 3],
         reading: &ReadingArguments,
@@ -79,7 +79,7 @@ impl RecordedSets {
         read
     }
 
-    /// Which jumps came into which set, file and first row of each, if they were divided: in words and as JSON.
+    /// The set of each jump, with file and first row, if they were divided: in words and as JSON.
     pub(super) fn division(&self) -> Option<(String, Value)> {
         let (mut text, mut json) = (String::new(), Map::new());
         for (name, places) in SETS.into_iter().zip(self.divided.as_ref()?) {
@@ -103,7 +103,7 @@ impl RecordedSets {
         with.map(|(name, _)| name).collect()
     }
 
-    /// The files of each set, those with jumps in several in the first.
+    /// The files of each set; a file with jumps in several sets is listed in the first.
     pub(super) fn files(&self) -> [(&'static str, Vec<&Path>); 3] {
         let mut seen: Vec<&Path> = Vec::new();
         std::array::from_fn(|set| {

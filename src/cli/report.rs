@@ -57,11 +57,11 @@ fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer>
     progress.finish_and_clear();
     let can_control = without_statistics(&model).is_none();
     let runs = can_control.then(|| run_with_both_lifts(&model, &recordings));
-    // Without statistics of the inputs there are no runs, and the page says so.
+    // Without statistics of the inputs there are no controller runs; the page states this.
     let [plain, consistent] = runs.transpose()?.unwrap_or_default();
     let usual = of_usual_lift(&model, [&plain, &consistent]);
     let paths = recordings.iter().map(|recording| &recording.path);
-    // A file that is gone by now has no digest, and counts as one that the model does not name.
+    // A file deleted since has no digest, and counts as one that the model does not name.
     let digest = |path: &PathBuf| Some((path.clone(), sha256(&std::fs::read(path).ok()?)));
     let content = Content {
         model: &model,
@@ -76,7 +76,7 @@ fn of_model(arguments: &ReportArguments, model_path: &PathBuf) -> Result<Answer>
     };
     let commands = commands(arguments, model_path, can_control);
     let made = page_of(&content, arguments.tolerance, commands)?;
-    // The figures come first: files that romc did not make are refused with nothing written.
+    // The figures come first: if other files would be overwritten, nothing is written.
     let written = match &arguments.figures {
         Some(folder) => inputs.write_folder(folder, &made.files, arguments.force)?,
         None => Vec::new(),

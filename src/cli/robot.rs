@@ -1,8 +1,8 @@
-//! `--robot` of every command, and `romc robot`: what a robot's file says.
+//! `--robot` of every command, and `romc robot`: contents of a robot file.
 
 use super::*;
 
-/// The robot of `--robot`; of a file, how its joints were matched goes to stderr.
+/// The robot of `--robot`; for a file, the matching of its joints is printed to stderr.
 pub(super) fn chosen(name_or_file: &str) -> Result<&'static Robot> {
     let read = robot_file::open(name_or_file, &RobotOptions::default())?;
     let robot = read.robot;

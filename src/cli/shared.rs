@@ -1,4 +1,4 @@
-//! What every command reads, where it may write, its words and progress.
+//! Shared by all commands: recordings, allowed outputs, messages and progress.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ impl Format {
     pub(super) const PAGE: Self = Self(&[".html", ".htm"]);
 }
 
-/// The files that a command reads and never replaces; the folder that it writes into, as it is when the command begins.
+/// The files that a command reads and never replaces; the state of its output folder when the command begins.
 #[derive(Debug, Default)]
 pub(super) struct Inputs<'a>(Vec<&'a Path>, Option<Emitted>);
 
@@ -47,10 +47,10 @@ impl<'a> Inputs<'a> {
         self.and(name.filter(is_file))
     }
 
-    /// Refuses to write a file that is read, or that is in a folder that is.
+    /// Refuses to write to an input file, or into an input folder.
     fn check(&self, output: &Path) -> Result<()> {
         let Ok(place) = output.canonicalize() else {
-            return Ok(()); // what is not there is not read
+            return Ok(()); // a file that does not exist is no input
         };
         let is_read = |input: &&&Path| {
             (input.canonicalize())
@@ -212,7 +212,7 @@ pub(super) fn read_jump(
     Ok(recording.segments.swap_remove(0))
 }
 
-/// Notes motions that turn too far for a linear encoder, with what becomes of them.
+/// Prints a note about motions that turn too far for a linear encoder, with the consequence.
 pub(super) fn note_turns<'a>(motions: impl IntoIterator<Item = &'a Segment>, consequence: &str) {
     let turns = |motion: &Segment| motion.by_heading().len() > 1;
     let turns: Vec<bool> = motions.into_iter().map(turns).collect();
@@ -273,14 +273,14 @@ pub(super) fn note_mismatches(recording: &Recording, robot: &Robot) {
     (mismatch::notes(recording, robot).iter()).for_each(|found| note(found));
 }
 
-/// A jump in two sets judges nothing, and one that counts twice says less than two.
+/// A jump in two sets invalidates the validation, and a repeated one adds no information.
 pub(super) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
     let mut first: BTreeMap<String, (&str, &Path)> = BTreeMap::new();
     let of_set = |(set, paths): &(_, Vec<_>)| paths.iter().map(|path| (*set, *path)).collect();
     let files: Vec<(&str, &Path)> = sets.iter().flat_map::<Vec<_>, _>(of_set).collect();
     for (set, path) in files.into_iter().filter(|(_, path)| path.is_file()) {
         let Ok(bytes) = std::fs::read(path) else {
-            continue; // reading it as a recording says why
+            continue; // reading it as a recording gives the error
         };
         let digest = sha256(&bytes);
         let Some((other, earlier)) = first.get(&digest) else {
@@ -306,13 +306,13 @@ pub(super) fn note_late_restarts(recordings: &[Recording], restart_every_s: f64)
     }
 }
 
-/// Characters that act instead of being shown, but for line ends and tabs, are written out.
+/// Writes out control characters and other invisible ones, except line ends and tabs.
 pub(super) fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, |c| c.escape_unicode().to_string())
 }
 
 pub(super) fn printable_json(text: &str) -> Cow<'_, str> {
-    // Those of JSON itself have been escaped, so that all of them are in strings.
+    // JSON's own are escaped already, so all others are in strings.
     escaped(text, |c| {
         let units = c.encode_utf16(&mut [0; 2]).to_vec();
         units.iter().map(|unit| format!("\\u{unit:04x}")).collect()
@@ -336,8 +336,8 @@ pub(super) fn lines<T: Display>(words: &str, items: impl IntoIterator<Item = T>)
     lines.collect()
 }
 
-/// Text on lines that fit a terminal; those after the first are indented by two characters more. Text that has lines
-/// already, such as a table, stays as it is.
+/// Text on lines that fit a terminal; those after the first are indented by two more characters. Text with lines, such
+/// as a table, is unchanged.
 pub(super) fn fitted(text: &str) -> String {
     let bare = text.trim_start_matches([' ', '\n']);
     if bare.contains('\n') {
@@ -387,7 +387,7 @@ pub(super) fn progress_bar(message: impl Into<String>, steps: usize) -> Progress
     bar.with_message(message.into())
 }
 
-/// Begins a part of the work: a number of steps, or unknown.
+/// Begins a part of the work with this number of steps, or an unknown number.
 pub(super) fn begin_part(bar: &ProgressBar, message: &'static str, steps: Option<usize>) {
     bar.set_message(message);
     bar.set_style(style(steps.map_or(ELAPSED, |_| ESTIMATED)));
@@ -420,7 +420,7 @@ pub(super) fn show_progress(bar: &ProgressBar, done: usize, total: usize) {
     bar.set_position(done as u64);
 }
 
-/// Paths as a shell reads them, in one line.
+/// Paths quoted for a shell, in one line.
 pub(super) fn quoted_all(paths: &[PathBuf]) -> String {
     let words: Vec<String> = paths.iter().map(|path| quoted(path)).collect();
     words.join(" ")

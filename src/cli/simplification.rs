@@ -19,7 +19,7 @@ pub(super) struct Outcome {
     domain_files: Vec<String>,
 }
 
-/// Nothing if no domain was given.
+/// `None` if no domain was given.
 pub(super) fn run(
     equations: &Equations<'_>,
     arguments: &SimplifyArguments,
@@ -28,7 +28,7 @@ pub(super) fn run(
     if files.is_empty() {
         return Ok(None);
     }
-    let progress = progress_bar("simplifying", 2); // and rollouts, which take about as long
+    let progress = progress_bar("simplifying", 2); // and rollouts, which need as much time
     let mut recordings = Vec::new();
     let ranges = ranges(original, arguments)?;
     if ranges.is_none() {
@@ -109,12 +109,12 @@ impl Outcome {
         Ok(())
     }
 
-    /// Coefficients in full where simplification has already chosen their digits.
+    /// All digits if simplification has already chosen the digits of the coefficients.
     pub(super) fn rounding(&self) -> Option<Rounding> {
         (self.certificate.n_changes() > 0).then_some(Rounding::Exact)
     }
 
-    /// Adds the certificate, and a comment to files that can hold one; `equations` are those of the model as printed.
+    /// Adds the certificate, and a comment to files that can contain one; `equations` are as printed.
     pub(super) fn add_to(
         &self,
         files: &mut Vec<EmittedFile>,
@@ -162,7 +162,7 @@ impl Outcome {
                 Some("rs") => ["// ", ""],
                 Some("py") => ["# ", ""],
                 Some("md" | "html") => ["<!-- ", " -->"],
-                _ => continue, // holds none of the model's equations
+                _ => continue, // contains none of the model's equations
             };
             let comment = format!(
                 "{before}Simplified within {within}{after}\n\
@@ -197,10 +197,10 @@ pub(super) fn exact_words(equations: &Equations<'_>) -> String {
 }
 
 const LADDER: [f64; 4] = [0.001, 0.01, 0.05, 0.1];
-/// Its steps of progress: those within no tolerance and the chosen one are included.
+/// Its progress steps, including one without tolerance and one with the chosen tolerance.
 pub(super) const LADDER_STEPS: usize = LADDER.len() + 2;
 
-/// Sizes, errors and rollouts within several tolerances; errors of each equation within `chosen`; changes within it.
+/// Sizes, errors and rollouts for several tolerances; errors of each equation and changes for `chosen`.
 pub(super) fn ladder(
     model: &ReducedModel,
     assessment: &Assessment<'_>,

@@ -6,12 +6,12 @@ use crate::identify::{IdentifyError, identify};
 use crate::limits::table::{LAYER_WIDTH, of_training};
 use clap::ValueEnum as _;
 
-/// The word for actuators that stands for no file.
+/// The word for no actuators.
 const NONE: &str = "none";
 const IDENTIFIED: &str = "identify";
 const IDENTIFIED_FROM: usize = 20;
 
-/// The settings of the window of predictions beside its weight.
+/// The settings of the prediction window, except its weight.
 const WINDOW: &str = "bptt-window bptt-stride bptt-decay bptt-integrator";
 
 impl TrainSettings {
@@ -34,7 +34,7 @@ impl TrainSettings {
         Ok(settings)
     }
 
-    /// Without actuators that are [identified](Self::identify).
+    /// Without [identified](Self::identify) actuators.
     pub(super) fn options(
         &self,
         latent_dim: usize,
@@ -103,15 +103,15 @@ impl TrainSettings {
         Ok(options)
     }
 
-    /// Whether phases are those of a walk, and there are latent coordinates enough for all of the body.
+    /// Whether the phases are those of a walk and there are enough latent coordinates for the whole body.
     fn walks(&self, options: &TrainOptions) -> bool {
         let is_walk = matches!(self.phases, Some(PhaseSet::Trot | PhaseSet::Crawl));
         let body = BodyRows::all();
         is_walk && body.fits(options.latent_dim) && options.coordinates() == Coordinates::Named
     }
 
-    /// Leaves out phases of a walk that the training recordings do not have, with a note for each. Another is printed if no
-    /// phases were chosen and contacts look like another motion than a jump.
+    /// Leaves out phases of a walk that do not occur in the training recordings, with a note for each. Another note is
+    /// printed if no phases were chosen and contacts do not look like a jump.
     pub(super) fn check_phases(
         &self,
         options: &mut TrainOptions,
@@ -145,8 +145,8 @@ impl TrainSettings {
         patterns.or(self.phases.map(PhaseSet::rule))
     }
 
-    /// Sets the actuators that are identified from the first training recordings, if the settings want those. Recordings
-    /// that are not of one robot are refused, also where no actuators are wanted.
+    /// Sets the actuators identified from the first training recordings, if requested. Recordings of different robots
+    /// are always refused.
     pub(super) fn identify(
         &self,
         options: &mut TrainOptions,
@@ -166,7 +166,7 @@ impl TrainSettings {
                 "torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
             ));
         });
-        options.actuators = found.ok(); // the note has the reason
+        options.actuators = found.ok(); // the note states the reason
         Ok(())
     }
 
@@ -187,7 +187,7 @@ impl TrainSettings {
         }
     }
 
-    /// The decoder mirrors the encoder unless it is described itself.
+    /// The decoder has the encoder's layers in reverse unless it has its own.
     fn maps(&self) -> MapOptions {
         let widths = |given: &Option<Widths>| given.as_ref().map(|widths| widths.0.clone());
         let encoder_layers = widths(&self.encoder_layers).unwrap_or_default();
@@ -199,7 +199,7 @@ impl TrainSettings {
         }
     }
 
-    /// By default the joint one if a setting is given that it alone has.
+    /// By default the joint method if one of its own settings is given.
     pub(super) fn method(&self) -> Method {
         self.method.unwrap_or(match self.of_the_joint_method() {
             None => Method::ClosedForm,
@@ -223,7 +223,7 @@ impl TrainSettings {
             .or_else(|| self.first("bptt-weight").or(self.first(WINDOW)))
     }
 
-    /// The first of some settings, by their names, that is given.
+    /// The first of these settings, by name, that is given.
     pub(super) fn first(&self, names: &'static str) -> Option<&'static str> {
         let given = self.given();
         names.split(' ').find(|name| given.contains_key(*name))
@@ -278,7 +278,7 @@ impl TrainSettings {
         self.given().into_iter().map(flag).collect()
     }
 
-    /// Refuses settings that have no use beside the others.
+    /// Refuses settings that have no effect together with the others.
     pub(super) fn check_pairs(&self) -> Result<()> {
         let (method, is_linear) = (self.method(), self.maps().is_linear());
         let given = |names, when: bool| self.first(names).filter(|_| when);
@@ -362,7 +362,7 @@ impl TrainSettings {
         Some(words)
     }
 
-    /// The checks of clap, for settings that came from a file.
+    /// The checks of clap, for settings from a file.
     fn check(&self) -> Result<(), String> {
         for (name, value) in &self.given() {
             let (numbers, range) = match value {

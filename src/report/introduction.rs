@@ -1,4 +1,4 @@
-//! A report's first words: what the model is fit for, whether its training saw the recordings, errors.
+//! The first sentences of a report: uses the model is fit for, whether its training used the recordings, errors.
 
 use std::collections::BTreeSet;
 
@@ -163,7 +163,7 @@ fn errors(assessment: &Assessment<'_>) -> String {
     )
 }
 
-/// The errors as shares of those of the better template.
+/// The errors relative to those of the better template.
 fn beside_template(assessment: &Assessment<'_>) -> Option<String> {
     let best = best_template(assessment).filter(|_| assessment.full.diverged == 0)?;
     let best = &assessment.baselines[best];

@@ -262,7 +262,7 @@ impl<'a> Jump<'a> {
         figure.in_columns(2, (360.0, 180.0))
     }
 
-    /// The same with the best baseline alone, for the first screen.
+    /// The same with the best baseline only, as used on the first screen.
     pub(super) fn overview(&self) -> Figure {
         let best = best_template(self.assessment);
         let mut figure = self.body_path("overview", best.as_slice());

@@ -1,4 +1,4 @@
-//! The page on a generated controller's log: what ended it, statuses, figures over time.
+//! The page of a generated controller's log: the status that ended it, all statuses, figures over time.
 
 use askama::Template;
 use serde::Serialize;
@@ -201,7 +201,7 @@ impl Drawn<'_> {
         Panel::shaded(title, lines.collect(), self.shaded.clone())
     }
 
-    /// Times of the stretches of steps that are so.
+    /// Time spans of the steps that satisfy a condition.
     fn spans(&self, is_so: impl Fn(usize) -> bool) -> Vec<(f64, f64)> {
         let end = self.time_s.len();
         let all = stretches(0..end, |a, b| is_so(a) == is_so(b)).into_iter();

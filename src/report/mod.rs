@@ -1,9 +1,10 @@
 //! A one-page assessment of a model, its tables and its figures.
 //!
-//! An assessment and controller runs come in; a self-contained HTML page and figures leave. `log.rs` makes another page of
-//! a generated controller's log. `introduction.rs` and `verdict.rs` have the first screen, `tables.rs` holds the tables and the same numbers for programs, `contents.rs` and `jump.rs` pick
-//! what is drawn, `figures/` draws it, `sections.rs` and `page.rs` place all. Start with `page.rs`. What this file
-//! imports is what its files import with `use super::*`.
+//! An assessment and controller runs come in; a self-contained HTML page and figures leave. `log.rs` makes another page
+//! of a generated controller's log. `introduction.rs` and `verdict.rs` have the first screen, `tables.rs` contains the
+//! tables and the same numbers for programs, `contents.rs` and `jump.rs` choose the drawings, `figures/` draws them,
+//! `sections.rs` and `page.rs` place all. Start with `page.rs`. All files share its imports
+//! (`use super::*`).
 
 mod contents;
 mod figures;

@@ -1,4 +1,4 @@
-//! The terms of equations with those that they may be rewritten to, and ranges of their combinations over a box.
+//! The terms of equations, their possible replacements, and ranges of their combinations over a box.
 
 use super::equation::Rewrite;
 use super::*;
@@ -154,7 +154,7 @@ impl<'a> Ranges<'a> {
 
     /// All values of `sum delta_j theta_j`, for every choice of the `delta_j` in their intervals. Terms without common
     /// variables are independent: their ranges add. Others are bounded together, with the middles of the intervals as
-    /// coefficients. Where these are many, bounding only those of the very same variables is sharper: both are done.
+    /// coefficients. For many terms it is sharper to bound together only terms with equal variables: both are done.
     pub(crate) fn combination(&mut self, parts: &[Part]) -> Interval {
         let connected = self.sum_of_groups(self.connected(parts));
         let alike = self.sum_of_groups(self.alike(parts));

@@ -35,8 +35,8 @@ impl LatentDynamics for Hopper {
     }
 }
 
-/// Commanded inputs from one sample of a motion to the next, for a robot on a reference without inputs: the mean of the
-/// estimates at both samples. `given` predicts the input from the state.
+/// Commanded inputs from one sample of a motion to the next: the mean of the estimates at both samples. The robot is on
+/// a reference without inputs. `given` predicts the input from the state.
 fn estimated(
     step_s: f64,
     velocity: &[f64],

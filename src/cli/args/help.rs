@@ -9,7 +9,7 @@ use super::*;
 
 /// Heading of the options that every command ends with.
 pub(super) const OUTPUT: &str = "Output";
-/// Heading of the options that say how recordings are read.
+/// Heading of the options about reading recordings.
 pub(super) const RECORDINGS: &str = "Recordings";
 
 pub(super) fn help_flag() -> Arg {

@@ -1,11 +1,11 @@
-//! Flags that a command would ignore beside its other arguments, refused as wrong usage.
+//! Flags without effect together with the other arguments of a command, refused as wrong usage.
 
 use super::*;
 use crate::Error;
 use crate::artifact::is_standard_input;
 
 impl Arguments {
-    /// Refuses a flag that has no effect beside the others.
+    /// Refuses a flag that has no effect together with the other arguments.
     pub(crate) fn refuse_idle(&self) -> Result<(), Error> {
         match &self.command {
             Command::Compile(arguments) => of_compile(arguments),
@@ -42,7 +42,7 @@ impl Arguments {
     }
 }
 
-/// What flags need to have an effect, and whether it is there.
+/// A requirement of flags, in words, and whether it is satisfied.
 #[derive(Clone, Copy)]
 struct Needed(&'static str, bool);
 
@@ -113,7 +113,7 @@ fn of_check(arguments: &CheckArguments) -> Result<(), Error> {
 }
 
 fn of_import(arguments: &ImportArguments) -> Result<(), Error> {
-    // A name that says no format: the import tells it by the content, and every flag may be used.
+    // If the name has no known ending, the import recognises the format by the content: every flag is allowed.
     let format = (arguments.format).or_else(|| Format::of_path(&arguments.file).ok());
     let is = |wanted: &[Format]| format.is_none_or(|format| wanted.contains(&format));
     Needed("a file of LaTeX or Markdown", is(&[Format::Latex]))

@@ -27,7 +27,7 @@ const EQUATIONS: &str = "Equations";
 const ROBOT: &str = "Robot and units";
 const COMPARISON: &str = "Comparison with recordings";
 
-/// What `-h` begins its last lines with, in place of the names of tensors.
+/// Beginning of the last lines of `-h`, in place of the names of tensors.
 const SHORT: &str =
     "This is a selection: `romc import --help` lists all options and the names of tensors.\n\n";
 

@@ -35,7 +35,7 @@ pub(super) fn overwrite() -> impl TypedValueParser<Value = Overwrite> {
     BoolValueParser::new().map(Overwrite::from)
 }
 
-/// Takes any text and offers the names of romc's own robots to shells.
+/// Accepts any text; shells complete it with the names of romc's own robots.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotParser;
 

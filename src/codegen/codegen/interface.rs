@@ -29,9 +29,9 @@ pub struct ModelInterface {
     /// Whether latent quantities are in physical units instead of the model's scaled ones.
     pub is_physical: bool,
     pub latent_dim: usize,
-    /// Lines of the documentation with quantity and unit of each latent coordinate; empty where they are not known.
+    /// Lines of the documentation with quantity and unit of each latent coordinate; empty if unknown.
     pub latent_lines: Vec<String>,
-    /// Number of robot coordinates, if the model speaks of any.
+    /// Number of robot coordinates, if the model has any.
     pub state_dim: Option<usize>,
     pub(crate) maps: Vec<FunctionSpec>,
     pub phases: Vec<PhaseInterface>,
@@ -89,7 +89,7 @@ pub(super) fn computes_angles(statement: &Statement) -> bool {
     matches!(statement, Statement::SinCos { .. })
 }
 
-/// The input of the maps, and motor torques from it, for a model over a known robot's coordinates.
+/// Functions for the maps' input and motor torques from it; none unless the model has a known robot's coordinates.
 fn input_entries(model: &ReducedModel) -> Result<Vec<FunctionSpec>, LowerError> {
     let (Some(input), Some(torque)) = (
         lower::generalised_input(model)?,

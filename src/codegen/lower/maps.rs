@@ -51,7 +51,7 @@ impl Map {
     /// The program of a model's map.
     ///
     /// # Errors
-    /// [`LowerError::Model`] if the model has no scaling, encoder or, for the maps that decode, decoder.
+    /// [`LowerError::Model`] if the model has no scaling, no encoder, or no decoder for the decoding maps.
     pub fn lower(self, model: &ReducedModel) -> Result<Program> {
         let map = match self {
             Self::Encode | Self::EncodeVelocity | Self::ProjectInput | Self::LiftInput => {
@@ -62,7 +62,7 @@ impl Map {
         let Some(map) = map.as_affine() else {
             return lower(self, model);
         };
-        // The Jacobian of a linear map is the same everywhere.
+        // The Jacobian of a linear map is constant.
         let at = &DVector::zeros(map.input_dim());
         let (weights, bias) = match self {
             Self::Encode => (model.encoder_jacobian(at)?, Some(map.bias().clone())),
@@ -257,7 +257,7 @@ fn divided<'b>(values: &[Number<'b>], factors: &DVector<f64>) -> Layer<'b> {
 }
 
 /// `phi(a)` and `phi'(a)` without branches: `min(a, 0) = (a - |a|)/2` and `max(a, 0) = (a + |a|)/2` are exact in
-/// floating point, so that elu has the slope `e = exp(min(a, 0))` and the value `max(a, 0) + (e - 1)`.
+/// floating point, so elu has the slope `e = exp(min(a, 0))` and the value `max(a, 0) + (e - 1)`.
 fn activation(activation: Activation, a: Number) -> (Number, Number) {
     match activation {
         Activation::Linear => (a, a.constant(1.0)),
@@ -342,7 +342,7 @@ pub(super) fn pinv_times<'b>(
     rows: &[Vec<Number<'b>>],
     w: &[Number<'b>],
 ) -> Layer<'b> {
-    // Two chains, so that one does not wait for every sum of the other.
+    // Two chains: the sums of one do not wait for those of the other.
     let dot = |a: &[Number<'b>], b: &[Number<'b>]| {
         let mut sums = [Number::known(sheet, 0.0); 2];
         for (k, (&a, &b)) in a.iter().zip(b).enumerate() {

@@ -1,4 +1,4 @@
-//! Numbers as they are printed, and coefficients before terms with a record of what rounding changed.
+//! Printed numbers, and coefficients before terms with a record of their rounding errors.
 
 use super::expression::with_coefficient;
 use super::*;
@@ -6,7 +6,7 @@ use super::*;
 /// How coefficients are rounded for print.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rounding {
-    /// The paper's two decimals, or more where a coefficient would be off by over 5 %. Never rounds a term away.
+    /// The paper's two decimals, or more if the rounding error would exceed 5 %. Never rounds a term to zero.
     #[default]
     Adaptive,
     /// Exactly this many places after the point, as the paper prints; small coefficients can vanish.
@@ -27,13 +27,13 @@ pub struct Decimal {
 }
 
 impl Rounding {
-    /// Of equations in physical units where no other is chosen; the default is that of the paper's equations (25), (26).
+    /// Default of equations in physical units; the other default is that of the paper's equations (25), (26).
     pub const PHYSICAL: Self = Self::Significant(3);
 }
 
 const MOST_DIGITS: usize = 40;
 pub(super) const LEAST_DECIMALS: usize = 2; // fewest after the point of `Rounding::Adaptive`
-const MOST_DECIMALS: usize = 6; // beyond, it turns to powers of ten
+const MOST_DECIMALS: usize = 6; // beyond, it uses powers of ten
 pub(super) const RELATIVE_ERROR: f64 = 0.05; // its largest |printed - value| / |value|
 const LARGE: f64 = 1e7; // from here on with a power of ten
 const SMALL: f64 = 1e-4; // below with a power of ten where digits are not fixed
@@ -114,7 +114,7 @@ impl Decimal {
         }
     }
 
-    /// What the printed text means.
+    /// The value of the printed text.
     pub fn value(&self) -> f64 {
         let value = self.to_string().parse();
         value.expect("sign, digits and exponent form a number")
@@ -141,7 +141,7 @@ impl Decimal {
     }
 }
 
-/// So many digits, or as many more as it takes to round a finite number to one: of 1.6e308 no fewer than two.
+/// `digits`, or more if a finite number rounds to infinity with these: 1.6e308 needs at least two.
 pub(super) fn finite_digits(value: f64, digits: usize) -> usize {
     let is_finite = |digits: &usize| {
         let text = format!("{value:.*e}", digits - 1);
@@ -256,7 +256,7 @@ impl Rounder {
         }
     }
 
-    /// A coefficient before its term, which also is a text for the record; nothing if it rounds to zero.
+    /// A coefficient before its term, whose text is for the record; nothing if it rounds to zero.
     fn term(
         &mut self,
         phase: &str,
@@ -285,7 +285,7 @@ impl Rounder {
             return None;
         }
         report.largest_relative = report.largest_relative.max(error / coefficient.abs());
-        // Only a true one: a rounded 1.00 says how well it is known.
+        // Only an exact 1 is omitted: a rounded 1.00 shows its precision.
         let is_omitted = coefficient.abs() == 1.0 && self.is_exact;
         Some(with_coefficient(&printed, is_omitted, term.clone()))
     }

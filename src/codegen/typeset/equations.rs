@@ -1,4 +1,4 @@
-//! A model's latent dynamics as equations to print, and what rounding did to them.
+//! A model's latent dynamics as printed equations, and the effect of rounding on them.
 
 use super::*;
 
@@ -13,7 +13,7 @@ pub struct EquationSystem {
 pub struct Equation {
     pub(crate) left: Symbol,
     pub(crate) terms: Vec<Signed>,
-    /// Whether small terms were left out, so that the sides are nearly equal.
+    /// Whether small terms were left out, so the two sides are only nearly equal.
     pub is_approximate: bool,
 }
 
@@ -82,7 +82,7 @@ impl Typeset {
     }
 }
 
-/// Places of systems with the same printed equations together, each group where its first system is.
+/// Indices of systems grouped by equal printed equations, each group in the order of its first system.
 pub fn alike(systems: &[EquationSystem]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (place, system) in systems.iter().enumerate() {

@@ -21,8 +21,8 @@ pub(super) fn terms<'e>(
         .collect()
 }
 
-/// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`. The coefficient takes the place of a
-/// term or numerator that is one; one that `is_omitted` prints its sign alone.
+/// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`. The coefficient replaces a term or
+/// numerator equal to one; if `is_omitted`, only its sign is printed.
 pub(super) fn with_coefficient(coefficient: &Decimal, is_omitted: bool, term: Signed) -> Signed {
     let number = Math::Number(coefficient.magnitude());
     let math = match term.math {
@@ -71,7 +71,7 @@ impl Layout<'_> {
         Box::new(self.signed(expr).into_math())
     }
 
-    /// Constants first, then monomials by degree and variables, then the rest as the pool has it.
+    /// Constants first, then monomials by degree and variables, then the rest in the pool's order.
     fn sum(&self, terms: &[ExprId]) -> Signed {
         let mut order: Vec<ExprId> = terms.to_vec();
         order.sort_by_cached_key(|&term| {
@@ -81,7 +81,7 @@ impl Layout<'_> {
         });
         let laid_out = |term| {
             let Signed { negative, math } = self.signed(term);
-            // A sum inside a sum does not occur in canonical form; brackets keep it right.
+            // A sum inside a sum does not occur in canonical form; brackets keep it correct.
             let math = in_brackets(math);
             Signed { negative, math }
         };
@@ -160,7 +160,7 @@ impl Layout<'_> {
         }
         let slash = |top, bottom| Math::Slash(Box::new(integer(top)), Box::new(integer(bottom)));
         let (base, exponent) = match (exponent.as_rational(), self.pool.node(base)) {
-            // Where a base may be negative its odd root is read as negative, its power is nothing.
+            // If a base may be negative, its odd root is a real number and its power is undefined.
             (Some((1, index @ (2 | 4 | 6 | 8))), _) => {
                 let index = (index != 2).then_some(index as u32);
                 return (FactorKey::Function, Math::Root(self.boxed(base), index));
@@ -190,7 +190,7 @@ impl Layout<'_> {
         // The power of exp(x) without parentheses could be read as one of x.
         let base = match self.apply(function, argument) {
             math @ Math::Function(..) => Math::Group(Box::new(math)),
-            // bars and roots show themselves where they end
+            // bars and roots show their own extent
             math => math,
         };
         Math::Power(Box::new(base), Box::new(power))

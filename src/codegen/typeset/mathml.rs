@@ -159,7 +159,7 @@ fn mathematics(word: &str) -> Option<String> {
 }
 
 const INVISIBLE_TIMES: &str = "<mo>\u{2062}</mo>";
-/// What TeX puts before a function's name.
+/// TeX's space before a function's name.
 const THIN_SPACE: &str = r#"<mspace width="0.167em"/>"#;
 const APPLY: &str = "<mo>\u{2061}</mo>";
 const MINUS: &str = "\u{2212}";
@@ -190,7 +190,7 @@ pub(crate) fn mathml(math: &Math) -> String {
             format!("<mrow>{top}<mo>/</mo>{bottom}</mrow>")
         }
         Math::Power(base, exponent) => match &**base {
-            // Both scripts stand above each other.
+            // Both scripts are above each other.
             Math::Symbol(symbol) if !symbol.subscript.is_empty() => {
                 let (base, subscript) = (accented(symbol), subscript(symbol));
                 let exponent = mathml(exponent);

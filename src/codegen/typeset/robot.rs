@@ -1,4 +1,4 @@
-//! The model in robot coordinates: the rows of the encoder, and the accelerations that the latent dynamics mean.
+//! The model in robot coordinates: the rows of the encoder, and the robot accelerations of the latent dynamics.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use super::*;
 
 /// Weights below this share of their row's largest are left out of the printed encoder.
 const NEGLIGIBLE: f64 = 0.02;
-/// Difference of two accelerations from which it is explained, as a share of the largest.
+/// Difference of two accelerations that is explained, as a share of the largest.
 const NOTABLE: f64 = 0.01;
 const SAME: f64 = 1e-9; // difference of weights
 const NOISE: f64 = 1e-12; // share of the largest
@@ -16,15 +16,15 @@ const NOISE: f64 = 1e-12; // share of the largest
 /// A model in robot coordinates `q`, in SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RobotTypeset {
-    /// `z = W_e (s_x q) + b_e`, one equation a latent coordinate.
+    /// `z = W_e (s_x q) + b_e`, one equation per latent coordinate.
     pub encoder: EquationSystem,
     /// How many weights of the encoder are too small to be printed: each below 2 % of the largest of its row.
     pub negligible_weights: usize,
-    /// `ddq = (W_d ddz) / s_x` a phase, as sums of candidate terms.
+    /// `ddq = (W_d ddz) / s_x` per phase, as sums of candidate terms.
     pub systems: Vec<EquationSystem>,
-    /// What rounding changed in `systems`.
+    /// Rounding errors of `systems`.
     pub rounding: RoundingReport,
-    /// Where a decoded position accelerates otherwise than the latent coordinate that it nearly is.
+    /// Decoded positions whose acceleration differs from that of the nearly equal latent coordinate.
     pub deviations: Vec<Deviation>,
 }
 

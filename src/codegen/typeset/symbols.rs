@@ -1,4 +1,4 @@
-//! How the model's variables are written, and what else a user can choose about printed equations.
+//! Symbols of the model's variables, and the options of printed equations.
 
 use std::collections::BTreeMap;
 
@@ -104,11 +104,11 @@ impl std::fmt::Display for Glyph {
     }
 }
 
-/// What a new name may be.
+/// Allowed new names.
 const NAME: &str = "a letter, a word or a Greek letter's name, with an optional subscript of letters and digits after \
                     `_` (x, theta, p_x, F_lin,1)";
 
-const LONGEST_WORD: usize = 24; // more is surely a mistake
+const LONGEST_WORD: usize = 24; // longer words are surely mistakes
 
 fn parse_symbol(text: &str) -> Option<Symbol> {
     let (base, subscript) = match text.split_once('_') {

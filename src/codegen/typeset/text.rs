@@ -196,7 +196,7 @@ fn math_text(math: &Math) -> String {
     }
 }
 
-/// A piece that stands beside an operator: in parentheses unless it is a number, a name or a call.
+/// An operand of an operator: in parentheses unless it is a number, a name or a call.
 fn operand(math: &Math) -> String {
     let text = math_text(math);
     match math {

@@ -3,7 +3,7 @@
 
 use super::*;
 
-/// One piece of laid-out mathematics: parentheses, dots and signs are in place, a printer chooses spelling alone.
+/// One piece of laid-out mathematics: parentheses, dots and signs are in place, a printer only chooses the spelling.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Math {
     /// A number without sign.
@@ -139,7 +139,7 @@ const PARENTHESIS: f64 = 0.39;
 const OPERATOR: f64 = 1.222; // plus or minus with its spaces
 pub(crate) const EQUALS: f64 = 1.333; // with its spaces
 const MINUS: f64 = 0.778;
-/// Of a character in a script of the same, whose font is wider than the large one scaled to its size.
+/// Of a character in a script, relative to the text; the script's font is wider than the text's scaled to its size.
 const SCRIPT: f64 = 0.8;
 
 pub(crate) fn width(math: &Math) -> f64 {
@@ -201,8 +201,8 @@ fn glyph_width(glyph: &Glyph) -> f64 {
     }
 }
 
-/// Splits terms before signs into lines of `limit` em, greedily; `first` em of the first line and `indent` em of
-/// others are taken.
+/// Splits terms before signs into lines of `limit` em, greedily; `first` em of the first line and `indent` em of the
+/// others are in use already.
 pub(crate) fn break_lines(terms: &[Signed], limit: f64, first: f64, indent: f64) -> Vec<&[Signed]> {
     let mut lines = Vec::new();
     let mut start = 0;

@@ -1,14 +1,14 @@
-//! Sentences of every printed form of a model, in the form's spelling, and what Markdown and HTML pages are made of.
+//! Sentences of all printed forms of a model, in the form's spelling, and the contents of Markdown and HTML pages.
 
 use super::decimal::{LEAST_DECIMALS, Occurrence, RELATIVE_ERROR};
 use super::*;
 use crate::equations::PhaseEquations;
 use crate::robot::{ContactFlags, Leg};
 
-/// How a sentence spells words from outside and mathematics.
+/// How external text and mathematics are spelled in a sentence.
 #[derive(Debug)]
 pub struct Spelling {
-    /// Text, so that it shows as it is.
+    /// Text, escaped to be shown unchanged.
     pub text: fn(&str) -> String,
     /// Mathematics within a line or cell, which the text spells in the library's syntax.
     pub(crate) math: fn(&Math, &str) -> String,
@@ -30,12 +30,12 @@ pub const PLAIN: Spelling = Spelling {
     math: |_, text| text.to_owned(),
 };
 
-/// Whether a character of a text from outside ends a line or is a control character.
+/// Whether a character of external text ends a line or is a control character.
 pub(super) fn ends_line(character: char) -> bool {
     character.is_control() || matches!(character, '\u{2028}' | '\u{2029}')
 }
 
-/// A character that acts instead of being shown, for a page: written out.
+/// A control character or invisible one, written out for a page.
 pub(super) fn code_point(character: char) -> String {
     format!("[U+{:04X}]", u32::from(character))
 }
@@ -92,7 +92,7 @@ fn conditions(phases: &[&PhaseEquations], text: fn(&str) -> String) -> String {
     }
 }
 
-/// Patterns of feet by front and rear pair where that says the same, one by one otherwise.
+/// Patterns of feet by front and rear pair if that is equivalent, else listed individually.
 fn pairs(patterns: &[ContactFlags]) -> String {
     let is_meant = |[front, rear]: [[bool; 3]; 2]| {
         FeetRule::all_patterns().all(|feet| {
@@ -111,7 +111,7 @@ fn pairs(patterns: &[ContactFlags]) -> String {
             let pairs = [(front, "front"), (rear, "rear")];
             let mut words = Vec::from(pairs.map(|(words, pair)| words.replace("{}", pair)));
             words.retain(|words| !words.is_empty());
-            // what is there comes before what is not
+            // feet on the ground come before feet in the air
             words.sort_by_key(|words| words.starts_with("no "));
             words.join(" and ")
         }
@@ -129,7 +129,7 @@ fn by_name(pattern: &ContactFlags) -> String {
     }
 }
 
-/// How coefficients were rounded and what it changed, in a few sentences.
+/// The rounding of coefficients and its effect, in a few sentences.
 pub fn rounding(spelling: &Spelling, rule: Rounding, report: &RoundingReport) -> String {
     let rule = match rule {
         Rounding::Adaptive => format!(

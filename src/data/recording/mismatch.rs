@@ -32,7 +32,7 @@ const OTHER_SLIP: f64 = 1.15; // times worse that feet may stay in place with a 
 
 const ORIGIN: (f64, f64) = (1.0, 0.5); // m from the origin and rad about the vertical at which a segment may begin
 
-/// Something about a whole recording that cannot be true of the robot, its figure and the bound that it breaks.
+/// A property of a whole recording that is impossible for the robot, its value and the bound that it exceeds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mismatch {
     #[serde(rename = "what")]
@@ -60,13 +60,13 @@ fn mismatch(kind: &'static str, breach: Breach, words: String) -> Found {
     })
 }
 
-/// Everything about a recording that cannot be true of the robot.
+/// All properties of a recording that are impossible for the robot.
 pub fn mismatches(recording: &Recording, robot: &Robot) -> Vec<Mismatch> {
     let slip = Slip::of(recording, robot);
     let balance = Balance::of(recording, robot);
     let (place, is_attitude) = place(recording, robot, &slip).unzip();
     let floor_m = feet::floor_m(recording, robot);
-    // In another attitude the feet's heights do not identify their columns.
+    // With another attitude the feet's heights do not identify their columns.
     let columns = match is_attitude {
         Some(true) => None,
         _ => feet::columns(recording, robot),
@@ -121,7 +121,7 @@ pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
         let words = format!("{found}: torques that were not recorded, or in other units");
         return Some((at, words));
     }
-    // Velocities may be broken where heights are right.
+    // Velocities may be wrong while heights are right.
     let falls = each().find_map(|(at, balance)| {
         beyond(balance.fall_by_height_m_s2?, FALL_M_S2)?;
         Some((at, fall(balance)?.words))
@@ -129,7 +129,7 @@ pub(crate) fn contradiction(balances: &[Balance]) -> Option<(usize, String)> {
     if falls.is_some() {
         return falls;
     }
-    // Of several recordings, those that differ from the median; all may be off alike, by units or a payload.
+    // Of several recordings, those that differ from the median; all may have the same deviation, by units or a payload.
     let most = median(shares().map(|(_, share)| share));
     let (low, high) = (most / OTHER_SHARE, most * OTHER_SHARE);
     let (at, share) =
@@ -156,7 +156,7 @@ pub fn notes(recording: &Recording, robot: &Robot) -> Vec<String> {
     notes
 }
 
-/// Encoders and decoders were learned from jumps that begin at the origin and run along x.
+/// The training jumps of encoders and decoders begin at the origin and run along x.
 fn origin(recording: &Recording) -> Found {
     let [x, y, yaw] = [0, 1, 5].map(|coordinate| {
         let starts = recording.segments.iter().map(|segment| segment.state(0));
@@ -349,7 +349,7 @@ fn other_robot(recording: &Recording, robot: &Robot, slip: &Slip, balance: &Bala
     mismatch("other_robot", Some((share, OTHER_WEIGHT.0.exp())), words)
 }
 
-/// A value that is not within a range, and the bound that it breaks; no number breaks the upper.
+/// A value outside a range, and the bound that it exceeds; NaN counts as above the upper.
 fn beyond(value: f64, (low, high): (f64, f64)) -> Breach {
     let of_nan = value.is_nan().then_some((value, high));
     outside(value, low, high).or(of_nan)

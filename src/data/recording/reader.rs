@@ -55,12 +55,12 @@ impl Reader {
         }
     }
 
-    /// The reader that has these recordings, as they are, in place of files at their paths.
+    /// A reader that uses these recordings, unchanged, instead of files at their paths.
     pub fn with_held(self, held: Arc<[Recording]>) -> Self {
         Self { held, ..self }
     }
 
-    /// The reader for recordings of a robot, for the names of its joints; the default is the Go1.
+    /// The reader for recordings of a robot, whose joint names it needs; the default is the Go1.
     pub fn for_robot(self, robot: &'static Robot) -> Self {
         let robot = Some(robot);
         Self { robot, ..self }
@@ -190,7 +190,7 @@ fn read_noted(path: &Path, lines: Lines<'_>) -> Outcome<Reading> {
     })
 }
 
-/// Gives numbers their decimal points again; segments that stay broken are left out where others remain.
+/// Restores the decimal points of numbers; segments that stay broken are left out if others remain.
 fn restore_points(reading: &mut Reading) {
     let segments = std::mem::take(&mut reading.recording.segments);
     let (mut whole, mut broken) = (Vec::new(), Vec::new());

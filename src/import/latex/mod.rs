@@ -2,9 +2,9 @@
 //! each piece with its place. Displays without a left side `\ddot z_k =` are skipped. Text is also skipped, unless the
 //! only equations are in its lines. In a display that is read, anything without a meaning here is an error.
 //!
-//! Read `token`, `markdown` (text to tokens), `expander`, `commands`, `definitions` (what is printed), `sections`, then
-//! for a right side `derivatives`, `reader`, `expression`, `variables`, `numbers`. `words.txt` has LaTeX's words by
-//! class.
+//! Read `token`, `markdown` (text to tokens), `expander`, `commands`, `definitions` (printed text), `sections`, then
+//! for a right-hand side `derivatives`, `reader`, `expression`, `variables`, `numbers`. `words.txt` has LaTeX's words
+//! by class.
 
 mod commands;
 mod definitions;

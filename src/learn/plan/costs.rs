@@ -59,7 +59,7 @@ fn squares(task: &Task<'_>, y: &[f64]) -> Vec<(Affine, f64)> {
             0 => settings.first_duration,
             _ => settings.duration[usize::from(!of.is_grounded())],
         };
-        // A little for every duration keeps the program strictly convex.
+        // A small cost of every duration keeps the program strictly convex.
         out.push(one(task.duration(part), weight.max(1e-3)));
     }
     for part in 0..task.seed.parts.len() {

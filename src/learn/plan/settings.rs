@@ -1,4 +1,4 @@
-//! Weights and bounds of a plan, and the jump that it is to reach.
+//! Weights and bounds of a plan, and its goal.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -68,7 +68,7 @@ settings! {
     /// Share of the torque limits that a plan may use at its nodes.
     torque_share: f64 = 0.9, 1.0;
     friction: f64 = 0.6, ANY;
-    /// Force that may exceed the friction cone, N: the input's force is not free of noise.
+    /// Force that may exceed the friction cone, N: the input's force contains noise.
     friction_slack_n: f64 = 10.0, ANY;
     /// Most speed of the body at the end, of jumps that land, m/s.
     end_speed_m_s: f64 = 0.03, ANY;
@@ -148,7 +148,7 @@ impl Goal {
     }
 
     pub(super) fn check_within(&self, prior: &JumpPrior, height_m: f64, reach: f64) -> Result<()> {
-        // Heights count from wherever the recordings have their zero.
+        // Heights are relative to the recordings' zero.
         let names = [
             ("distance", 0.0),
             ("apex", 0.0),

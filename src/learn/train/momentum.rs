@@ -111,8 +111,8 @@ pub(super) fn momentum_rows(
     rows
 }
 
-/// Forces and moments that change the momentum of a body coordinate: for a centre of mass its own force, for a rotation
-/// the forces and moments with the same mirror symmetry.
+/// Forces and moments that change the momentum of a body coordinate: the force along the coordinate of a centre of
+/// mass; for a rotation the forces and moments with the same mirror symmetry.
 pub(super) fn loads_on(coordinate: usize) -> impl Iterator<Item = usize> {
     let is_rotation = coordinate >= ROLL;
     let lateral = is_lateral(coordinate);

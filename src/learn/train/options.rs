@@ -25,7 +25,7 @@ impl Method {
     /// Learns a model, deterministically. A cancelled training ends with the seeds that have begun.
     ///
     /// # Errors
-    /// [`TrainError`]: options out of range, too few samples, no stable model, cancelled before the first seed.
+    /// [`TrainError`]: options out of range, too few samples, no stable model, or cancellation before the first seed.
     pub fn learn(
         self,
         recordings: Recordings<'_>,
@@ -346,7 +346,7 @@ impl JointOptions {
         }
     }
 
-    /// Complains about a window of predictions out of range; one that no batch has room for would count for nothing.
+    /// Reports a window of predictions out of range; a window longer than every batch would have no effect.
     fn check_predictions(&self) -> Result<()> {
         table::BPTT_WEIGHT.check(self.weights.bptt)?;
         let (window, stride) = (self.unroll.window, self.unroll.stride);

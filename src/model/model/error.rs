@@ -75,7 +75,7 @@ impl ModelError {
         }
     }
 
-    /// A matrix of numbers of such different sizes that an iteration does not end.
+    /// A matrix with numbers of such different sizes that an iteration does not converge.
     pub(super) fn no_decomposition(tensor: &str) -> Self {
         let found = "singular values or eigenvalues that could not be computed";
         ModelError::invalid(format!("`{tensor}`"), found, "numbers of similar size")

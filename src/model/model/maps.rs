@@ -71,12 +71,12 @@ impl ReducedModel {
         builder.build()
     }
 
-    /// `z = E(s_x x)`, for a linear model `W_e (s_x x) + b_e`.
+    /// `z = E(s_x x)`; linear models: `W_e (s_x x) + b_e`.
     pub fn encode(&self, x: &DVector<f64>) -> Result<DVector<f64>> {
         self.encoder_map()?.apply(&self.scaled_state(x)?)
     }
 
-    /// `x = D(z) / s_x`, for a linear model `(W_d z + b_d) / s_x`.
+    /// `x = D(z) / s_x`; linear models: `(W_d z + b_d) / s_x`.
     pub fn decode(&self, z: &DVector<f64>) -> Result<DVector<f64>> {
         let scaled = self.decoder_map()?.apply(z)?;
         Ok(scaled.component_div(&self.state_factors()?))
@@ -163,7 +163,7 @@ pub(super) fn pinv_of_transpose(weights: &DMatrix<f64>, matrix: &str) -> Result<
     if largest_entry == 0.0 {
         return Err(deficient(0.0, 0.0));
     }
-    // Divided by the largest entry first, so that no intermediate product overflows.
+    // Divided by the largest entry first: no intermediate product overflows.
     let normalised = weights / largest_entry;
     let max_iterations = 1_000 * weights.ncols();
     let svd = nalgebra::SVD::try_new(normalised, true, true, f64::EPSILON, max_iterations)
@@ -313,7 +313,7 @@ impl Activation {
             Self::Gelu => {
                 let density = DENSITY_AT_ZERO * (-0.5 * a * a).exp();
                 let cumulative = normal_cumulative(a);
-                // Far out the density is zero, and the powers of a before it need not be finite.
+                // For large `|a|` the density is zero, and the powers of a before it need not be finite.
                 let far = |factor: f64| {
                     if density == 0.0 {
                         0.0
@@ -357,7 +357,7 @@ fn sigmoid(a: f64) -> f64 {
 }
 
 fn gelu_tanh(a: f64) -> [f64; 4] {
-    // Where tanh is one to the last bit; further out its argument's powers would only overflow.
+    // Here tanh is one to the last bit; for larger arguments the powers would only overflow.
     if a.abs() > 10.0 {
         return match a > 0.0 {
             true => [a, 1.0, 0.0, 0.0],

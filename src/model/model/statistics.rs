@@ -74,7 +74,7 @@ fn check_positive(tensor: &str, covariance: &DMatrix<f64>) -> Result<()> {
     if largest_entry == 0.0 {
         return Ok(());
     }
-    // Divided by the largest entry first, so that no intermediate product overflows.
+    // Divided by the largest entry first: no intermediate product overflows.
     let normalised = covariance / largest_entry;
     let max_iterations = 1_000 * covariance.nrows();
     let eigen = nalgebra::SymmetricEigen::try_new(normalised, f64::EPSILON, max_iterations)
@@ -94,7 +94,7 @@ fn check_positive(tensor: &str, covariance: &DMatrix<f64>) -> Result<()> {
 const LEAST_SAMPLES: usize = 4;
 const RIDGE: f64 = 1e-2;
 
-/// `u_lat | z, dz ~ (mean [1; z; dz], covariance)` of one phase, and how far the model's accelerations are off. Scaled.
+/// `u_lat | z, dz ~ (mean [1; z; dz], covariance)` of one phase, and the errors of the model's accelerations. Scaled.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputGivenState {

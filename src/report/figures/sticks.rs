@@ -177,7 +177,7 @@ const MOST_FRAMES: usize = 72;
 pub(crate) struct Film {
     /// An `svg` element with a `g` for each motion, which holds a polyline for each of [`Sticks::NAMES`].
     pub svg: String,
-    /// JSON `{"time": [s], "lines": [[motion][instant]]}`: the lines as `polyline` takes them, or an empty text.
+    /// JSON `{"time": [s], "lines": [[motion][instant]]}`: points for `polyline`, or an empty text.
     pub frames: String,
     pub shown: usize,
     pub count: usize,

@@ -232,7 +232,7 @@ impl Writer<'_> {
         Ok(Value::new(text, ty, 16))
     }
 
-    /// An element, or from a range what follows its beginning.
+    /// An element, or for a range the rest of the array after its beginning.
     fn index(&mut self, here: &mut Instance<'_>, index: &syn::ExprIndex) -> Found {
         let base = self.value(here, &index.expr)?;
         let Some(element) = base.ty.element().cloned() else {
@@ -296,7 +296,7 @@ impl Writer<'_> {
                 .iter()
                 .any(|ty| matches!(ty, Type::Real | Type::Double))
         {
-            // Compilers warn of equal reals; undefined numbers equal none.
+            // Compilers warn about comparing reals for equality; NaN equals nothing.
             let (left, right) = (left.at_least(11), right.at_least(11));
             let equal = format!("({left} <= {right} && {left} >= {right})");
             return Ok(match sign {

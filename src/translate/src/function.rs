@@ -4,7 +4,7 @@ use super::*;
 use crate::statement::Lines;
 use crate::text::wrapped;
 
-/// What the functions need, and their text, callees first.
+/// The text of the functions, callees first, and the items that they need.
 pub(crate) struct Writer<'a> {
     pub(crate) items: &'a Items<'a>,
     pub(crate) functions: String,

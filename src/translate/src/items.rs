@@ -222,13 +222,13 @@ impl<'a> Items<'a> {
                     }
                 }
             }
-            // `use`, `mod`, implementations of traits and what is compiled under a condition: nothing to translate.
+            // `use`, `mod`, implementations of traits and conditionally compiled items are not translated.
             _ => {}
         }
         Ok(())
     }
 
-    /// The settings that C has: `name: type,` behind an arrow, or behind `|` for more of one row.
+    /// The settings in the C: `name: type,` after an arrow, or after `|` for further ones of a row.
     fn add_settings(&mut self, source: usize, item: &syn::ItemMacro) -> Found<()> {
         let table = item.mac.tokens.to_string();
         let words: Vec<&str> = table.split_whitespace().collect();
@@ -305,7 +305,7 @@ impl<'a> Items<'a> {
         })
     }
 
-    /// A type as it is written; `owner` is what `Self` stands for.
+    /// A type as written; `owner` replaces `Self`.
     pub(crate) fn ty(&self, source: usize, ty: &syn::Type, owner: &str) -> Result<Type, Fault> {
         Ok(match ty {
             syn::Type::Reference(reference) => {
@@ -415,7 +415,7 @@ impl Writer<'_> {
         Ok(Translated { header, source })
     }
 
-    /// A constant, if it is a number or is none, as is asked for.
+    /// A constant, if it is a number or is not, as requested.
     fn constant_text(&self, name: &str, is_number: bool) -> Found<String> {
         let constant = &self.items.constants[name];
         if constant.ty.is_number() != is_number {
@@ -431,7 +431,7 @@ impl Writer<'_> {
         })
     }
 
-    /// A struct or enum, behind those that its fields are made of.
+    /// A struct or enum, after the types of its fields.
     fn write_type(&self, name: &str, out: &mut String, done: &mut BTreeSet<String>) -> Found<()> {
         if self.items.unit.elsewhere(name).is_some() || !done.insert(name.to_owned()) {
             return Ok(());

@@ -56,7 +56,7 @@ pub struct Fault {
     pub path: String,
     /// Line, from 1.
     pub line: usize,
-    /// The construct, and what is expected in its place.
+    /// The construct, and the expected one.
     pub message: String,
 }
 
@@ -81,21 +81,21 @@ impl fmt::Display for Fault {
 
 impl std::error::Error for Fault {}
 
-/// The names of the C.
+/// The names in the C.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unit<'a> {
     /// Before every name: `solver` for `solver_solve` and `SOLVER_WIDE`.
     pub prefix: &'a str,
     /// C templates: every function that they call with the prefix is translated, with all that it needs.
     pub users: &'a [Source],
-    /// Structs that nothing changes, which are `const` wherever they are pointed to.
+    /// Structs that are never changed: pointers to them are `const`.
     pub fixed: &'a [&'a str],
-    /// Structs whose text stands apart, for a header.
+    /// Structs whose text is separate, to be put into a header.
     pub header: &'a [&'a str],
-    /// Constants, structs and methods that state a condition, that whoever includes the C defines, with their names
-    /// there; a struct keeps its own.
+    /// Constants, structs and methods stating a condition that the including code defines, with their names there; a
+    /// struct keeps its own.
     pub elsewhere: &'a [(&'a str, &'a str)],
-    /// What stands before the type of every function, with a space.
+    /// Text before the type of every function, with a space.
     pub attribute: &'a str,
 }
 
@@ -109,7 +109,7 @@ impl<'a> Unit<'a> {
 /// The text of a unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Translated {
-    /// Structs of [`Unit::header`] and what they need.
+    /// Structs of [`Unit::header`] and the items that they need.
     pub header: String,
     /// All else, in an order in which everything is declared before it is used.
     pub source: String,
@@ -162,7 +162,7 @@ fn file(root: &Path, path: String) -> Result<Source, Fault> {
     Ok(Source { path, text })
 }
 
-/// The files of a folder whose names end so.
+/// The files of a folder whose names have this ending.
 fn read(root: &Path, folder: &str, end: &str) -> Result<Vec<Source>, Fault> {
     let entries = fs::read_dir(root.join(folder)).map_err(|error| Fault::at(folder, 0, error))?;
     let names = entries.flatten().map(|entry| entry.file_name());
@@ -174,7 +174,7 @@ fn read(root: &Path, folder: &str, end: &str) -> Result<Vec<Source>, Fault> {
     paths.into_iter().map(|path| file(root, path)).collect()
 }
 
-/// Types and functions of a unit that is made of the sources of folders, each behind a comment that names it.
+/// Types and functions of a unit made from the sources of folders, each after a comment that names it.
 fn texts(root: &Path, folders: &[&str], what: &str, unit: &Unit<'_>) -> Found<[String; 2]> {
     let mut sources = Vec::new();
     for folder in folders {

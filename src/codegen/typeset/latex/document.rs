@@ -91,14 +91,14 @@ fn equations(
     file(path, &equations)
 }
 
-/// What the templates show below the comments at the top.
+/// Contents of the templates below the comments at the top.
 #[derive(Template)]
 #[template(config = "templates/askama.toml", syntax = "latex")]
 enum Document<'a> {
     #[template(path = "latex/equations.askama")]
     Equations {
         header: String,
-        /// Whether a sentence stands before each system: the file holds more than the equations of motion.
+        /// Whether a sentence is before each system: the file contains more than the equations of motion.
         is_introduced: bool,
         systems: &'a [System],
         /// Sentences below the equations.
@@ -124,7 +124,7 @@ enum Document<'a> {
     },
 }
 
-/// Widest column, in em, for which previews have two.
+/// Widest column, in em, for which previews have two columns.
 const TWO_COLUMNS_EM: f64 = 26.0;
 
 /// Whether a column is one of two, in which no table can break across pages.
@@ -223,7 +223,7 @@ fn of_robot(model: &ReducedModel, robot: &RobotTypeset, options: &PrintOptions) 
     [encoder].into_iter().chain(of_phases).collect()
 }
 
-/// Why positions of the robot accelerate otherwise than the latent coordinates that they nearly are.
+/// Reasons for positions of the robot whose acceleration differs from that of the nearly equal latent coordinate.
 fn deviations(model: &ReducedModel, robot: &RobotTypeset, options: &PrintOptions) -> String {
     let groups = alike(&robot.systems);
     let is_printed = |of: &&Deviation| groups.iter().any(|group| group[0] == of.phase);

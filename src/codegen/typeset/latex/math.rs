@@ -73,7 +73,7 @@ pub(crate) fn tex_symbol(symbol: &Symbol) -> String {
         0 => base,
         1 => format!(r"\dot{{{base}}}"),
         2 => format!(r"\ddot{{{base}}}"),
-        // amsmath goes on to `\ddddot`; the latent model never asks for more.
+        // amsmath has `\ddddot` as well; the latent model never needs more.
         _ => format!(r"\dddot{{{base}}}"),
     };
     if symbol.subscript.is_empty() {
@@ -135,13 +135,13 @@ pub(super) const CASES_LINES: usize = 24;
 pub(super) struct Block {
     pub label: String,
     pub count: usize,
-    /// Whether the lines belong into `align` rather than `cases`.
+    /// Whether the lines belong in `align` rather than `cases`.
     pub aligned: bool,
     pub lines: Vec<String>, // with `\\` where they need it
 }
 
 impl Block {
-    /// What `\ref` and `\eqref` can name.
+    /// Labels for `\ref` and `\eqref`.
     pub(crate) fn labels(&self) -> String {
         let label = &self.label;
         match (self.aligned, self.count) {
@@ -172,7 +172,7 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
         false => in_cases,
     };
     let count = lines_of(&sides);
-    // the equations of the phase stand apart if one of them is broken
+    // the equations of the phase are spaced if one of them is broken
     let is_spaced = count > sides.len();
     let mut lines = Vec::with_capacity(count);
     for (place, (equation, of_equation)) in system.equations.iter().zip(&sides).enumerate() {
@@ -213,7 +213,7 @@ pub(super) fn block(system: &EquationSystem, label: String, options: &PrintOptio
     }
 }
 
-/// One phase as a bare `cases` environment, for a place that is in math mode already.
+/// One phase as a bare `cases` environment, to be used inside math mode.
 pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
     let options = PrintOptions {
         form: Form::Cases,
@@ -224,7 +224,7 @@ pub fn tex_cases(system: &EquationSystem, width_em: f64) -> String {
     format!("\\begin{{cases}}\n  {lines}\n\\end{{cases}}")
 }
 
-/// The lines of a right side: aligned behind the widest left side, in em, or behind a brace at their own left side.
+/// The lines of a right side: aligned after the widest left side, in em, or after a brace at their own left side.
 fn right_sides(equation: &Equation, aligned: Option<f64>, options: &PrintOptions) -> Vec<String> {
     let numbers = options.numbers;
     if equation.terms.is_empty() {

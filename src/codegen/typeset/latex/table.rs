@@ -15,7 +15,7 @@ pub(super) struct TableBlock {
     pub size: &'static str,
     pub columns: String,
     pub caption: String,
-    /// What `\ref` can name: its own label, and for the first that of the whole.
+    /// Labels for `\ref`: its own, and for the first block that of the whole table.
     pub labels: Vec<String>,
     pub heads: String,
     /// Title and rows of each group of phases.
@@ -104,7 +104,7 @@ fn pieces(parts: Vec<Part<'_>>, longest: usize) -> Vec<Vec<Part<'_>>> {
     for Part { phases, rows, .. } in parts {
         let mut rest = rows.as_slice();
         loop {
-            // A title stands above a row of its phase.
+            // A title is always above a row of its phase.
             if used + 1 + rest.len().min(1) > longest {
                 pieces.push(Vec::new());
                 used = 0;
@@ -181,7 +181,7 @@ fn layouts(table: &CoefficientTable, width_em: f64) -> Vec<Layout> {
         }
     }
     let print = &PRINTS[PRINTS.len() - 1];
-    // As few groups as fit, nearly equal; a column each at the least.
+    // As few groups as fit, nearly equal; at least one column each.
     let fit = |group: &[usize]| group.len() == 1 || width_of(table, group, print) <= page_em;
     let sizes = (2..=all.len()).map(|n_groups| all.len().div_ceil(n_groups));
     let size = sizes.into_iter().find(|size| all.chunks(*size).all(fit));
@@ -309,7 +309,7 @@ fn cell(number: &Decimal, width: &ColumnWidth, numbers: NumberStyle) -> String {
     if numbers == NumberStyle::Siunitx {
         return number.to_string();
     }
-    // Points stand below each other when the missing digits take their space.
+    // Missing digits are padded, so decimal points are aligned.
     let (_, decimals) = number.places();
     let point = if decimals == 0 { "." } else { "" };
     let pad = match (number.exponent, width.decimals - decimals) {

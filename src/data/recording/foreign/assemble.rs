@@ -224,7 +224,7 @@ impl Assembly<'_> {
         Ok(())
     }
 
-    /// The derivatives of a quantity's very elements, if the log has them.
+    /// The derivatives of exactly this quantity's elements, if the log has them.
     fn known_rates(&self, quantity: Quantity) -> Option<&Signal> {
         let rate = match quantity {
             Quantity::JointPosition => Quantity::JointVelocity,
@@ -241,7 +241,7 @@ impl Assembly<'_> {
     }
 
     /// Velocities about the body's own axes become the derivatives of position and angles.
-    #[allow(clippy::wrong_self_convention)] // turns what it holds
+    #[allow(clippy::wrong_self_convention)] // converts the fields in place
     fn to_world(&mut self) -> Outcome<()> {
         let angles = self.required(Quantity::Orientation).values.clone();
         let in_body = self.frame(Quantity::BodyVelocity) == Some(Frame::Body);
@@ -261,7 +261,7 @@ impl Assembly<'_> {
         Ok(())
     }
 
-    /// Makes a quantity that the log does not have of differences of another; whether it had to be made.
+    /// Computes a quantity missing in the log from differences of another; returns whether it was missing.
     fn derive(&mut self, quantity: Quantity, of: Quantity) -> bool {
         let is_absent = !self.signals.contains_key(&quantity);
         if is_absent {
@@ -275,7 +275,7 @@ impl Assembly<'_> {
         is_absent
     }
 
-    /// Lets x and y count from the first sample of each range, where the map asks for it.
+    /// Measures x and y from the first sample of each range, if the map requests it.
     fn shift_origin(&mut self) {
         let table = self.map.table(Quantity::BodyPosition);
         if table.and_then(|table| table.origin) != Some(Origin::Start) {
@@ -345,7 +345,7 @@ const SAME: f64 = 1e-6; // times within this share of a step are the same time
 const STENCIL: usize = 5; // samples of a polynomial whose slope is that of its middle, or of its ends at a log's ends
 const UNEVEN: f64 = 4.0; // longest over shortest step of a stencil: beyond, polynomials swing
 
-/// Values at `times_s`, one column a time, of rows known at `own_s`, with these derivatives or [`slopes_of`] them.
+/// Values at `times_s`, one column per time, of rows known at `own_s`, with these derivatives or [`slopes_of`] them.
 fn at_times(own: &Signal, slopes: Option<&Rows>, times_s: &[f64], between: Between) -> Rows {
     let (own_s, values) = (&own.times_s, &own.values);
     let slopes = slopes.map_or_else(|| Cow::Owned(slopes_of(own_s, values)), Cow::Borrowed);

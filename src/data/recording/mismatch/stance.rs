@@ -12,7 +12,7 @@ type State = [f64; STATE_DIM];
 
 const LEAST_STANCE_S: f64 = 0.05; // shortest stance that counts, s
 const EDGE_S: f64 = 0.02; // uncounted time at both ends of a stance, touchdown and lift-off; at most an eighth of it
-const FOOT_RADIUS_M: f64 = 0.022; // of the sphere that a foot rolls on: 0.02 to 0.023 on the robots that romc knows
+const FOOT_RADIUS_M: f64 = 0.022; // of the sphere that a foot rolls on: 0.02 to 0.023 on the robots in romc
 const LEAST_SAMPLES: usize = 50; // fewest samples of feet on the ground for a metric
 
 /// A way in which columns are easily recorded: words, body x and y exchanged, other signs, order of the quaternion.
@@ -33,7 +33,7 @@ const RIGHT_ANGLE: &str = "with body x and y turned by a right angle";
 const BOTH: &str = "with body x and y of the other sign";
 const XYZW: &str = "with the quaternion in the order xyzw instead of wxyz";
 const WXYZ: &str = "with the quaternion in the order wxyz instead of xyzw";
-/// Places of the body, its attitude being right, and attitudes.
+/// Other readings of the body's position if its attitude is right, and of the attitude.
 const PLACES: [Reading; 8] = [
     ("with body x of the other sign", false, &[BODY], None),
     ("with body y of the other sign", false, &[BODY + 1], None),
@@ -114,7 +114,7 @@ pub(crate) fn foot_place(robot: &Robot, leg: Leg, x: &State, rolled: bool) -> Ve
     place - FOOT_RADIUS_M * inclination * Vector3::new(yaw.cos(), yaw.sin(), 0.0)
 }
 
-/// Squares of distances of feet from where they stand, of each foot and against each other, and their number.
+/// Squared distances of feet from their stance positions, of each foot and between feet, and their number.
 #[derive(Default)]
 pub(super) struct Slip {
     absolute: (f64, usize),

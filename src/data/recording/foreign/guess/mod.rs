@@ -35,7 +35,7 @@ pub struct Guess {
     pub outcome: Result<usize, String>,
     /// Notes where other interpretations of the log fit as well, or none fits.
     pub notes: Vec<String>,
-    pub(crate) open: Vec<String>, // questions that names and numbers leave open, for a log that is read without a map
+    pub(crate) open: Vec<String>, // questions left open by names and numbers; used if a log is read without a map
 }
 
 /// Guesses the map of a text or MCAP file.

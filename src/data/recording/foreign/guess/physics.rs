@@ -31,9 +31,9 @@ pub(super) struct Reading {
     pub by_kind: bool,
     pub signs: [f64; JOINT_DIM],
     pub slip_m: f64,  // how far feet on the ground move in it, root mean square, m
-    motion_m: f64, // how far they would on stiff legs, which units that are too small make little of
+    motion_m: f64,    // how far they would on stiff legs, small for units that are too small
     shown: [bool; 3], // for each kind of joint whether feet on the ground show its sign
-    pub torques: Option<Torques>, // none where they carry nothing
+    pub torques: Option<Torques>, // none if they carry no weight
     pub as_well: Vec<Reading>, // others that fit as well
 }
 
@@ -120,7 +120,7 @@ impl<'a> View<'a> {
         let combination = |code: usize| -> [f64; 3] {
             std::array::from_fn(|kind| if code >> kind & 1 == 1 { -1.0 } else { 1.0 })
         };
-        // Sums of squares and counts by leg, for the same signs on all legs.
+        // Sums of squares and counts by leg, with equal signs on all legs.
         let tried = (0..8).map(|code| {
             let signs = combination(code);
             reading.signs = std::array::from_fn(|i| signs[i % 3]);
@@ -143,11 +143,11 @@ impl<'a> View<'a> {
             let turned = whole[best ^ (1 << kind)];
             whole[best] < BETTER.0 * turned && whole[best] + BETTER.1 < turned
         });
-        let shown_kinds = (0..3).filter(|kind| reading.shown[*kind]); // a sign that they do not show is the plain one
+        let shown_kinds = (0..3).filter(|kind| reading.shown[*kind]); // a sign without evidence is the plain one
         let common = shown_kinds.fold(0, |code, kind| code | best & (1 << kind));
         let mut codes = [common; 4];
         reading.slip_m = whole[common];
-        // Legs with axes of their own, where those are clearly better.
+        // Each leg with its own axes, if those are clearly better.
         let own = Leg::ALL.map(|leg| {
             let figures = (tried.iter()).map(|parts| rms(&parts[leg.index()..=leg.index()]));
             let figures: Option<Vec<f64>> = figures.collect();
@@ -223,7 +223,7 @@ impl<'a> View<'a> {
             known.min_by(|one, other| one.1.0.total_cmp(&other.1.0))
         };
         let common = best([[1.0, 1.0], [-1.0, -1.0]]);
-        // Flexions alone carry so little that chance decides their sign, in short recordings above all.
+        // Flexions alone carry little: their sign is decided by chance, above all in short recordings.
         let is_shown = reading.shown[1] && reading.shown[2];
         let other = best([[1.0, -1.0], [-1.0, 1.0]]).filter(|_| !is_shown);
         let (signs, (_, scale)) = match (common, other) {
@@ -235,7 +235,7 @@ impl<'a> View<'a> {
             let of_kind = [hips[i / 3], signs[0], signs[1]];
             reading.signs[i] * of_kind[i % 3]
         });
-        // An axis that points the other way turns angles and torques; one sign of all is that of who pushes whom.
+        // An opposite axis changes angles and torques; a common sign of all torques is a matter of action or reaction.
         if !reading.shown[0] && signs[0] == signs[1] {
             for leg in 0..4 {
                 reading.signs[3 * leg] *= hips[leg] * signs[1];

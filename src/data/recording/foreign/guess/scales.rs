@@ -44,7 +44,7 @@ impl Source<'_> {
         (lines, order, notes)
     }
 
-    /// The reading under which feet on the ground stay best in place; by the joints' limits where no feet stand.
+    /// The reading under which feet on the ground stay best in place; by the joints' limits if all are in the air.
     fn choice(&self, attitudes: &[Attitude], lines: &Lines) -> (usize, Reading) {
         let place = self.raw_of(Quantity::BodyPosition);
         let by_height = || match reach(place.row(2).iter().copied()) {
@@ -129,13 +129,13 @@ impl Source<'_> {
         units.into_iter().map(of_unit).collect()
     }
 
-    /// The log read with this attitude and these lines of the feet, everything else as its numbers are.
+    /// The log read with this attitude and these lines of the feet, all other numbers unscaled.
     fn without_scales(&self, attitude: &[String], lines: &Lines) -> Option<Recording> {
         let mut text = format!("[time]\n{}\n", self.time);
         let has_torques = self.group(Quantity::JointTorque).is_some();
         let is_required = |quantity: &Quantity| quantity.is_required();
         for quantity in Quantity::ALL.into_iter().filter(is_required) {
-            // Torques need not be there to see feet stand.
+            // Torques are not needed to detect standing feet.
             let group = match quantity {
                 Quantity::JointTorque if !has_torques => self.group(Quantity::JointPosition)?,
                 _ => self.group(quantity)?,
