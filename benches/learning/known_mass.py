@@ -9,13 +9,18 @@ and the torques of the links are subtracted. Needs Python alone; a few seconds.
 
 import json
 import pathlib
-import subprocess
 import tempfile
 
-from tables import RECORDINGS, ROOT
+from tables import ROOT, answer, jumps
 
 MASS_KG, GRAVITY_M_S2 = 12.74, 9.81
-SETS = {"test trots": "go1-trot/test_*", "other trots": "go1-trot-other/*", "crawls": "go1-gaits/crawl_*", "pronks": "go1-gaits/pronk_*"}
+# Folder and prefix of recordings by title.
+SETS = {
+    "test trots": ("go1-trot", "test"),
+    "other trots": ("go1-trot-other", ""),
+    "crawls": ("go1-gaits", "crawl"),
+    "pronks": ("go1-gaits", "pronk"),
+}
 ROWS = (0, 3, 1)  # equations of the centre of mass along x, y and z
 FORCE = 12  # place of the force along x in the input
 
@@ -35,23 +40,22 @@ def rigid(model):
     return model
 
 
-def errors_mm(path, pattern):
+def errors_mm(model, recordings):
     """Errors of the centre of mass over 0.1 s."""
-    command = [ROOT / "target/release/romc", "simulate", path, *sorted(RECORDINGS.glob(f"{pattern}.csv.gz")), "--verbose", "--json"]
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
-    coordinates = json.loads(done.stdout)["horizons"][0]["coordinates"]
+    found = answer(ROOT / "target/release/romc", "simulate", model, *recordings, "--verbose")
+    coordinates = found["horizons"][0]["coordinates"]
     return [f"{1e3 * coordinates[f'com.{axis}']['rms']:.2f}" for axis in "xyz"]
 
 
 def main():
     path = ROOT / "models/go1-trot-d12.json"
     print("| recordings | | x | y | z |\n|---|---|---:|---:|---:|")
-    with tempfile.TemporaryDirectory() as folder:
-        copy = pathlib.Path(folder) / "rigid.json"
+    with tempfile.TemporaryDirectory() as scratch:
+        copy = pathlib.Path(scratch) / "rigid.json"
         copy.write_text(json.dumps(rigid(json.loads(path.read_text()))))
-        for name, pattern in SETS.items():
+        for name, (folder, prefix) in SETS.items():
             for title, model in (("`go1-trot-d12`", path), ("rigid body of known mass", copy)):
-                print(f"| {name} | {title} | {' | '.join(errors_mm(model, pattern))} |", flush=True)
+                print(f"| {name} | {title} | {' | '.join(errors_mm(model, jumps(folder, prefix)))} |", flush=True)
 
 
 if __name__ == "__main__":

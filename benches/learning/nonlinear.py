@@ -11,7 +11,7 @@ import pathlib
 import subprocess
 import tempfile
 
-from tables import FREE_BODY, ROOT, errors, jumps, rollouts
+from tables import FREE_BODY, ROOT, answer, errors, jumps, rollouts, span
 
 NETWORK = "--encoder-layers 32,16 --seeds 1"
 # Title, latent dimension, options of `romc train`, and whether the controller is run.
@@ -44,17 +44,6 @@ def train(romc, model, dimension, flags):
     return report["validation"]["torque_r2"], " + ".join(str(phase["active"]) for phase in report["active_terms"])
 
 
-def control(romc, model):
-    """The runs of `romc mpc` along the test jumps; a model that fails its verdict has them also."""
-    command = [romc, "mpc", model, *jumps("go1", "test"), "--json"]
-    return json.loads(subprocess.run(command, capture_output=True, text=True).stdout)["runs"]
-
-
-def spread(values):
-    least, most = (f"{value:.2f}" for value in (min(values), max(values)))
-    return least if least == most else f"{least} to {most}"
-
-
 def main():
     romc = ROOT / "target" / "release" / "romc"
     driven, step_us = [], None
@@ -67,9 +56,9 @@ def main():
             cells = [title, f"{found['decoder_mean_square_scaled']:.1e}", *errors(found), f"{lift_r2:.2f}", terms]
             print(f"| {' | '.join(cells)} |", flush=True)
             if is_driven:
-                runs = control(romc, model)
+                runs = answer(romc, "mpc", model, *jumps("go1", "test"))["runs"]
                 r2 = [
-                    spread([of(run)[phase] for run in runs])
+                    span([of(run)[phase] for run in runs], 2)
                     for of in (lambda run: run["lift"]["commanded_torque_r2"], lambda run: run["torque_r2"])
                     for phase in ("contact", "flight")
                 ]

@@ -113,11 +113,21 @@ def jumps(folder, prefix):
 
 
 def rollouts(romc, model, recordings):
-    command = [romc, "simulate", model, *recordings, "--json"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if not done.stdout:  # exit code 1 with an output: predictions fail the verdict
+    return answer(romc, "simulate", model, *recordings)["rollouts"]
+
+
+def answer(romc, *arguments):
+    """The JSON object of a command; one that fails its verdict has it also, with exit code 1."""
+    done = subprocess.run([romc, *arguments, "--json"], capture_output=True, text=True)
+    if not done.stdout:
         raise SystemExit(done.stderr)
-    return json.loads(done.stdout)["rollouts"]
+    return json.loads(done.stdout)
+
+
+def span(values, decimals):
+    """The range of numbers, one number where both ends are printed alike."""
+    least, most = (f"{value:.{decimals}f}" for value in (min(values), max(values)))
+    return least if least == most else f"{least} to {most}"
 
 
 def errors(rollouts):

@@ -7,12 +7,12 @@ import re
 import subprocess
 import types
 
+from romc_controller import emitted
+
 
 def build(model, folder, romc):
     """Emits and compiles the controller of a model file; returns its folder."""
-    emit = [romc, "compile", model, "--emit", "controller-c", "--out-dir", folder]
-    subprocess.run([str(part) for part in emit], check=True, stdout=subprocess.DEVNULL)
-    (header,) = folder.glob("*-controller-c/*_controller.h")
+    header = emitted(model, "controller-c", folder, romc, "_controller.h")
     crate, name = header.parent, header.stem.removesuffix("_controller")
     sources = [f"{name}_controller.c", f"{name}.c"]
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC"]

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from romc_controller import emitted
+
 WINDOW = 11
 
 
@@ -33,9 +35,7 @@ class ModelInputs:
     def compiled(cls, model_path, folder, romc):
         """The rule of a model file; its C is compiled into `folder`."""
         folder.mkdir(parents=True, exist_ok=True)
-        emit = [romc, "compile", model_path, "--emit", "c", "--out-dir", folder, "--force"]
-        subprocess.run([str(part) for part in emit], check=True, stdout=subprocess.DEVNULL)
-        (header,) = folder.glob("*.h")
+        header = emitted(model_path, "c", folder, romc, ".h")
         library = folder / f"lib{header.stem}.so"
         compile_c = ["cc", "-O2", "-shared", "-fPIC", str(header.with_suffix(".c")), "-lm"]
         subprocess.run([*compile_c, "-o", str(library)], check=True)

@@ -200,7 +200,7 @@ def drawn_goals(seed):
         elif number % 3 == 1:
             distance = random.uniform(*middle[0])
         else:
-            # Both goals at once, half as far beyond the range.
+            # Both at once, half as far beyond.
             distance, apex = far * (1 + further) / 2, high * (1 + higher) / 2
         goals.append(Goal(f"out{number:02}", float(distance), float(apex)))
     return goals
@@ -271,7 +271,7 @@ def run(task):
         follower.step_s = 1 / arguments.rate
     else:
         follower = Replay(reference, with_torques=True)
-    # In flight the torques of these references are known: they swing the legs.
+    # Of these references, torques in flight are known: they swing the legs.
     follower.feed_forward_in_flight = True
     motors = Motors(follower, condition, simulation.robot.torque_limit_nm)
     log = simulation.run(motors, reference.time_s[-1])

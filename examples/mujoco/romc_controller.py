@@ -1,6 +1,7 @@
 """The controller of a model as romc generates it: compiled, built, and loaded through ctypes."""
 
 import importlib.util
+import json
 import os
 import pathlib
 import shutil
@@ -11,12 +12,18 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TARGET = ROOT / "target/generated-controllers"
 
 
+def emitted(model, target, folder, romc, ending):
+    """Emits a target of a model file into a folder; returns the only file there whose path ends so."""
+    emit = [romc, "compile", model, "--emit", target, "--out-dir", folder, "--force", "--json"]
+    done = subprocess.run([str(part) for part in emit], check=True, stdout=subprocess.PIPE, text=True)
+    paths = [file["path"] for file in json.loads(done.stdout)["files"]]
+    (path,) = [path for path in paths if path.endswith(ending)]
+    return pathlib.Path(path)
+
+
 def build(model, folder, romc):
     """Generates and builds the controller of a model file; returns the folder of its crate."""
-    emit = [romc, "compile", model, "--emit", "controller", "--out-dir", folder]
-    subprocess.run([str(part) for part in emit], check=True, stdout=subprocess.DEVNULL)
-    (manifest,) = folder.glob("*-controller/Cargo.toml")
-    crate = manifest.parent
+    crate = emitted(model, "controller", folder, romc, "-controller/Cargo.toml").parent
     environment = {**os.environ, "CARGO_TARGET_DIR": str(TARGET)}
     subprocess.run(
         ["cargo", "build", "--release", "--quiet"], check=True, cwd=crate, env=environment

@@ -6,15 +6,9 @@
 //   npm install && node check_page.mjs REPORT.html [SCREENSHOT_DIR [PICTURE_DIR]]
 //
 // SCREENSHOT_DIR gets the whole page in each form, PICTURE_DIR the parts that the documentation shows.
-import { createRequire } from "node:module";
-import { resolve } from "node:path";
 import { writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
-
-// packages are those of the current folder, so that none need to be installed in that of this file
-const require = createRequire(resolve("package.json"));
-const puppeteer = require("puppeteer-core");
-const axe = require.resolve("axe-core/axe.min.js");
+import { checkAccess, end, launched, opened } from "./chromium.mjs";
 
 const [file, screenshots, pictures] = process.argv.slice(2);
 if (!file) {
@@ -25,21 +19,13 @@ if (!file) {
 const MOST_PX = 6000, MOST_SHEETS = 8;
 /** Height of the first screen by width. */
 const SCREEN_PX = { 1280: 800, 390: 844 };
-const browser = await puppeteer.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--disable-gpu"],
-});
+const browser = await launched();
 const faults = [];
 for (const width of [1280, 390]) {
   for (const theme of ["light", "dark"]) {
     const where = `${width} px, ${theme}`;
     const fault = (text) => faults.push(`${where}: ${text}`);
-    const page = await browser.newPage();
-    page.on("pageerror", (error) => fault(`error: ${error.message}`));
-    page.on("console", (message) => message.type() === "error" && fault(`console: ${message.text()}`));
-    page.on("request", (request) => /^(file|data):/.test(request.url()) || fault(`request: ${request.url()}`));
-    await page.setViewport({ width, height: SCREEN_PX[width], isMobile: width < 600, hasTouch: width < 600 });
-    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
+    const page = await opened(browser, width, SCREEN_PX[width], theme, fault);
     await page.goto(pathToFileURL(file).href);
     const [wide, height] = await page.evaluate(() => {
       const { scrollWidth, scrollHeight } = document.documentElement;
@@ -51,18 +37,11 @@ for (const width of [1280, 390]) {
     if (width === 1280 && height > MOST_PX) fault(`${height} px high, at most ${MOST_PX}`);
     if (screenshots) await page.screenshot({ path: `${screenshots}/report-${width}-${theme}.png`, fullPage: true });
     if (pictures) await picture(page, width, theme);
-    await page.addScriptTag({ path: axe });
-    const check = async (state) => {
-      const { violations } = await page.evaluate(() => axe.run());
-      for (const { id, impact, help, nodes } of violations) {
-        fault(`axe ${impact}, ${state}: ${id}: ${help} (${nodes.length}, first ${nodes[0].target})`);
-      }
-    };
-    await check("as opened");
+    await checkAccess(page, fault, ", as opened");
     await film(page, fault);
     if (width === 1280 && theme === "light") await print(page, fault);
     await page.evaluate(() => document.querySelectorAll("details").forEach((details) => { details.open = true; }));
-    await check("all unfolded");
+    await checkAccess(page, fault, ", all unfolded");
     if (width === 1280) {
       const cut = await page.evaluate(() => [...document.querySelectorAll(".scroll")]
         .filter((region) => region.scrollWidth > region.clientWidth + 1)
@@ -76,9 +55,7 @@ for (const width of [1280, 390]) {
   }
 }
 await browser.close();
-faults.forEach((text) => console.error(text));
-console.log(faults.length ? `${faults.length} faults` : "no fault at 1280 and 390 px, light, dark and printed");
-process.exit(faults.length ? 1 : 0);
+end(faults, "no fault at 1280 and 390 px, light, dark and printed");
 
 /** The verdict is on the first screen, with the figure at desktop width; a sign and a word state each result. */
 async function verdict(page, width, fault) {

@@ -5,15 +5,10 @@
 //   npm install && node check_site.mjs REPOSITORY SITE [SCREENSHOT_DIR]
 //
 // SITE is the folder that `mdbook build docs` writes; SCREENSHOT_DIR gets the first screens of every page in each form.
-import { createRequire } from "node:module";
 import { mkdirSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
-import { join, relative, resolve } from "node:path";
+import { join, relative } from "node:path";
 import { pathToFileURL } from "node:url";
-
-// packages are those of the current folder, so that none need to be installed in that of this file
-const require = createRequire(resolve("package.json"));
-const puppeteer = require("puppeteer-core");
-const axe = require.resolve("axe-core/axe.min.js");
+import { checkAccess, end, launched, opened, require } from "./chromium.mjs";
 
 const [repository, site, screenshots] = process.argv.slice(2);
 if (!site) {
@@ -23,7 +18,7 @@ if (!site) {
 /** Heights by width, px. */
 const SCREENS = { 1280: 900, 390: 844 };
 
-/** The README with GitHub's style sheet, as a page beside it so that its pictures load. */
+/** The README with GitHub's style sheet, as a page in the repository so that its pictures load. */
 async function readme() {
   const { marked } = await import(pathToFileURL(require.resolve("marked")));
   const style = readFileSync(require.resolve("github-markdown-css/github-markdown.css"), "utf8");
@@ -45,22 +40,15 @@ function pages(folder) {
     .map((name) => join(folder, name));
 }
 
-const browser = await puppeteer.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"],
-});
+const browser = await launched();
 const faults = [];
 const all = [await readme(), ...pages(site)];
 if (screenshots) mkdirSync(screenshots, { recursive: true });
 for (const width of [1280, 390]) {
   for (const theme of ["light", "dark"]) {
-    const page = await browser.newPage();
     let where = "";
     const fault = (text) => faults.push(`${where}: ${width} px, ${theme}: ${text}`);
-    page.on("pageerror", (error) => fault(`error: ${error.message}`));
-    page.on("request", (request) => /^(file|data|blob):/.test(request.url()) || fault(`request: ${request.url()}`));
-    await page.setViewport({ width, height: SCREENS[width], isMobile: width < 600, hasTouch: width < 600 });
-    await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
+    const page = await opened(browser, width, SCREENS[width], theme, fault);
     for (const file of all) {
       where = relative(repository, file);
       await page.goto(pathToFileURL(file).href);
@@ -72,16 +60,10 @@ for (const width of [1280, 390]) {
         const name = where.replaceAll("/", "_").replace(/\.html$/, "");
         await page.screenshot({ path: join(screenshots, `${name}-${width}-${theme}.png`) });
       }
-      await page.addScriptTag({ path: axe });
-      const { violations } = await page.evaluate(() => axe.run());
-      for (const { id, impact, help, nodes } of violations) {
-        fault(`axe ${impact}: ${id}: ${help} (${nodes.length}, first ${nodes[0].target})`);
-      }
+      await checkAccess(page, fault);
     }
     await page.close();
   }
 }
 await browser.close();
-faults.forEach((text) => console.error(text));
-console.log(faults.length ? `${faults.length} faults` : `${all.length} pages: no fault at 1280 and 390 px, light and dark`);
-process.exit(faults.length ? 1 : 0);
+end(faults, `${all.length} pages: no fault at 1280 and 390 px, light and dark`);

@@ -161,6 +161,8 @@ fn example_in_c_follows_a_planned_walk_from_its_first_sample() {
         &[&["compile", &model], &emit[..], &["--out-dir", "code"]].concat(),
     );
     let code = folder.join("code/go1_trot_d6-controller-c");
+    let parameters = fs::read_to_string(code.join("ros2_control/controllers.yaml"));
+    assert!(parameters.expect("emitted").contains("start: jump"));
     let built = std::process::Command::new("cc")
         .args(["-Wall", "-Wextra", "-Werror", "-O1", "-ffp-contract=off"])
         .args(["go1_trot_d6_example.c", "go1_trot_d6_controller.c"])

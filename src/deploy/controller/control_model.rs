@@ -109,7 +109,7 @@ pub(in crate::deploy) struct SettingText {
 }
 
 impl SettingText {
-    pub(in crate::deploy) fn all(settings: &Settings) -> Vec<Self> {
+    pub(super) fn all(settings: &Settings) -> Vec<Self> {
         let defaults = settings.numbers();
         let all = SETTINGS.iter().zip(defaults);
         all.map(|(setting, default)| Self { setting, default })

@@ -8,8 +8,7 @@ mod lock;
 
 use super::*;
 use crate::mpc::Drives;
-use control_model::ControlModelText;
-pub(in crate::deploy) use control_model::SettingText;
+use control_model::{ControlModelText, SettingText};
 use joints::JointTexts;
 
 /// Data of the model, the robot and romc for the files of a controller, as a crate or in C.

@@ -33,7 +33,8 @@ struct Facts<'a> {
     rows: &'a StageRows,
     /// Whether the model has strides to walk by.
     walks: bool,
-    /// Whether the trajectory begins in motion, so that no stand leads to it.
+    /// Whether the trajectory is a given one, and whether it begins in motion, so that no stand leads to it.
+    has_plan: bool,
     begins_moving: bool,
     timing: Timing,
     /// Names of the columns of a log.
@@ -102,7 +103,7 @@ pub(crate) fn emit(
         (format!("{name}_controller_selftest.c"), tidy(&self_test)),
     ];
     texts.splice(1..1, made);
-    texts.extend(ros2_control::files(facts, plant.robot(), provenance)?);
+    texts.extend(ros2_control::files(facts, provenance)?);
     let of_model = c::emit(&entries, provenance, precision, options.sines)?;
     let of_model = of_model.into_iter().map(|file| (file.path, file.contents));
     let mut files: Vec<(String, String)> = of_model
@@ -139,6 +140,7 @@ impl<'a> Facts<'a> {
             solver_stage: source::stage(controller.name, &controller.upper, real, walks),
             row_numbers: ROW_NUMBERS,
             walks,
+            has_plan: plan.is_some(),
             begins_moving,
             controller,
             banner: format!("/* {provenance} */"),

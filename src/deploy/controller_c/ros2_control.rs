@@ -3,7 +3,6 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::*;
-use crate::deploy::controller::SettingText;
 use crate::mpc::STEP_SLACK;
 use crate::recording::Column;
 use crate::recording::check::{BODY_SPEED_M_S, JOINT_MARGIN_RAD};
@@ -15,21 +14,11 @@ struct Facts<'a> {
     version: &'static str,
     /// The columns of a jump with the physical limits of the robot, as an initialiser.
     columns: String,
-    /// Defaults of the parameters: of walks, if the model has strides.
-    settings: Vec<SettingText>,
-    defaults: Settings,
-    lift: &'static str,
+    /// The motion by default: along a given plan, by commands for a model with strides.
     start: &'static str,
     /// Name of the controller in the example of its parameters.
     node: &'static str,
-    command_every_s: f64,
-    max_fallbacks: usize,
 }
-
-/// Time between commands of a walk: at 100 Hz the feet would be known too late.
-const WALK_COMMAND_EVERY_S: f64 = 0.002;
-/// Time without a plan after which the plugin gives up.
-const MAX_FALLBACK_S: f64 = 0.2;
 
 extends! { <'a> Facts<'a>: super::Facts<'a>, controller }
 
@@ -48,30 +37,19 @@ templates! {
 
 pub(super) fn files(
     controller: &super::Facts<'_>,
-    robot: &Robot,
     provenance: &str,
 ) -> askama::Result<Vec<(String, String)>> {
-    let walks = controller.walks;
-    let defaults = match walks {
-        true => Settings::from(&crate::mpc::walk_settings(robot)),
-        false => controller.defaults,
-    };
-    let command_every_s = match walks {
-        true => WALK_COMMAND_EVERY_S,
-        false => defaults.step_s,
+    let start = match (controller.has_plan, controller.begins_moving) {
+        (true, true) => "jump",
+        (false, _) if controller.walks => "walk",
+        _ => "stand",
     };
     let facts = Facts {
-        settings: SettingText::all(&defaults),
-        lift: if walks { "consistent" } else { "plain" },
-        start: if walks { "walk" } else { "stand" },
-        node: if walks {
-            "walk_controller"
-        } else {
-            "jump_controller"
+        start,
+        node: match start {
+            "walk" => "walk_controller",
+            _ => "jump_controller",
         },
-        command_every_s,
-        max_fallbacks: (MAX_FALLBACK_S / command_every_s).round() as usize,
-        defaults,
         controller,
         package: format!("{}_ros2_control", controller.name.to_ascii_lowercase()),
         version: env!("CARGO_PKG_VERSION"),

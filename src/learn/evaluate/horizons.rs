@@ -132,6 +132,7 @@ impl<'a> Horizon {
         };
         let take_off_s = flights.first().map(|flight| segment.time_s[flight.start]);
         let rollout = rollout_over(compiled, latent, windows);
+        let state_dim = model.decoder_map()?.output_dim();
         for (sample, window, column) in rollout.predictions() {
             let Range { start, end } = window.samples;
             if is_flight && sample + 1 < end {
@@ -171,9 +172,10 @@ impl<'a> Horizon {
                         Predicted::Body(BODY.into_iter().zip(moved).collect())
                     }
                 };
-                for (row, of) in (model.decoder_map()?.output_dim()..).zip(&self.mass_centre) {
+                let centre = predicted.mass_centre(model, &self.mass_centre, &coasted)?;
+                for (row, (of, y_hat)) in (state_dim..).zip(self.mass_centre.iter().zip(centre)) {
                     let y = latent.z[(of.latent, sample)] / of.factor;
-                    if let Some(y_hat) = predicted.mass_centre(model, of, &coasted)? {
+                    if let Some(y_hat) = y_hat {
                         sums.add_pair(phase, row, [y, y_hat]);
                     }
                 }
@@ -203,23 +205,32 @@ enum Predicted {
 }
 
 impl Predicted {
-    /// A coordinate of the centre of mass, m or rad. If the body alone is predicted, both have the same acceleration.
+    /// Coordinates of the centre of mass, m or rad. If the body alone is predicted, both have the same acceleration.
     fn mass_centre(
         &self,
         model: &ReducedModel,
-        of: &MassCentre,
+        all: &[MassCentre],
         coasted: &DVector<f64>,
-    ) -> Result<Option<f64>> {
-        let encoded =
-            |x: &DVector<f64>| Ok::<_, ModelError>(model.encode(x)?[of.latent] / of.factor);
-        Ok(match self {
-            Self::Latent(z) => Some(z[of.latent] / of.factor),
-            Self::All(x) => Some(encoded(x)?),
-            Self::Body(rows) => match rows.iter().find(|(row, _)| *row == of.axis) {
-                Some((row, moved)) => Some(encoded(coasted)? + moved - coasted[*row]),
-                None => None,
-            },
-        })
+    ) -> Result<Vec<Option<f64>>> {
+        if all.is_empty() {
+            return Ok(Vec::new());
+        }
+        let z = match self {
+            Self::Latent(z) => z.clone(),
+            Self::All(x) => model.encode(x)?,
+            Self::Body(_) => model.encode(coasted)?,
+        };
+        let accelerated = |of: &MassCentre| match self {
+            Self::Latent(_) | Self::All(_) => Some(0.0),
+            Self::Body(rows) => {
+                let (row, moved) = rows.iter().find(|(row, _)| *row == of.axis)?;
+                Some(moved - coasted[*row])
+            }
+        };
+        let each = all.iter();
+        Ok(each
+            .map(|of| Some(z[of.latent] / of.factor + accelerated(of)?))
+            .collect())
     }
 }
 

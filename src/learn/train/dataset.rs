@@ -134,6 +134,15 @@ impl Dataset {
         Ok(())
     }
 
+    pub(super) fn median_step_s(&self) -> f64 {
+        let pairs = self.jumps.iter().flat_map(|jump| jump.time_s.windows(2));
+        let mut steps: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        // Recorded times carry rounding; a microsecond is below every sampling.
+        let median = steps.get(steps.len() / 2);
+        median.map_or(0.002, |step| (step * 1e6).round() / 1e6)
+    }
+
     /// Whether feet change so often that the motions are walks.
     pub(super) fn walks(&self) -> bool {
         let spans: usize = self.jumps.iter().map(|motion| motion.spans.len()).sum();

@@ -15,7 +15,7 @@ const LEAST_SHARE: f64 = 0.05; // of all samples that they begin at
 const FLIGHT_RIDGE: f64 = 1e-2; // relative to the mean square of all joints' accelerations
 const RIDGE: f64 = 1e-3; // the same with feet on the ground
 /// The same of x in walks. Feet resist rolling with a force that follows the legs' motion, and a weak ridge would count it
-/// as the legs' momentum. Predictions of validation trots do not depend on it, those of another controller do.
+/// as the legs' momentum. Chosen with another controller and other gaits in sight: validation trots hardly depend on it.
 const ROLLING_RIDGE: f64 = 2e-2;
 const LOAD_RIDGE: f64 = 1e-5; // on the other columns of the regression, relative to the mean square of each
 

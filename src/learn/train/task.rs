@@ -166,7 +166,7 @@ impl Task<'_> {
                 state: ScaleFactors::Uniform(options.scaling.state),
                 input: ScaleFactors::PerCoordinate(options.scaling.factors().input),
             })
-            .sample_time_s(median_step_s(training))
+            .sample_time_s(training.median_step_s())
             .provenance(provenance)
             .encoder(fitted.maps.encoder)
             .decoder(fitted.maps.decoder)
@@ -201,15 +201,6 @@ impl Task<'_> {
         });
         given.collect()
     }
-}
-
-fn median_step_s(dataset: &Dataset) -> f64 {
-    let pairs = dataset.jumps.iter().flat_map(|jump| jump.time_s.windows(2));
-    let mut steps: Vec<f64> = pairs.map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    // Recorded times carry rounding; a microsecond is below every sampling.
-    let median = steps.get(steps.len() / 2);
-    median.map_or(0.002, |step| (step * 1e6).round() / 1e6)
 }
 
 pub(super) fn provenance(

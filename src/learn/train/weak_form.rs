@@ -4,7 +4,7 @@ use super::*;
 
 const STRIDE: usize = 5; // samples between the starts of two windows
 pub(super) const FLIGHT_WINDOW: usize = 50; // samples
-const MOTION_WINDOW: usize = 100; // about a step of a trot; errors of forces average out over it
+const MOTION_WINDOW_S: f64 = 0.2; // about a step of a trot; errors of forces average out over it
 const WHOLE_FLIGHTS: f64 = 10.0; // weight of the errors of whole flights against those of windows
 const LARGEST: f64 = 1e150; // magnitude of a term: sums of its squares stay finite
 
@@ -60,14 +60,15 @@ pub(super) fn windowed_samples(
     windows_of(set, features, set.dataset.spans(Some(phase)), window)
 }
 
-/// The same over whole motions, with windows of [`MOTION_WINDOW`] samples across phases.
+/// The same over whole motions, with windows of [`MOTION_WINDOW_S`] across phases.
 pub(super) fn samples_of_all_phases(
     set: EncodedSet<'_>,
     features: &Features,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let motions = set.dataset.jumps.iter().enumerate();
     let motions = motions.map(|(index, motion)| (index, 0..motion.samples()));
-    windows_of(set, features, motions, MOTION_WINDOW)
+    let window = (MOTION_WINDOW_S / set.dataset.median_step_s()).round();
+    windows_of(set, features, motions, window.max(1.0) as usize)
 }
 
 fn windows_of(

@@ -1,19 +1,18 @@
 """Runs the controller along recordings it was not trained on and prints the tables of docs/evaluation/control.md.
 
-    cargo build --release && python3 benches/control/along.py
+    cargo build --release && python3 benches/learning/along.py
 
 Every row has the ranges over the test jumps of `go1`, or over the jumps of `go1-other`, with the transpose lift. Needs
 Python alone; a few seconds.
 """
 
 import argparse
-import json
 import pathlib
-import subprocess
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from tables import ROOT, answer, jumps, span
+
 MODELS = ("go1-d4", "go1-d7")
-SETS = {"go1": "test_*.csv.gz", "go1-other": "*.csv.gz"}
+SETS = {"go1": "test", "go1-other": ""}  # prefixes of the recordings
 BASELINES = {
     "no dynamics": "no_dynamics",
     "constant velocity": "constant_velocity",
@@ -35,14 +34,6 @@ LIFT = [
 ]
 
 
-def runs_along(romc, model, name):
-    """The runs of a model along the recordings of a set, from `romc mpc --json`."""
-    recordings = sorted((ROOT / "examples" / "recordings" / name).glob(SETS[name]))
-    command = [romc, "mpc", ROOT / "models" / f"{model}.json", *recordings, "--json"]
-    done = subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True)
-    return json.loads(done.stdout)["runs"]
-
-
 def cell(runs, path, factor, decimals):
     """The range of a number over runs; empty where they do not have it."""
     values = []
@@ -52,8 +43,7 @@ def cell(runs, path, factor, decimals):
         if value is None:
             return ""
         values.append(factor * value)
-    least, most = (f"{value:.{decimals}f}" for value in (min(values), max(values)))
-    return least if least == most else f"{least} to {most}"
+    return span(values, decimals)
 
 
 def row(title, runs, columns):
@@ -67,7 +57,7 @@ def main():
     along, lift = [], []
     for model in MODELS:
         for name in SETS:
-            runs = runs_along(romc, model, name)
+            runs = answer(romc, "mpc", ROOT / f"models/{model}.json", *jumps(name, SETS[name]))["runs"]
             title = f"`{model}`, `{name}`"
             along.append(row(f"{title} | model", runs, COLUMNS))
             for baseline, key in BASELINES.items():
