@@ -3,10 +3,13 @@
 
     .ci/docs.py generate [--romc target/release/romc]    writes docs/reference/commands.md and docs/reference/json.md
     .ci/docs.py check [--romc target/release/romc]       these are up to date, every link leads somewhere, docs/SUMMARY.md has
-                                                         every page, tables of README.md fit 80 columns
-    .ci/docs.py run [--romc ...] [PAGE ...]              runs the `sh` blocks of README.md and of the pages, but for those of
-                                                         docs/evaluation, whose commands are in docs/numbers; each
-                                                         page in a copy of the repository's examples and models
+                                                         every page, every message of docs/reference/messages.md is in
+                                                         the sources, tables of README.md fit 80 columns
+    .ci/docs.py run [--romc ...] [--python ...] [PAGE ...]
+                                                         runs the `sh` blocks of README.md and of the pages, and compares
+                                                         what they print with the `text` blocks below them; pages of
+                                                         docs/evaluation have their commands in docs/numbers; each
+                                                         page runs in a copy of the repository's examples and models
 """
 import argparse
 import json
@@ -26,7 +29,7 @@ GO1 = "examples/recordings/go1"
 JSON_COMMANDS = [
     "inspect models/go1-d4.json",
     f"inspect {GO1}/test_01.csv.gz",
-    f"simulate models/go1-d4.json {GO1}/test_01.csv.gz",
+    f"simulate models/go1-d4.json {GO1}/test_01.csv.gz --verbose",
     f"mpc models/go1-d4.json {GO1}/test_01.csv.gz",
     "plan models/go1-d7.json --distance 0.35 --apex 0.12 --output {out}/plan.csv",
     "plan models/go1-trot-d6.json --speed 0.5 --output {out}/walk.csv",
@@ -58,8 +61,11 @@ def commands_page(romc):
 
 
 def keys(value, path=""):
-    """Yields the path and the type of every value; entries of a list and of a map of names share one line each."""
-    if isinstance(value, dict):
+    """Yields the path and the type of every value; entries of a list, and objects with the same keys, share their lines."""
+    if isinstance(value, dict) and have_same_keys(value):
+        yield f"{path}.*", f"objects, here `{'`, `'.join(value)}`"
+        yield from keys(next(iter(value.values())), f"{path}.*")
+    elif isinstance(value, dict):
         for key, inner in value.items():
             yield from keys(inner, f"{path}.{key}" if path else key)
     elif isinstance(value, list):
@@ -72,10 +78,18 @@ def keys(value, path=""):
         yield path, kind
 
 
+def have_same_keys(value):
+    """Whether the values are several objects with the same keys, such as those of phases and coordinates."""
+    if len(value) < 2 or not all(isinstance(inner, dict) and inner for inner in value.values()):
+        return False
+    first, *others = ([path for path, _ in keys(inner)] for inner in value.values())
+    return all(other == first for other in others)
+
+
 def json_page(romc):
     parts = ["# JSON output", "", "With `--json`, every command prints one JSON object. This page lists its keys, one example per command.", ""]
     parts += ["`.ci/docs.py generate` makes this page from the program. Keys are stable within a minor version."]
-    parts += ["`[]` stands for each entry of a list. [Metrics](metrics.md) defines the numbers.", ""]
+    parts += ["`[]` stands for each entry of a list, and `*` for each of several objects with the same keys. [Metrics](metrics.md) defines the numbers.", ""]
     with tempfile.TemporaryDirectory() as out:
         for command in JSON_COMMANDS:
             value = json.loads(output_of(romc, *command.format(out=out).split(), "--json"))
@@ -110,8 +124,35 @@ def pages():
     return sorted(path for path in DOCS.rglob("*.md"))
 
 
+def texts_of_program():
+    """Everything that the program can print, on one line: sources, with placeholders as gaps."""
+    sources = [path.read_text(encoding="utf-8") for folder in ("src", "python/src") for path in sorted((ROOT / folder).rglob("*.rs"))]
+    text = re.sub(r"\\\n\s*", "", "\n".join(sources))
+    text = re.sub(r"\{[\w.:?#<>$*]*\}", "\0", text)
+    return " ".join(text.split()).replace('\\"', '"').replace("`", "")
+
+
+# Put together from words, or printed by the library that reads the command line.
+COMPOSED = {"joint rates clip at", "invalid value"}
+
+
+def messages():
+    """Faults of the page of messages: texts that the program does not print. Parts count between `...`, numbers, options
+    and the words that a message is put together from; of the words of a part six of ten have to stand in one place."""
+    known, page = texts_of_program(), "docs/reference/messages.md"
+    for line, row in enumerate((ROOT / page).read_text(encoding="utf-8").split("\n"), 1):
+        for text in re.findall(r"`([^`]+)`", row.split(" | ")[0]) if row.startswith("| `") else []:
+            text = re.sub(r"^(note|error|warning|FAILED|because):? ", "", text)
+            for part in re.split(r"\.\.\.|\bexpected\b|\bfound\b|: |--[a-z-]+|[();,?]|\b[A-Z]{3,}\b|\b\d[\d.]*\b", text):
+                words = part.split()
+                size = -(-len(words) * 6 // 10)
+                runs = [" ".join(words[at : at + size]) for at in range(len(words) - size + 1)]
+                if len(part) >= 9 and " ".join(words) not in COMPOSED and not any(run in known for run in runs):
+                    yield f"{page}:{line}: the program does not print `{part.strip()}`"
+
+
 def check(romc):
-    faults = []
+    faults = list(messages())
     for name, make in GENERATED.items():
         if not (DOCS / name).is_file() or (DOCS / name).read_text(encoding="utf-8") != make(romc):
             faults.append(f"docs/{name} is not what the program prints: run .ci/docs.py generate")
@@ -140,40 +181,82 @@ def check(romc):
     return faults
 
 
-def blocks(page):
-    """The `sh` blocks of a page, with the line where each begins."""
+def blocks(page, has_python):
+    """The `sh` blocks of a page: the line where each begins, its text, and the output that a `text` block right below
+    shows. Blocks `sh,fails` have to fail, `sh,python` run with --python alone, and `sh,ignore` do not run here."""
     text = page.read_text(encoding="utf-8")
-    for found in re.finditer(r"^```sh\n(.*?)^```", text, flags=re.S | re.M):
-        if "cargo " not in found.group(1):  # the checks run the demo and the tests themselves
-            yield text[: found.start()].count("\n") + 2, found.group(1)
+    below = r"(?:(?:[^\s`]+\s+){0,9}?```text\n(.*?)^```)?"  # a few words may stand between
+    for found in re.finditer(r"^```sh((?:,\w+)*)\n(.*?)^```\s*" + below, text, flags=re.S | re.M):
+        kinds, script, shown = found.groups()
+        runs = "ignore" not in kinds and (has_python or "python" not in kinds)
+        if runs and "cargo " not in script:  # the checks run the demo and the tests themselves
+            yield text[: found.start()].count("\n") + 2, f"! {{\n{script}}}\n" if "fails" in kinds else script, shown
 
 
-def run(romc, names):
+def programs(page):
+    """Names and texts of the Python programs that a page tells its readers to save."""
+    return re.findall(r"Save it as `(\w+\.py)`:\s*```python\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.S | re.M)
+
+
+def comparable(line):
+    """A line of output without the width of columns and without times, which differ between runs."""
+    return re.sub(r"\b[\d.]+ (?=(?:s|ms|us)\b)", "# ", " ".join(line.split()))
+
+
+def absent(shown, printed):
+    """The first line of a page's block that the output does not have, in this order. `...` stands for any lines, or for
+    the rest of one."""
+    rest = [comparable(line) for line in printed.splitlines()]
+    for line in filter(None, map(comparable, shown.splitlines())):
+        begins = line.removesuffix("...")
+        at = next((at for at, other in enumerate(rest) if other == line or (begins != line and other.startswith(begins))), None)
+        if line == "...":
+            continue
+        if at is None:
+            return line
+        rest = rest[at + 1 :]
+    return None
+
+
+def run(romc, python, names):
     usual = [page for page in pages() if page.parent.name != "evaluation"]
     chosen = [ROOT / name for name in names] or [ROOT / "README.md", *usual]
     faults = []
     for page in chosen:
-        script = [(line, block) for line, block in blocks(page)]
+        script = list(blocks(page, python is not None))
         if not script:
             continue
         begun = time.monotonic()
-        with tempfile.TemporaryDirectory() as folder:
-            folder = pathlib.Path(folder)
+        with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as outputs:
+            folder, outputs = pathlib.Path(folder), pathlib.Path(outputs)
             for name in ("examples", "models", "docs", "python", "benches"):
                 shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("target", "node_modules"))
-            (folder / "bin").mkdir()
-            (folder / "bin" / "romc").symlink_to(pathlib.Path(romc).resolve())
-            (folder / "target").mkdir()
-            (folder / "target" / "release").mkdir()
-            (folder / "target" / "release" / "romc").symlink_to(pathlib.Path(romc).resolve())
+            for place in (folder / "bin", folder / "target" / "release"):
+                place.mkdir(parents=True)
+                (place / "romc").symlink_to(pathlib.Path(romc).resolve())
+            if python:
+                (folder / "bin" / "python").write_text(f'#!/bin/sh\nexec {pathlib.Path(python).absolute()} "$@"\n')
+                (folder / "bin" / "python").chmod(0o755)
+            for name, program in programs(page):
+                (folder / name).write_text(program, encoding="utf-8")
             environment = dict(os.environ, PATH=f"{folder / 'bin'}:{os.environ['PATH']}")
-            text = "set -e\n" + "".join(f"echo '@{line}' >&2\n{block}" for line, block in script)
-            done = subprocess.run(["bash", "-c", text], cwd=folder, env=environment, capture_output=True, text=True)
-            if done.returncode:
-                at = re.findall(r"^@(\d+)$", done.stderr, re.M)[-1]
-                faults.append(f"{page.relative_to(ROOT)}:{at}: {done.stderr.strip().splitlines()[-1]}")
-        print(f"{page.relative_to(ROOT)}: {len(script)} blocks, {time.monotonic() - begun:.0f} s", flush=True)
+            text = "set -e\n" + "".join(f"exec >'{outputs / str(line)}' 2>&1\n{block}" for line, block, _ in script)
+            done = subprocess.run(["bash", "-c", text], cwd=folder, env=environment)
+            here = page.relative_to(ROOT)
+            for line, _, shown in script:
+                path = outputs / str(line)
+                printed = path.read_text(encoding="utf-8") if path.exists() else ""
+                if done.returncode and path.exists() and not (outputs / str(following(script, line))).exists():
+                    faults.append(f"{here}:{line}: {(printed.strip() or 'failed').splitlines()[-1]}")
+                elif shown and path.exists() and (lost := absent(shown, printed)) is not None:
+                    faults.append(f"{here}:{line}: the page shows `{lost}`, which the commands do not print")
+        print(f"{here}: {len(script)} blocks, {time.monotonic() - begun:.0f} s", flush=True)
     return faults
+
+
+def following(script, line):
+    """Where the next block begins; none for the last."""
+    return next((other for other, *_ in script if other > line), None)
 
 
 def main():
@@ -181,12 +264,13 @@ def main():
     parser.add_argument("action", choices=["generate", "check", "run"])
     parser.add_argument("pages", nargs="*")
     parser.add_argument("--romc", default=str(ROOT / "target/release/romc"))
-    arguments = parser.parse_args()
+    parser.add_argument("--python", help="interpreter with romc and PyTorch, for the blocks that need them")
+    arguments = parser.parse_intermixed_args()
     if arguments.action == "generate":
         for name, make in GENERATED.items():
             (DOCS / name).write_text(make(arguments.romc), encoding="utf-8")
         return
-    faults = check(arguments.romc) if arguments.action == "check" else run(arguments.romc, arguments.pages)
+    faults = check(arguments.romc) if arguments.action == "check" else run(arguments.romc, arguments.python, arguments.pages)
     if faults:
         sys.exit("\n".join(faults))
 

@@ -158,6 +158,7 @@ def check():
 
 
 def update(names):
+    (ROOT / "target" / "numbers").mkdir(parents=True, exist_ok=True)  # of models that commands make
     for name, entry in entries().items():
         if (names and name not in names) or (not names and (entry.get("kept") or entry.get("slow"))):
             continue

@@ -24,7 +24,10 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Answer> {
     let inputs = inputs.as_deref();
     write_recording(&arguments.output, segments, inputs, arguments.force)?;
     let output = arguments.output.display().to_string();
-    let text = format!("{output}: {samples} samples in {count} segments\n");
+    let text = format!(
+        "{output}: {samples} samples in {}\n",
+        counted(count, "segment")
+    );
     let json = json!({
         "recordings": names(&arguments.recordings),
         "output": output,

@@ -47,7 +47,7 @@ use std::path::{Path, PathBuf};
 use std::process::{self, ExitCode};
 
 use args::{PhaseSet, ReadingArguments, TrainArguments, TrainSettings, Widths, *};
-use console::style;
+use console::{Style, style};
 use nalgebra::{DMatrix, DVector};
 use prepared_recordings::RecordedSets;
 use serde_json::{Map, Value, json};
@@ -160,11 +160,10 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             if print(&text) { code } else { FAILED }
         }
         Err(error) => {
-            let head = style("error:").for_stderr().red().bold();
-            eprintln!("{head} {}", printable(&error.to_string()));
+            tell("error:", Style::new().red().bold(), &error.to_string());
             let first = std::error::Error::source(&error);
             for cause in std::iter::successors(first, |cause| cause.source()) {
-                eprintln!("  because: {}", printable(&cause.to_string()));
+                tell("  because:", Style::new(), &cause.to_string());
             }
             if error.is_usage() {
                 WRONG_USAGE

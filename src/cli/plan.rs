@@ -88,11 +88,7 @@ fn trusted(verdict: &Verdict, force: Overwrite) -> Result<()> {
         }
         Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
             (reasons.iter()).for_each(|reason| {
-                eprintln!(
-                    "{} {}",
-                    style("warning:").for_stderr().yellow().bold(),
-                    printable(reason)
-                )
+                tell("warning:", Style::new().yellow().bold(), reason);
             });
             Ok(())
         }

@@ -1,7 +1,7 @@
 //! Settings of the controller for a plan: a file next to it, which `romc plan` writes and other commands read.
 
 use super::*;
-use crate::mpc::interface::{SETTINGS, Settings};
+use crate::mpc::interface::{Accepts, SETTINGS, Setting, Settings};
 
 /// `PLAN.settings.toml` of `PLAN.csv`, `PLAN.csv.gz` or `PLAN.mcap`.
 pub(super) fn path_for(plan: &Path) -> PathBuf {
@@ -63,10 +63,18 @@ pub(super) fn text(settings: &MpcSettings) -> String {
         .to_owned();
     for ((setting, own), usual) in SETTINGS.iter().zip(own).zip(usual) {
         if own != usual || setting.name.starts_with("drive_") || setting.name == "flight_torque" {
-            text += &format!("{} = {own:?} # {}\n", setting.name, setting.text);
+            text += &format!("{} = {own:?} # {}\n", setting.name, words(setting));
         }
     }
     text
+}
+
+/// What a setting is; a choice by its numbers, because names of C mean nothing in the file.
+fn words(setting: &Setting) -> String {
+    match (setting.text.split_once("UPPER_"), setting.accepts) {
+        (Some((before, _)), Accepts::Whole(_, _, choices)) => format!("{before}{choices}"),
+        _ => setting.text.to_owned(),
+    }
 }
 
 /// Whether a file has this text already, as after a plan of the same name in another format.

@@ -94,9 +94,9 @@ fn answer(
     let (output, verdict) = (arguments.output.display().to_string(), content.verdict);
     let (headline, reasons) = (&made.introduction.headline, made.introduction.sentences());
     let mut text = format!(
-        "{headline}\n{}\n\n{}\n{output}: {} kB, {} figures\n",
-        reasons.join("\n"),
-        verdict_lines(verdict),
+        "{headline}\n{}\n{}\n{output}: {} kB, {} figures\n",
+        lines("", &reasons),
+        lines("", verdict_lines(verdict).lines()),
         made.page.len() / 1000,
         made.n_figures
     );

@@ -262,10 +262,20 @@ pub(super) fn note(text: &str) {
     if host::keep_note(text) {
         return;
     }
-    eprintln!(
-        "{} {}",
-        console::style("note:").for_stderr().cyan(),
-        printable(text)
+    tell("note:", Style::new().cyan(), text);
+}
+
+/// Prints to stderr, with the head in this style; on a terminal, on lines that fit it.
+pub(super) fn tell(head: &str, style: Style, text: &str) {
+    let mut line = format!("{head} {}", printable(text));
+    match console::Term::stderr().is_term() {
+        true => line = fitted(&line),
+        false => line.push('\n'),
+    }
+    eprint!(
+        "{}{}",
+        style.for_stderr().apply_to(head),
+        &line[head.len()..]
     );
 }
 

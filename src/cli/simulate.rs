@@ -68,17 +68,14 @@ fn metrics_text(
         let words = "rollouts diverged; the table covers them up to there";
         text += &format!("{diverged} of {all} {kind} {words}\n\n");
     }
-    if !horizons.is_empty() {
-        text += &format!(
-            "root mean square errors by horizon, of flights at the touchdown\n\n{}\n",
-            horizon_table(assessment, horizons)
-        );
-        for horizon in horizons {
-            let own = &horizon.predictors[0].1;
-            if own.diverged > 0 {
-                let (diverged, all, name) = (own.diverged, own.windows, &horizon.name);
-                text += &format!("{diverged} of {all} rollouts diverged: {name}\n\n");
-            }
+    let met = |horizon: &&Horizon| horizon.predictors[0].1.windows > 0;
+    for horizon in horizons.iter().filter(met) {
+        let (name, own) = (&horizon.name, &horizon.predictors[0].1);
+        let table = horizon_table(assessment, horizon);
+        text += &format!("root mean square errors, {name}\n\n{table}\n");
+        if own.diverged > 0 {
+            let (diverged, all) = (own.diverged, own.windows);
+            text += &format!("{diverged} of {all} rollouts diverged: {name}\n\n");
         }
     }
     text += &format!("{}\n", baseline_table(assessment));

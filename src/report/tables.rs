@@ -136,46 +136,37 @@ fn quantities(assessment: &Assessment<'_>, horizon: &Horizon) -> Vec<(String, St
     coordinates.chain(mass_centre).collect()
 }
 
-pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizons: &[Horizon]) -> Table {
+pub(crate) fn horizon_table(assessment: &Assessment<'_>, horizon: &Horizon) -> Table {
     let mut groups = groups(&assessment.names);
-    let quantities = quantities(assessment, &horizons[0]);
+    let quantities = quantities(assessment, horizon);
     let mass_centre = (0..).zip(&quantities).skip(assessment.names.len());
     groups.extend(mass_centre.map(|(row, (name, _))| (name.clone(), vec![row])));
-    let met = horizons
-        .iter()
-        .filter(|horizon| horizon.predictors[0].1.windows > 0);
-    let rows = met.flat_map(|horizon| {
-        let rows = groups.iter();
-        rows.map(move |(name, rows)| (horizon, name, rows))
-    });
-    let fits = |horizon: &Horizon, predictor: usize, rows: &[usize]| -> Option<Vec<Fit>> {
+    let fits = |predictor: usize, rows: &[usize]| -> Option<Vec<Fit>> {
         let fits = horizon.predictors[predictor].1.fits();
         rows.iter().map(|&row| fits[row]).collect()
     };
-    let rms = |horizon: &Horizon, predictor, rows: &[usize]| {
-        let squares = fits(horizon, predictor, rows)?.into_iter();
+    let rms = |predictor, rows: &[usize]| {
+        let squares = fits(predictor, rows)?.into_iter();
         let square: f64 = squares.map(|fit| fit.rms * fit.rms).sum();
         Some((square / rows.len() as f64).sqrt())
     };
-    let least_r2 = |(horizon, _, rows): &(&Horizon, &String, &Vec<usize>)| -> Option<String> {
-        let all = fits(horizon, 0, rows)?.into_iter().map(|fit| fit.r2);
+    let least_r2 = |(_, rows): &&(String, Vec<usize>)| -> Option<String> {
+        let all = fits(0, rows)?.into_iter().map(|fit| fit.r2);
         let least = all.collect::<Option<Vec<_>>>()?.into_iter();
         Some(format!("{:.3}", least.fold(f64::INFINITY, f64::min)))
     };
-    let mut table = Table::of(rows)
-        .column("horizon", "", |(horizon, ..)| &horizon.name)
-        .column("coordinate", "", |(_, name, _)| *name)
-        .column("unit", "", |(.., rows)| &quantities[rows[0]].1)
+    let mut table = Table::of(&groups)
+        .column("coordinate", "", |(name, _)| name)
+        .column("unit", "", |(_, rows)| &quantities[rows[0]].1)
         .column("least R^2", "", least_r2);
-    for (predictor, (name, _)) in horizons[0].predictors.iter().enumerate() {
-        table = table.column(name, "", |(horizon, _, rows)| rms(horizon, predictor, rows));
+    for (predictor, (name, _)) in horizon.predictors.iter().enumerate() {
+        table = table.column(name, "", |(_, rows)| rms(predictor, rows));
     }
     table
-        .column("worse than", "", |(horizon, _, rows)| {
+        .column("worse than", "", |(_, rows)| {
             let others = horizon.predictors.iter().enumerate().skip(1);
-            let own = rms(horizon, 0, rows)?;
-            let better =
-                others.filter(|(i, _)| rms(horizon, *i, rows).is_some_and(|other| other < own));
+            let own = rms(0, rows)?;
+            let better = others.filter(|(i, _)| rms(*i, rows).is_some_and(|other| other < own));
             let better: Vec<&str> = better.map(|(_, (name, _))| *name).collect();
             (!better.is_empty()).then(|| better.join(", "))
         })
