@@ -193,6 +193,18 @@ def blocks(page, has_python):
             yield text[: found.start()].count("\n") + 2, f"! {{\n{script}}}\n" if "fails" in kinds else script, shown
 
 
+def session(page):
+    """The Python blocks of a page as one program, with the output that `text` blocks right below them show; none without
+    such output, or where the page's program is to be saved."""
+    text = page.read_text(encoding="utf-8")
+    found = re.findall(r"^```python\n(.*?)^```\s*(?:```text\n(.*?)^```)?", text, flags=re.S | re.M)
+    if programs(page) or not any(shown for _, shown in found):
+        return []
+    program = "".join(block for block, _ in found)
+    line = text[: text.index("```python\n")].count("\n") + 2
+    return [(line, f"python - <<'END_OF_PAGE'\n{program}END_OF_PAGE\n", "".join(shown for _, shown in found))]
+
+
 def programs(page):
     """Names and texts of the Python programs that a page tells its readers to save."""
     return re.findall(r"Save it as `(\w+\.py)`:\s*```python\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.S | re.M)
@@ -223,7 +235,7 @@ def run(romc, python, names):
     chosen = [ROOT / name for name in names] or [ROOT / "README.md", *usual]
     faults = []
     for page in chosen:
-        script = list(blocks(page, python is not None))
+        script = sorted([*blocks(page, python is not None), *(session(page) if python else [])])
         if not script:
             continue
         begun = time.monotonic()
