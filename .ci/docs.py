@@ -7,7 +7,7 @@
                                                          the sources, tables of README.md fit 80 columns
     .ci/docs.py run [--romc ...] [--python ...] [PAGE ...]
                                                          runs the `sh` blocks of README.md and of the pages, and compares
-                                                         what they print with the `text` blocks below them; pages of
+                                                         their output with the `text` blocks below them; pages of
                                                          docs/evaluation have their commands in docs/numbers; each
                                                          page runs in a copy of the repository's examples and models
 """
@@ -190,7 +190,13 @@ def blocks(page, has_python):
         kinds, script, shown = found.groups()
         runs = "ignore" not in kinds and (has_python or "python" not in kinds)
         if runs and "cargo " not in script:  # the checks run the demo and the tests themselves
-            yield text[: found.start()].count("\n") + 2, f"! {{\n{script}}}\n" if "fails" in kinds else script, shown
+            yield text[: found.start()].count("\n") + 2, refused(script) if "fails" in kinds else script, shown
+
+
+def refused(script):
+    """A script that fails unless the given one does. Behind `!` and `if`, bash goes on after a command that fails."""
+    unless = "echo 'succeeds, and the page shows a failure'; exit 1"
+    return f"set +e\n(set -e\n{script})\nfailed=$?; set -e\n[ $failed -ne 0 ] || {{ {unless}; }}\n"
 
 
 def session(page):
@@ -206,7 +212,7 @@ def session(page):
 
 
 def programs(page):
-    """Names and texts of the Python programs that a page tells its readers to save."""
+    """Names and texts of the Python programs of a page that are to be saved."""
     return re.findall(r"Save it as `(\w+\.py)`:\s*```python\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.S | re.M)
 
 
@@ -219,11 +225,12 @@ def absent(shown, printed):
     """The first line of a page's block that the output does not have, in this order. `...` stands for any lines, or for
     the rest of one."""
     rest = [comparable(line) for line in printed.splitlines()]
-    for line in filter(None, map(comparable, shown.splitlines())):
-        begins = line.removesuffix("...")
-        at = next((at for at, other in enumerate(rest) if other == line or (begins != line and other.startswith(begins))), None)
-        if line == "...":
+    for line in map(comparable, shown.splitlines()):
+        if line in ("", "..."):
             continue
+        begins = line.removesuffix("...")
+        is_it = str.startswith if line.endswith("...") else str.__eq__
+        at = next((at for at, other in enumerate(rest) if is_it(other, begins)), None)
         if at is None:
             return line
         rest = rest[at + 1 :]
@@ -255,20 +262,15 @@ def run(romc, python, names):
             text = "set -e\n" + "".join(f"exec >'{outputs / str(line)}' 2>&1\n{block}" for line, block, _ in script)
             done = subprocess.run(["bash", "-c", text], cwd=folder, env=environment)
             here = page.relative_to(ROOT)
-            for line, _, shown in script:
-                path = outputs / str(line)
-                printed = path.read_text(encoding="utf-8") if path.exists() else ""
-                if done.returncode and path.exists() and not (outputs / str(following(script, line))).exists():
-                    faults.append(f"{here}:{line}: {(printed.strip() or 'failed').splitlines()[-1]}")
-                elif shown and path.exists() and (lost := absent(shown, printed)) is not None:
+            ran = [(line, shown, (outputs / str(line)).read_text(encoding="utf-8")) for line, _, shown in script if (outputs / str(line)).exists()]
+            if done.returncode:  # of the last block that began
+                line, _, printed = ran.pop()
+                faults.append(f"{here}:{line}: {(printed.strip() or 'failed').splitlines()[-1]}")
+            for line, shown, printed in ran:
+                if shown and (lost := absent(shown, printed)) is not None:
                     faults.append(f"{here}:{line}: the page shows `{lost}`, which the commands do not print")
         print(f"{here}: {len(script)} blocks, {time.monotonic() - begun:.0f} s", flush=True)
     return faults
-
-
-def following(script, line):
-    """Where the next block begins; none for the last."""
-    return next((other for other, *_ in script if other > line), None)
 
 
 def main():
@@ -276,7 +278,7 @@ def main():
     parser.add_argument("action", choices=["generate", "check", "run"])
     parser.add_argument("pages", nargs="*")
     parser.add_argument("--romc", default=str(ROOT / "target/release/romc"))
-    parser.add_argument("--python", help="interpreter with romc and PyTorch, for the blocks that need them")
+    parser.add_argument("--python", help="interpreter with romc and PyTorch for `sh,python` and Python blocks")
     arguments = parser.parse_intermixed_args()
     if arguments.action == "generate":
         for name, make in GENERATED.items():

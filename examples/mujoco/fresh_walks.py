@@ -52,10 +52,19 @@ def main():
     for seed in arguments.seeds:
         if any(seed == gait_set.seed for gait_set in GAIT_SETS.values()):
             raise SystemExit(f"--seeds: {seed} is the seed of a set in the repository; choose another")
+    refuse_other_models(arguments)
     record(arguments)
-    answers = [answer_for(arguments, name, prefix) for name, prefix in SETS.values()]
+    answers = [answer_for(arguments, recordings(arguments, *of)) for of in SETS.values()]
     for horizon in HORIZONS:
         print(table(horizon, answers))
+
+
+def refuse_other_models(arguments):
+    """Stops before minutes of recording unless the model's equations are those of the whole body."""
+    (horizon, *_) = answer_for(arguments, [ROOT / "examples/recordings/go1-trot/test_02.csv.gz"])["horizons"]
+    missing = [f"com.{axis}" for axis in COORDINATES if f"com.{axis}" not in horizon["coordinates"]]
+    if missing:
+        raise SystemExit(f"{arguments.model}: found no {', '.join(missing)}, expected a model of walks with --body all")
 
 
 def folder(arguments, name, seed):
@@ -78,6 +87,12 @@ def recorded(task):
     write_walk(*task)
 
 
+def recordings(arguments, name, prefix):
+    """The recordings of a set, of all seeds."""
+    folders = [folder(arguments, name, seed) for seed in arguments.seeds]
+    return [path for one in folders for path in sorted(one.glob(f"{prefix}*.csv.gz"))]
+
+
 def table(horizon, answers):
     """Errors after a horizon of `romc simulate`, a row for each set and predictor."""
     lines = []
@@ -97,12 +112,13 @@ def rounded(value):
     return f"{value:.0f}" if value >= 9.95 else f"{value:#.2g}"
 
 
-def answer_for(arguments, name, prefix):
-    """What `romc simulate` answers for the walks of a set, of all seeds."""
-    folders = [folder(arguments, name, seed) for seed in arguments.seeds]
-    recordings = [path for one in folders for path in sorted(one.glob(f"{prefix}*.csv.gz"))]
-    command = [arguments.romc, "simulate", arguments.model, *recordings, "--verbose", "--json"]
-    result = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+def answer_for(arguments, walks):
+    """The JSON of `romc simulate` for recorded walks."""
+    command = [arguments.romc, "simulate", arguments.model, *walks, "--verbose", "--json"]
+    try:
+        result = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        raise SystemExit(f"{arguments.romc}: no such program; `cargo build --release` makes it") from None
     # A model that is not fit for the recordings ends with 1, after its answer.
     if result.returncode not in (0, 1) or not result.stdout:
         raise SystemExit(f"romc simulate: {result.stderr.strip()}")

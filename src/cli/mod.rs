@@ -160,10 +160,10 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             if print(&text) { code } else { FAILED }
         }
         Err(error) => {
-            tell("error:", Style::new().red().bold(), &error.to_string());
+            to_stderr("error:", Style::new().red().bold(), &error.to_string());
             let first = std::error::Error::source(&error);
             for cause in std::iter::successors(first, |cause| cause.source()) {
-                tell("  because:", Style::new(), &cause.to_string());
+                to_stderr("  because:", Style::new(), &cause.to_string());
             }
             if error.is_usage() {
                 WRONG_USAGE

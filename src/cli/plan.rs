@@ -88,7 +88,7 @@ fn trusted(verdict: &Verdict, force: Overwrite) -> Result<()> {
         }
         Verdict::Refused(reasons) | Verdict::Extrapolates(reasons) => {
             (reasons.iter()).for_each(|reason| {
-                tell("warning:", Style::new().yellow().bold(), reason);
+                to_stderr("warning:", Style::new().yellow().bold(), reason);
             });
             Ok(())
         }

@@ -262,11 +262,11 @@ pub(super) fn note(text: &str) {
     if host::keep_note(text) {
         return;
     }
-    tell("note:", Style::new().cyan(), text);
+    to_stderr("note:", Style::new().cyan(), text);
 }
 
 /// Prints to stderr, with the head in this style; on a terminal, on lines that fit it.
-pub(super) fn tell(head: &str, style: Style, text: &str) {
+pub(super) fn to_stderr(head: &str, style: Style, text: &str) {
     let mut line = format!("{head} {}", printable(text));
     match console::Term::stderr().is_term() {
         true => line = fitted(&line),

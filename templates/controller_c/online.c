@@ -1057,6 +1057,12 @@ static MAYBE_UNUSED bool online_write_wrench_map(const online_leg_shape *leg, co
     return true;
 }
 
+/* Raises the floor to the height, m, of a foot that the reference has on the ground. */
+static MAYBE_UNUSED void online_contacts_raise_floor(online_contacts *self, bool is_first, real height)
+{
+    self->floor_m = is_first ? height : online_greater(height, self->floor_m);
+}
+
 /* Writes F(x, u) and (A B), row by row, for a stage of step_s. The memory holds two states, two matrices of
  * the size of (A B) and the entries of a Jacobian. */
 static MAYBE_UNUSED void online_latent_dynamics_step(online_latent_dynamics *restrict self, int phase, const real *x,
@@ -1489,6 +1495,14 @@ static MAYBE_UNUSED real online_supervisor_fade(online_supervisor *restrict self
     return share;
 }
 
+/* Forgets measurements, but not the floor. */
+static MAYBE_UNUSED void online_contacts_forget(online_contacts *self)
+{
+    self->is_aloft = false;
+    self->is_contradicted = false;
+    self->is_opposed = false;
+}
+
 /* Forgets measurements, but neither a fault nor the floor. */
 static MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self)
 {
@@ -1500,9 +1514,7 @@ static MAYBE_UNUSED void online_supervisor_forget(online_supervisor *self)
     self->frozen = 0;
     self->has_good = false;
     self->is_doubted = false;
-    self->is_aloft = false;
-    self->is_contradicted = false;
-    self->is_opposed = false;
+    online_contacts_forget(&self->contacts);
     self->poor_s = 0.0;
     for (int i = 0; i < 3; ++i) {
         self->unexplained[i] = 0;
@@ -1528,12 +1540,6 @@ static MAYBE_UNUSED void online_supervisor_reset(online_supervisor *self)
     online_supervisor_forget(self);
     self->fault = ONLINE_NONE;
     self->faded_s = 0.0;
-}
-
-/* Raises the floor to the height, m, of a foot that the reference has on the ground. */
-static MAYBE_UNUSED void online_supervisor_take_floor(online_supervisor *self, bool is_first, real height)
-{
-    self->floor_m = is_first ? height : online_greater(height, self->floor_m);
 }
 
 /* Whether the clock stands, goes back or leaps. */
@@ -1696,8 +1702,8 @@ static MAYBE_UNUSED bool online_supervisor_is_unexplained(online_supervisor *res
 
 /* Whether contacts have been impossible for too long: a foot on the ground is above the floor, or a body without a
  * foot on the ground does not fall. */
-static MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor *restrict self, const online_bounds *bounds,
-        double time_s, real rises, const real *heights, bool *is_down)
+static MAYBE_UNUSED bool online_contacts_contradicts(online_contacts *restrict self, int most_steps, double time_s,
+        double step_s, real rises, const real *heights, bool *is_down)
 {
     bool is_wrong = false;
     bool is_aloft = true;
@@ -1721,14 +1727,14 @@ static MAYBE_UNUSED bool online_supervisor_contradicts(online_supervisor *restri
         self->contradicted_s = time_s;
     }
     self->is_contradicted = is_wrong;
-    const double steps = 1.0 + (time_s - self->contradicted_s) / self->step_s;
-    const double most = (double)bounds->contact_mismatch_steps;
+    const double steps = 1.0 + (time_s - self->contradicted_s) / step_s;
+    const double most = (double)most_steps;
     return is_wrong && most > 0.0 && steps > most - 0.5;
 }
 
 /* Whether a walk has for too long been on just the other feet than measured. */
-static MAYBE_UNUSED bool online_supervisor_opposes(online_supervisor *restrict self, const online_bounds *bounds,
-        double time_s, bool *is_down, bool *walks_on)
+static MAYBE_UNUSED bool online_contacts_opposes(online_contacts *restrict self, int most_steps, double time_s,
+        bool *is_down, bool *walks_on)
 {
     bool is_opposed = true;
     bool changes = false;
@@ -1741,7 +1747,17 @@ static MAYBE_UNUSED bool online_supervisor_opposes(online_supervisor *restrict s
         self->opposed_s = time_s;
     }
     self->is_opposed = is_opposed;
-    return is_opposed && bounds->contact_mismatch_steps > 0 && time_s - self->opposed_s > ONLINE_OPPOSED_S;
+    return is_opposed && most_steps > 0 && time_s - self->opposed_s > ONLINE_OPPOSED_S;
+}
+
+/* Whether contacts have been impossible for most_steps steps, which disable the check if they are zero. The body
+ * rises at rises, m/s; heights are those of the feet, m, is_down the measured feet on the ground, walks_on
+ * those that a walk has there. */
+static MAYBE_UNUSED bool online_contacts_are_impossible(online_contacts *restrict self, int most_steps,
+        double time_s, double step_s, real rises, const real *heights, bool *is_down, bool *walks_on)
+{
+    return online_contacts_contradicts(self, most_steps, time_s, step_s, rises, heights, is_down)
+            || online_contacts_opposes(self, most_steps, time_s, is_down, walks_on);
 }
 
 /* Checks a finite measurement of state and velocity, 18 each, and returns the fault. nominal is the reference's
@@ -1779,8 +1795,8 @@ static MAYBE_UNUSED online_fault online_supervisor_watch(online_supervisor *rest
     self->is_doubted = false;
     if (online_supervisor_is_unexplained(self, bounds, time_s, x, dx)) {
         self->fault = ONLINE_VELOCITY_MISMATCH;
-    } else if (online_supervisor_contradicts(self, bounds, time_s, dx[14], heights, is_down)
-            || online_supervisor_opposes(self, bounds, time_s, is_down, walks_on)) {
+    } else if (online_contacts_are_impossible(&self->contacts, bounds->contact_mismatch_steps, time_s, self->step_s,
+            dx[14], heights, is_down, walks_on)) {
         self->fault = ONLINE_CONTACT_MISMATCH;
     }
     self->has_good = true;

@@ -44,6 +44,22 @@ typedef struct {
 /* A kind of fault. Each has a status. */
 typedef enum { ONLINE_NONE, ONLINE_TILT, ONLINE_JOINT_BEYOND, ONLINE_JOINT_SPEED, ONLINE_BODY_FAR, ONLINE_JOINTS_FAR, ONLINE_BODY_LEAP, ONLINE_JOINTS_LEAP, ONLINE_NOT_AT_START, ONLINE_CLOCK_STANDS, ONLINE_CLOCK_BACK, ONLINE_CLOCK_LEAPS, ONLINE_FROZEN, ONLINE_VELOCITY_MISMATCH, ONLINE_CONTACT_MISMATCH, ONLINE_POOR_STEPS } online_fault;
 
+/* Times since which contacts are as they are, and the floor. */
+typedef struct {
+    /* Height of the reference's highest foot on the ground, m. */
+    real floor_m;
+    /* Since when no foot is on the ground, s, and the vertical velocity then, m/s. */
+    bool is_aloft;
+    double aloft_s;
+    real aloft_m_s;
+    /* Since when contacts cannot be, s. */
+    bool is_contradicted;
+    double contradicted_s;
+    /* Since when a walk is on the other feet, s. */
+    bool is_opposed;
+    double opposed_s;
+} online_contacts;
+
 /* State of the supervisor between measurements. */
 typedef struct {
     /* The present fault; it stays until a reset. */
@@ -70,18 +86,7 @@ typedef struct {
     double doubted_s;
     /* Displacement of the body that its velocity does not explain, fading, m. */
     real unexplained[3];
-    /* Height of the reference's highest foot on the ground, m. */
-    real floor_m;
-    /* Since when no foot is on the ground, s, and the vertical velocity then, m/s. */
-    bool is_aloft;
-    double aloft_s;
-    real aloft_m_s;
-    /* Since when contacts cannot be, s. */
-    bool is_contradicted;
-    double contradicted_s;
-    /* Since when a walk is on the other feet, s. */
-    bool is_opposed;
-    double opposed_s;
+    online_contacts contacts;
     /* Time without a good plan, s, and that of a step. */
     double poor_s;
     double step_s;

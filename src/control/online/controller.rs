@@ -181,8 +181,8 @@ impl Controller {
         let mut is_first = true;
         for (x, feet) in grounded {
             for leg in Leg::down(*feet) {
-                self.supervisor
-                    .take_floor(is_first, foot_height(self.plant.robot(), leg, x));
+                let height = foot_height(self.plant.robot(), leg, x);
+                self.supervisor.contacts.raise_floor(is_first, height);
                 is_first = false;
             }
         }

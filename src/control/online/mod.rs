@@ -19,6 +19,7 @@
 mod choices;
 mod command;
 mod conic;
+mod contacts;
 mod control_model;
 mod controller;
 mod dense;
@@ -28,6 +29,7 @@ pub(crate) mod estimate;
 mod horizon;
 pub mod interface;
 mod lift;
+mod lift_program;
 pub(crate) mod linearise;
 mod machine;
 mod plan;

@@ -4,11 +4,11 @@
 //! In: every measurement with the reference's state at its time. Out: a [`Fault`], which stays until a reset, and
 //! torques that fade into joint damping. A measurement beyond a bound is refused, because it may be a glitch. After
 //! [`PATIENCE_S`] of such measurements, or in the first measurement, it is a fault. The clock, repeated measurements,
-//! contacts and steps without a good plan are also checked. Read [`Supervisor::watch`] first.
+//! [`Contacts`] and steps without a good plan are also checked. Read [`Supervisor::watch`] first.
 
+use super::contacts::Contacts;
 use super::control_model::{clamped_joint, clamped_torque};
 use super::dense::{Real, greater, smaller};
-use crate::robot::GRAVITY_M_S2;
 
 /// How long measurements are refused before they are a fault, s.
 const PATIENCE_S: f64 = 0.019;
@@ -25,13 +25,6 @@ const CLOCK_JITTER_S: f64 = 0.005;
 const LONGEST_STEPS: f64 = 1.5;
 /// Time over which velocities are compared with positions, s.
 const MEMORY_S: Real = 0.05;
-/// Height above the floor at which a foot is not on it, m.
-const FOOT_UP_M: Real = 0.06;
-/// Time in the air after which a body has to fall, s, and the least share of gravity.
-const FALL_S: f64 = 0.03;
-/// Longest time that a walk may be on the other feet: twice that by which feet may be early, s.
-const OPPOSED_S: f64 = 0.08;
-const FALL_SHARE: Real = 0.5;
 /// How far a reference moves, rad or m, while a measurement that stays the same is not believed.
 const REFERENCE_MOVES: Real = 0.01;
 
@@ -137,18 +130,7 @@ pub(super) struct Supervisor {
     doubted_s: f64,
     /// Displacement of the body that its velocity does not explain, fading, m.
     unexplained: [Real; 3],
-    /// Height of the reference's highest foot on the ground, m.
-    floor_m: Real,
-    /// Since when no foot is on the ground, s, and the vertical velocity then, m/s.
-    is_aloft: bool,
-    aloft_s: f64,
-    aloft_m_s: Real,
-    /// Since when contacts cannot be, s.
-    is_contradicted: bool,
-    contradicted_s: f64,
-    /// Since when a walk is on the other feet, s.
-    is_opposed: bool,
-    opposed_s: f64,
+    pub contacts: Contacts,
     /// Time without a good plan, s, and that of a step.
     poor_s: f64,
     pub step_s: f64,
@@ -173,9 +155,7 @@ impl Supervisor {
         self.frozen = 0;
         self.has_good = false;
         self.is_doubted = false;
-        self.is_aloft = false;
-        self.is_contradicted = false;
-        self.is_opposed = false;
+        self.contacts.forget();
         self.poor_s = 0.0;
         for i in 0..3 {
             self.unexplained[i] = 0.0;
@@ -187,15 +167,6 @@ impl Supervisor {
         self.forget();
         self.fault = Fault::None;
         self.faded_s = 0.0;
-    }
-
-    /// Raises the floor to the height, m, of a foot that the reference has on the ground.
-    pub(super) fn take_floor(&mut self, is_first: bool, height: Real) {
-        self.floor_m = if is_first {
-            height
-        } else {
-            greater(height, self.floor_m)
-        };
     }
 
     /// Checks a finite measurement of state and velocity, 18 each, and returns the fault. `nominal` is the reference's
@@ -243,9 +214,15 @@ impl Supervisor {
         self.is_doubted = false;
         if self.is_unexplained(bounds, time_s, x, dx) {
             self.fault = Fault::VelocityMismatch;
-        } else if self.contradicts(bounds, time_s, dx[14], heights, is_down)
-            || self.opposes(bounds, time_s, is_down, walks_on)
-        {
+        } else if self.contacts.are_impossible(
+            bounds.contact_mismatch_steps,
+            time_s,
+            self.step_s,
+            dx[14],
+            heights,
+            is_down,
+            walks_on,
+        ) {
             self.fault = Fault::ContactMismatch;
         }
         self.has_good = true;
@@ -397,65 +374,6 @@ impl Supervisor {
             largest = greater(unexplained.abs(), largest);
         }
         largest / MEMORY_S > bounds.velocity_mismatch
-    }
-
-    /// Whether contacts have been impossible for too long: a foot on the ground is above the floor, or a body without a
-    /// foot on the ground does not fall.
-    fn contradicts(
-        &mut self,
-        bounds: &Bounds,
-        time_s: f64,
-        rises: Real,
-        heights: &[Real],
-        is_down: &[bool],
-    ) -> bool {
-        let mut is_wrong = false;
-        let mut is_aloft = true;
-        for foot in 0..4 {
-            let is_up = heights[foot] > self.floor_m + FOOT_UP_M;
-            is_wrong = is_wrong || (is_down[foot] && is_up);
-            is_aloft = is_aloft && !is_down[foot];
-        }
-        if is_aloft && !self.is_aloft {
-            self.aloft_s = time_s;
-            self.aloft_m_s = rises;
-        }
-        self.is_aloft = is_aloft;
-        let passed_s = time_s - self.aloft_s;
-        let least = FALL_SHARE * (GRAVITY_M_S2 as Real) * (passed_s as Real);
-        let falls = rises - self.aloft_m_s < -least;
-        if is_aloft && passed_s > FALL_S && !falls {
-            is_wrong = true;
-        }
-        if is_wrong && !self.is_contradicted {
-            self.contradicted_s = time_s;
-        }
-        self.is_contradicted = is_wrong;
-        let steps = 1.0 + (time_s - self.contradicted_s) / self.step_s;
-        let most = bounds.contact_mismatch_steps as f64;
-        is_wrong && most > 0.0 && steps > most - 0.5
-    }
-
-    /// Whether a walk has for too long been on just the other feet than measured.
-    fn opposes(
-        &mut self,
-        bounds: &Bounds,
-        time_s: f64,
-        is_down: &[bool],
-        walks_on: &[bool],
-    ) -> bool {
-        let mut is_opposed = true;
-        let mut changes = false;
-        for foot in 0..4 {
-            is_opposed = is_opposed && is_down[foot] != walks_on[foot];
-            changes = changes || walks_on[foot] != walks_on[0];
-        }
-        is_opposed = is_opposed && changes;
-        if is_opposed && !self.is_opposed {
-            self.opposed_s = time_s;
-        }
-        self.is_opposed = is_opposed;
-        is_opposed && bounds.contact_mismatch_steps > 0 && time_s - self.opposed_s > OPPOSED_S
     }
 
     /// Adds up the time of steps without a good plan, `passed_s` after the last one; returns the fault.
