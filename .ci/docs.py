@@ -5,7 +5,7 @@
     .ci/docs.py check [--romc target/release/romc]       these are up to date, every link leads somewhere, docs/SUMMARY.md has
                                                          every page, every message of docs/reference/messages.md is in
                                                          the sources, tables of README.md fit 80 columns
-    .ci/docs.py run [--romc ...] [--python ...] [PAGE ...]
+    .ci/docs.py run [--romc ...] [--python ... [--slow]] [PAGE ...]
                                                          runs the `sh` blocks of README.md and of the pages, and compares
                                                          their output with the `text` blocks below them; pages of
                                                          docs/evaluation have their commands in docs/numbers; each
@@ -181,16 +181,20 @@ def check(romc):
     return faults
 
 
-def blocks(page, has_python):
+def blocks(page, kinds):
     """The `sh` blocks of a page: the line where each begins, its text, and the output that a `text` block right below
-    shows. Blocks `sh,fails` have to fail, `sh,python` run with --python alone, and `sh,ignore` do not run here."""
+    shows. A comment `<!-- sh` above a block has commands that prepare for it. Blocks `sh,fails` have to fail, `sh,python`
+    and `sh,slow` run if they are among the kinds, and `sh,ignore` do not run here."""
     text = page.read_text(encoding="utf-8")
+    above = r"(?:^<!-- sh\n(.*?)^-->\n)?"
     below = r"(?:(?:[^\s`]+\s+){0,9}?```text\n(.*?)^```)?"  # a few words may stand between
-    for found in re.finditer(r"^```sh((?:,\w+)*)\n(.*?)^```\s*" + below, text, flags=re.S | re.M):
-        kinds, script, shown = found.groups()
-        runs = "ignore" not in kinds and (has_python or "python" not in kinds)
-        if runs and "cargo " not in script:  # the checks run the demo and the tests themselves
-            yield text[: found.start()].count("\n") + 2, refused(script) if "fails" in kinds else script, shown
+    for found in re.finditer(above + r"^```sh((?:,\w+)*)\n(.*?)^```\s*" + below, text, flags=re.S | re.M):
+        prepares, words, script, shown = found.groups()
+        asked = set(words.split(",")) - {"", "fails"}
+        runs = asked <= kinds and ("slow" in asked or "cargo " not in script)  # the checks run README's commands themselves
+        if runs:
+            line = text[: found.start(3)].count("\n") + 1
+            yield line, (prepares or "") + (refused(script) if "fails" in words else script), shown
 
 
 def refused(script):
@@ -237,12 +241,15 @@ def absent(shown, printed):
     return None
 
 
-def run(romc, python, names):
+def run(arguments):
+    python, slow = arguments.python, arguments.slow
+    kinds = {kind for kind, is_on in (("python", python), ("slow", slow)) if is_on}
     usual = [page for page in pages() if page.parent.name != "evaluation"]
-    chosen = [ROOT / name for name in names] or [ROOT / "README.md", *usual]
+    usual = [page for page in [ROOT / "README.md", *usual] if not slow or "```sh,slow" in page.read_text(encoding="utf-8")]
+    chosen = [ROOT / name for name in arguments.pages] or usual
     faults = []
     for page in chosen:
-        script = sorted([*blocks(page, python is not None), *(session(page) if python else [])])
+        script = sorted([*blocks(page, kinds), *(session(page) if python else [])])
         if not script:
             continue
         begun = time.monotonic()
@@ -252,13 +259,13 @@ def run(romc, python, names):
                 shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("target", "node_modules"))
             for place in (folder / "bin", folder / "target" / "release"):
                 place.mkdir(parents=True)
-                (place / "romc").symlink_to(pathlib.Path(romc).resolve())
-            if python:
-                (folder / "bin" / "python").write_text(f'#!/bin/sh\nexec {pathlib.Path(python).absolute()} "$@"\n')
-                (folder / "bin" / "python").chmod(0o755)
+                (place / "romc").symlink_to(pathlib.Path(arguments.romc).resolve())
+            for name, is_module in (("python", ""), ("pip", "-m pip")) if python else ():
+                (folder / "bin" / name).write_text(f'#!/bin/sh\nexec {pathlib.Path(python).absolute()} {is_module} "$@"\n')
+                (folder / "bin" / name).chmod(0o755)
             for name, program in programs(page):
                 (folder / name).write_text(program, encoding="utf-8")
-            environment = dict(os.environ, PATH=f"{folder / 'bin'}:{os.environ['PATH']}")
+            environment = dict(os.environ, PATH=f"{folder / 'bin'}:{os.environ['PATH']}", REPOSITORY=str(ROOT))
             text = "set -e\n" + "".join(f"exec >'{outputs / str(line)}' 2>&1\n{block}" for line, block, _ in script)
             done = subprocess.run(["bash", "-c", text], cwd=folder, env=environment)
             here = page.relative_to(ROOT)
@@ -279,12 +286,13 @@ def main():
     parser.add_argument("pages", nargs="*")
     parser.add_argument("--romc", default=str(ROOT / "target/release/romc"))
     parser.add_argument("--python", help="interpreter with romc and PyTorch for `sh,python` and Python blocks")
+    parser.add_argument("--slow", action="store_true", help="the pages with `sh,slow` blocks, and these too; they need MuJoCo")
     arguments = parser.parse_intermixed_args()
     if arguments.action == "generate":
         for name, make in GENERATED.items():
             (DOCS / name).write_text(make(arguments.romc), encoding="utf-8")
         return
-    faults = check(arguments.romc) if arguments.action == "check" else run(arguments.romc, arguments.python, arguments.pages)
+    faults = check(arguments.romc) if arguments.action == "check" else run(arguments)
     if faults:
         sys.exit("\n".join(faults))
 

@@ -438,7 +438,8 @@ fn controller_in_c_repeats_the_library_bit_for_bit_under_random_steps_and_tight_
         }
         let emitted = Emitted::with_library_sines(&model);
         let replay = root().join("tests/controller_c/replay.c");
-        let program = emitted.program("cc", &[], replay.to_str().expect("UTF-8"));
+        let level = if number == 0 { "-O2" } else { "-O1" };
+        let program = emitted.program("cc", &[level], replay.to_str().expect("UTF-8"));
         let file = emitted.scratch.path().join("steps");
         let (steps, changed, [limited, failed]) =
             replay_file(&model, step_count() / 5, number as u64, Rates::Free);

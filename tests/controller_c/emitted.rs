@@ -64,7 +64,8 @@ impl Emitted {
             .join(format!("{}-controller-c", self.name))
     }
 
-    /// Compiles a source of the folder, or another, unless it is compiled already; returns the object.
+    /// Compiles a source of the folder, or another, unless it is compiled already; returns the object. With -O1, which
+    /// compiles almost twice as fast as -O2, unless the flags have another level.
     pub fn object(&self, compiler: &str, flags: &[&str], source: &str) -> PathBuf {
         let key: String = format!("{compiler} {flags:?} {source}")
             .chars()
@@ -78,7 +79,7 @@ impl Emitted {
         succeed(
             Command::new(compiler)
                 .args(STRICT)
-                .args(["-O2", "-ffp-contract=off"])
+                .args(["-O1", "-ffp-contract=off"])
                 .args(flags)
                 .arg(format!("-DNAME={name}"))
                 .arg(format!("-DUPPER={}", name.to_ascii_uppercase()))
@@ -119,7 +120,7 @@ impl Emitted {
         succeed(
             Command::new("cc")
                 .args(STRICT)
-                .args(["-O2", "-ffp-contract=off", "-I."])
+                .args(["-O1", "-ffp-contract=off", "-I."])
                 .arg(format!("-DNAME={}", self.name))
                 .arg(format!("-DSOURCE=\"{}_controller.c\"", self.name))
                 .arg(root().join("tests/controller_c").join(source))

@@ -360,9 +360,15 @@ impl Build {
 
     pub fn all() -> Vec<Self> {
         let mut all = Self::exact();
-        all.extend([Self::c_fast(), Self::rust_libm()]);
-        all.extend(Self::clang_fast());
+        all.extend(Self::inexact());
         all
+    }
+
+    /// The builds that may round otherwise than the interpreter.
+    pub fn inexact() -> Vec<Self> {
+        let mut inexact = vec![Self::c_fast(), Self::rust_libm()];
+        inexact.extend(Self::clang_fast());
+        inexact
     }
 
     /// As a user compiles it.

@@ -50,7 +50,7 @@ pub fn kinks() -> Vec<Kink> {
     if tools::is_thorough() && tools::answers(tools::python().args(["-c", "import mpmath"])) {
         let seed = std::env::var("ROMC_SEED").unwrap_or_else(|_| "2026".to_owned());
         let script = folder.join("scripts/slopes.py");
-        let output = tools::python().arg(script).args(["2000", &seed]).output();
+        let output = tools::python().arg(script).args(["200", &seed]).output();
         let output = output.expect("Python starts");
         assert!(
             output.status.success(),
