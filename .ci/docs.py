@@ -184,7 +184,8 @@ def check(romc):
 def blocks(page, kinds):
     """The `sh` blocks of a page: the line where each begins, its text, and the output that a `text` block right below
     shows. A comment `<!-- sh` above a block has commands that prepare for it. Blocks `sh,fails` have to fail, `sh,python`
-    and `sh,slow` run if they are among the kinds, and `sh,ignore` do not run here."""
+    and `sh,slow` run if they are among the kinds, the slow ones in a shell of their own, whose folder is not that of later
+    blocks, and `sh,ignore` do not run here."""
     text = page.read_text(encoding="utf-8")
     above = r"(?:^<!-- sh\n(.*?)^-->\n)?"
     below = r"(?:(?:[^\s`]+\s+){0,9}?```text\n(.*?)^```)?"  # a few words may stand between
@@ -194,7 +195,8 @@ def blocks(page, kinds):
         runs = asked <= kinds and ("slow" in asked or "cargo " not in script)  # the checks run README's commands themselves
         if runs:
             line = text[: found.start(3)].count("\n") + 1
-            yield line, (prepares or "") + (refused(script) if "fails" in words else script), shown
+            script = (prepares or "") + (refused(script) if "fails" in words else script)
+            yield line, f"(set -e\n{script})\n" if "slow" in asked else script, shown
 
 
 def refused(script):

@@ -53,6 +53,11 @@ fn n_random_models() -> u64 {
     })
 }
 
+/// Every nth of the shipped models and fixtures, for comparisons that take long.
+fn some_shipped(n: usize) -> Vec<ReducedModel> {
+    models::shipped().into_iter().step_by(n).collect()
+}
+
 /// Functions, points and expected results of some models.
 struct Case {
     models: Vec<ReducedModel>,
@@ -157,7 +162,7 @@ fn check_all(what: &str, cases: &[Case], builds: impl Fn(usize) -> Vec<Build>) {
 fn generated_code_of_shipped_models_equals_the_interpreter() {
     let n_points = tools::thorough_or(2_000, 1_000);
     // Contracted code takes the longest to compile.
-    let [all, some] = [models::shipped(), models::some_shipped(3)]
+    let [all, some] = [models::shipped(), some_shipped(3)]
         .map(|models| Case::new(models, n_points, Form::Automatic));
     check_all("shipped", &[all, some], |case| match case {
         0 => Build::exact(),
@@ -248,7 +253,7 @@ fn random_models_have_all_shapes() {
 #[test]
 fn generated_code_with_tables_equals_the_interpreter() {
     let random_models = (1000..1000 + n_models_a_program()).map(models::random);
-    let shipped = tools::thorough_or(models::some_shipped(3), Vec::new());
+    let shipped = tools::thorough_or(some_shipped(3), Vec::new());
     let models = shipped.into_iter().chain(random_models).collect();
     let cases = [Case::new(models, 100, Form::Tables)];
     check_all("tables", &cases, |_| {

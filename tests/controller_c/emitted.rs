@@ -65,7 +65,7 @@ impl Emitted {
     }
 
     /// Compiles a source of the folder, or another, unless it is compiled already; returns the object. With -O1, which
-    /// compiles almost twice as fast as -O2, unless the flags have another level.
+    /// compiles faster than -O2, unless the flags have another level.
     pub fn object(&self, compiler: &str, flags: &[&str], source: &str) -> PathBuf {
         let key: String = format!("{compiler} {flags:?} {source}")
             .chars()

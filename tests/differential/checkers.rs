@@ -9,7 +9,7 @@ use romc::model::ReducedModel;
 
 use super::drivers::{Build, Workshop, contents, succeed};
 use super::tools::has;
-use super::{Case, SOME_MODELS, check_all, models};
+use super::{Case, SOME_MODELS, check_all, models, some_shipped};
 
 /// Builds with sanitizers and under valgrind, if this machine has them.
 fn memory_checkers() -> Vec<Build> {
@@ -23,7 +23,7 @@ fn memory_checkers() -> Vec<Build> {
 fn sanitizers_and_valgrind_are_silent_on_generated_functions() {
     let random: Vec<ReducedModel> = (0..SOME_MODELS / 3).map(models::random).collect();
     let cases = [
-        Case::new(models::some_shipped(3), 20, Form::Automatic),
+        Case::new(some_shipped(3), 20, Form::Automatic),
         Case::new(
             (1000..1000 + SOME_MODELS / 4).map(models::random).collect(),
             20,
@@ -66,8 +66,8 @@ fn emitted() -> Vec<Workshop> {
     let tables = Form::Tables;
     let automatic = Form::default();
     vec![
-        Workshop::new(&models::some_shipped(2), automatic),
-        Workshop::in_precision(&models::some_shipped(3), automatic, Precision::Single),
+        Workshop::new(&some_shipped(2), automatic),
+        Workshop::in_precision(&some_shipped(3), automatic, Precision::Single),
         Workshop::new(&random, tables),
     ]
 }

@@ -38,11 +38,6 @@ pub fn shipped() -> Vec<ReducedModel> {
         .collect()
 }
 
-/// Every nth of the shipped models and fixtures, for comparisons that take long.
-pub fn some_shipped(n: usize) -> Vec<ReducedModel> {
-    shipped().into_iter().step_by(n).collect()
-}
-
 /// A random model. The seed varies: one to eight coordinates, the library (standard of degree 0 to 3 with and without
 /// sines, or terms of the syntax), inputs or none, one to three phases, density of Xi, equations and phases without a
 /// term, no maps, affine maps, nonlinear maps. Models of even seeds call no mathematics library and have no sines.
