@@ -61,7 +61,7 @@ pub enum Error {
     Mpc(#[from] crate::mpc::MpcError),
     #[error(transparent)]
     Plan(#[from] crate::plan::PlanError),
-    #[error("no plan to be trusted: {0} (--force writes it all the same)")]
+    #[error("plan refused: {0} (--force writes it anyway)")]
     Distrusted(String),
     /// A file that cannot be used or written as the command line asks.
     #[error("{path}: {message}", path = path.display())]

@@ -303,6 +303,33 @@ fn pitch_that_is_wrong_makes_the_verdict_fail() {
     assert_eq!(verdict.failed[0], "0.1 s");
 }
 
+/// The threshold depends on constant velocity; a pendulum with the recorded forces can be better than a model that passes.
+#[test]
+fn best_baseline_of_a_row_is_the_best_of_all_and_a_better_one_is_reported() {
+    let of_body_z = |model, jump| {
+        let verdict = verdict_on(&shipped(model), &[jump]);
+        let of = "error of body.z over 0.1 s";
+        let row = verdict.rows.into_iter().find(|row| row.name == of);
+        row.expect("a row")
+    };
+    let beaten = of_body_z(
+        "go2-async-d4",
+        "examples/recordings/go2-asynchronous/test_01.csv.gz",
+    );
+    let better = of_body_z("go1-d4", "examples/recordings/go1/test_02.csv.gz");
+    for row in [&beaten, &better] {
+        assert_eq!(row.passed, Some(true), "{row:?}");
+        assert!(
+            row.best_baseline_name != row.baseline_name && row.best_baseline < row.baseline,
+            "{row:?}"
+        );
+    }
+    assert!(
+        beaten.is_beaten() && !better.is_beaten(),
+        "{beaten:?} {better:?}"
+    );
+}
+
 #[test]
 fn every_row_that_praises_the_dynamics_falls_with_them() {
     let go1 = "examples/recordings/go1/test_02.csv.gz";

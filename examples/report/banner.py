@@ -15,8 +15,8 @@ STYLE = """
 text{font:34px Helvetica,Arial,sans-serif;fill:#222}
 polyline{fill:none;stroke-width:9;stroke-linejoin:round;stroke-linecap:round}
 .recorded{stroke:#1f5fa8}.full{stroke:#c2570c}.full polyline{stroke-dasharray:34 16}
-.path{stroke-width:4;opacity:.55}.floor{stroke:#888;stroke-width:5}
-@media (prefers-color-scheme:dark){text{fill:#e6e6e6}.recorded{stroke:#6ea8ee}.full{stroke:#f29a4f}.floor{stroke:#777}}
+.path{stroke-width:4;opacity:.55}.floor{stroke:#888;stroke-width:5}.plate{fill:#fff}
+@media (prefers-color-scheme:dark){.plate{fill:#0d1117}text{fill:#e6e6e6}.recorded{stroke:#6ea8ee}.full{stroke:#f29a4f}.floor{stroke:#777}}
 """
 PAUSE_FRAMES = 12  # the last posture stays, then it begins again
 MARGIN_MM = 90
@@ -41,6 +41,8 @@ def main(report, output):
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left:.0f} {top:.0f} {right - left:.0f} {floor - top + 60:.0f}" role="img">',
         "<title>A recorded jump of a Go1 and its prediction by the model from the first state</title>",
         f"<style>{STYLE.strip()}</style>",
+        # A page may be dark where the system is light.
+        f'<rect class="plate" x="{left:.0f}" y="{top:.0f}" width="100%" height="100%" rx="16"/>',
         f'<line class="floor" x1="{left:.0f}" x2="{right:.0f}" y1="{floor + 5:.0f}" y2="{floor + 5:.0f}"/>',
     ]
     for role, path in paths:

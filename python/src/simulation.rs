@@ -199,7 +199,10 @@ fn verdict_text(verdict: &Verdict) -> String {
             (true, Some(true)) => "passed",
             (true, Some(false)) => "FAILED",
         };
-        for line in wrapped(&row.words(), WORDS_WIDTH) {
+        let better = row.best_baseline_words().filter(|_| row.is_beaten());
+        let better = better.map(|best| format!("; a baseline is better, {best}"));
+        let words = row.words() + &better.unwrap_or_default();
+        for line in wrapped(&words, WORDS_WIDTH) {
             text += &format!("  {outcome:OUTCOME_WIDTH$}  {line}\n");
             outcome = "";
         }

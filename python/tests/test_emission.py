@@ -100,7 +100,7 @@ def test_notebook_formula_has_every_phase():
 
 
 @pytest.mark.parametrize("name", ["go1-d4", "go1-d6", "paper-2d"])
-def test_text_says_the_same_as_the_model(name, command_line, tmp_path):
+def test_text_is_equal_as_the_model(name, command_line, tmp_path):
     path = MODELS / f"{name}.json"
     (tmp_path / "equations.txt").write_text(romc.Model.load(path).equations(units="si").to_text())
     answer = command_line.json("check", path, "equations.txt")

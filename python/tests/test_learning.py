@@ -67,7 +67,7 @@ def test_model_is_refined_on_other_recordings(command_line, tmp_path):
         ({"latent_dim": 12}, 'expected 1 to 9 .*`body="all"`, `coordinates="free"` and `mask_std="0"` allow more'),
         ({"latent_dim": 2, "method": "magic"}, "invalid value 'magic' for method: expected one of closed-form, joint"),
         ({"latent_dim": 2, "phases": {"rear": "7"}}, "for phases: found \"rear=7\", expected NAME=any"),
-        ({"latent_dim": 2, "activation": "elu"}, "expected `encoder_layers=` or `decoder_layers=` beside it"),
+        ({"latent_dim": 2, "activation": "elu"}, "expected `encoder_layers=` or `decoder_layers=` as well"),
         ({"latent_dim": 2, "robot": "go9"}, "unknown robot `go9`; known: go1, go2, a1"),
         ({"latent_dim": 2, "body": object()}, "expected a number, a word, a path, a list of them, or True"),
     ],

@@ -45,7 +45,7 @@ impl ExprPool {
     fn derivative_of_node(&mut self, expr: ExprId, symbol: SymbolId) -> ExprId {
         let inner = |pool: &ExprPool, operand: ExprId| {
             pool.known_derivative(operand, symbol)
-                .expect("operands are differentiated before what uses them")
+                .expect("operands are differentiated before their parents")
         };
         let (coefficient, rest) = self.split(expr);
         if rest != expr {

@@ -68,7 +68,7 @@ impl Verdict {
 }
 
 impl Comparison {
-    pub fn says_the_same(&self) -> bool {
+    pub fn is_equal(&self) -> bool {
         self.verdicts().all(Verdict::is_equal)
     }
 

@@ -14,7 +14,7 @@
 //! let paper = br"\[\ddot z_1 = 0.72\sin z_1\cos z_1\]";
 //! let paper = Side::from_bytes("b.tex", paper, &options, &[])?;
 //! let comparison = compare(&text, &paper, &options);
-//! assert!(comparison.says_the_same());
+//! assert!(comparison.is_equal());
 //! # Ok::<(), romc::check::CheckError>(())
 //! ```
 

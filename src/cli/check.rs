@@ -41,7 +41,8 @@ fn answer(left: &Side, right: &Side, comparison: &Comparison) -> Answer {
         let mut equations = Vec::new();
         for equation in &phase.equations {
             let (words, verdict) = described(&equation.verdict);
-            let _ = writeln!(text, "  {}: {words}", equation.output);
+            let words = format!("  {}: {words}", equation.output);
+            text.extend(words.lines().map(fitted));
             text += &dropping(&equation.verdict, [left, right]);
             let mut entry = json!({ "equation": equation.output });
             extend(&mut entry, verdict);
@@ -62,12 +63,12 @@ fn answer(left: &Side, right: &Side, comparison: &Comparison) -> Answer {
         0 => String::new(),
         n => format!(", {n} of them up to the printed digits"),
     };
-    let is_equal = comparison.says_the_same();
-    let (say, of_all) = match is_equal {
-        true => ("say", all),
-        false => ("do not say", format!("{equal} of {all}")),
+    let is_equal = comparison.is_equal();
+    let (are, of_all) = match is_equal {
+        true => ("are", all),
+        false => ("are not", format!("{equal} of {all}")),
     };
-    text += &format!("\nA and B {say} the same: {of_all} proven equal{rounded}\n");
+    text += &format!("\nA and B {are} equal: {of_all} proven equal{rounded}\n");
     let json = json!({
         "files": [&left.file, &right.file],
         "equal": is_equal,
@@ -112,7 +113,7 @@ fn described(verdict: &Verdict) -> (String, Value) {
         }
         Verdict::Different(difference) => {
             let how = match difference.beside_rounding {
-                true => "different in terms beside those that rounding explains,",
+                true => "different in terms that rounding does not explain,",
                 false => "different",
             };
             let (gap, terms) = (gap_text(&difference.gap), terms_text(&difference.terms));

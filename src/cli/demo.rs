@@ -29,7 +29,9 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     let targets = [Target::Latex, Target::C, Target::Rust];
     let mut options = EmitOptions::default();
     options.print.digest = Some(artifact::digest(&model).short());
-    let mut files = deploy::emit(&Equations::of(&model), &targets, &options)?;
+    options.print.rounding = UnitsChoice::Physical.usual_rounding();
+    let equations = Equations::of(&model).in_physical_units()?;
+    let mut files = deploy::emit(&equations, &targets, &options)?;
     progress.set_message("rolling the model out");
     let evaluation = Assessment::over(&model, &jumps, RESTART_S)?;
     progress.finish_and_clear();
@@ -62,13 +64,13 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
     let mut text = format!(
         "romc demo: model {} on {} jumps of a simulated Go1 that training did not see\n\
          1. The model\n{}\n\
-         2. Predictions from the first state and the recorded forces\n{}\n\
+         2. Predictions from the first state, the recorded torques and contacts\n{}\n\
          3. Control along the jumps, without the recorded torques\n{}\n\
          4. Made in {}; open report.html next\n{}",
         MODEL.0.trim_end_matches(".json"),
         JUMPS.len(),
         model_text(&model).replace("\n\n", "\n"),
-        predictions(&model, &evaluation)?,
+        predictions(&model, &evaluation, &verdict)?,
         controllers(&model, &jumps, &control[0])?,
         folder.display(),
         made_text(&model, &self_test)
@@ -107,40 +109,25 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<Answer> {
 }
 
 /// Errors of the body compared with the best of all baselines, and the height of the body over the first jump.
-fn predictions(model: &ReducedModel, evaluation: &Assessment<'_>) -> Result<String> {
-    let [whole, short] = &evaluation.constant_velocity;
-    let [latent_whole, latent_short] = &evaluation.constant_latent_velocity;
-    let horizons = [
-        ("0.1 s", &evaluation.restarted, [short, latent_short]),
-        ("whole jump", &evaluation.full, [whole, latent_whole]),
-    ];
-    let mut rows = Vec::new();
-    for (place, name) in ["body.x", "body.z"].into_iter().enumerate() {
-        for (horizon, own, [constant, in_latent]) in &horizons {
-            let rms = |sums| body_rms(evaluation, sums)[place];
-            let mut baselines = vec![
-                ("constant velocity", rms(constant)),
-                ("constant latent velocity", rms(in_latent)),
-            ];
-            baselines.extend(evaluation.baselines.iter().map(|baseline| {
-                let sums = match *horizon {
-                    "0.1 s" => &baseline.restarted,
-                    _ => &baseline.full,
-                };
-                (baseline.name, template_rms(sums)[place])
-            }));
-            let best = (baselines.into_iter())
-                .filter_map(|(of, rms)| Some((of, rms?)))
-                .min_by(|a, b| a.1.total_cmp(&b.1));
-            rows.push((format!("{name}, {horizon}"), rms(own), best));
-        }
-    }
+fn predictions(
+    model: &ReducedModel,
+    evaluation: &Assessment<'_>,
+    verdict: &crate::evaluate::Verdict,
+) -> Result<String> {
+    let bodies = ["body.x", "body.z"].into_iter();
+    let horizons = [("0.1 s", "0.1 s"), ("the whole motion", "whole jump")];
+    let cells = bodies.flat_map(|body| horizons.map(|(of, shown)| (body, of, shown)));
+    let rows = cells.filter_map(|(body, of, shown)| {
+        let name = format!("error of {body} over {of}");
+        let row = verdict.rows.iter().find(|row| row.name == name)?;
+        Some((format!("{body}, {shown}"), row))
+    });
     let in_mm = |rms: f64| 1e3 * rms;
     let table = Table::of(rows)
         .column("root mean square error", "mm", |row| row.0.clone())
-        .column("model", "", |row| row.1.map(in_mm))
-        .column("best baseline", "", |row| row.2.map(|(_, rms)| in_mm(rms)))
-        .column("which", "", |row| row.2.map(|(name, _)| name))
+        .column("model", "", |(_, row)| row.value.map(in_mm))
+        .column("best baseline", "", |(_, row)| row.best_baseline.map(in_mm))
+        .column("which", "", |(_, row)| row.best_baseline_name)
         .table();
     let run = &evaluation.runs[0];
     let recorded: Vec<f64> = run.segment.x.row(BODY_Z).iter().copied().collect();
@@ -171,7 +158,7 @@ fn controllers(model: &ReducedModel, jumps: &[Recording], runs: &[NamedRun]) -> 
             "romc",
             mean(&|of| of.torque_r2.contact),
             mean(&|of| mm(of.recovery_rms_m)),
-            "with the equations above",
+            "with these equations",
         ),
         (
             "no dynamics",
@@ -189,13 +176,13 @@ fn controllers(model: &ReducedModel, jumps: &[Recording], runs: &[NamedRun]) -> 
             "replay",
             None,
             mean(&|of| mm(of.baseline.replay.recovery_rms_m)),
-            "the recorded torques again",
+            "recorded torques again",
         ),
     ];
     let table = Table::of(rows)
         .column("controller", "", |row| row.0)
         .column("torques, R^2", "", |row| row.1)
-        .column("error after a push, mm", "", |row| row.2)
+        .column("deviation after a push, mm", "", |row| row.2)
         .column("", "", |row| row.3)
         .table();
     let settings = MpcSettings {

@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<Answer> {
     let axes = (has_axes && arguments.wrench_frame.is_none()).then(|| {
         format!(
             "force and moment of the inputs are along the {}'s axes, as published \
-             (--wrench-frame says otherwise)",
+             (change with --wrench-frame)",
             model.wrench_frame().name()
         )
     });
@@ -144,12 +144,12 @@ fn lacking(model: &ReducedModel) -> Option<&'static str> {
     let has_maps = model.encoder_map().is_ok() && model.decoder_map().is_ok();
     let mut phases = 0..model.phases().len();
     Some(if !has_maps {
-        "Equations only: `romc compile` takes this model; everything else needs an encoder and a decoder."
+        "Equations only: use `compile`, `check` or `inspect`. All other commands need an encoder and a decoder."
     } else if model.robot().is_err() {
-        "No robot: `romc compile` takes this model; `--robot go1` lets `simulate`, `report` and `mpc` do so too."
+        "No robot: use `compile`, `check` or `inspect`. All other commands need `--robot`, such as `--robot go1`."
     } else if phases.any(|phase| model.input_statistics(phase).is_err()) {
         "No input statistics in some phase: the controller (`mpc`, `compile --emit controller`) cannot weigh inputs; \
-         `--inputs-from jumps/*.csv` takes them from recordings."
+         `--inputs-from jumps/*.csv` computes them from recordings."
     } else {
         return None;
     })

@@ -101,10 +101,12 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         .map(ToString::to_string)
         .collect();
     let dominant = dominant_coordinates(model);
+    let physical = equations.in_physical_units().ok();
+    let shown = dominant_coordinates(physical.as_ref().map_or(model, |of| &of.model));
     let [encoder, decoder] =
         [model.encoder_map(), model.decoder_map()].map(|map| map.ok().map(StateMap::summary));
-    text += &match (&dominant, &encoder) {
-        (Some(dominant), _) => composition(dominant),
+    text += &match (&shown, &encoder) {
+        (Some(shown), _) => composition(shown),
         (None, Some(_)) => lines("  encoder ", &encoder) + &lines("  decoder ", &decoder),
         (None, None) => LATENT_ONLY.to_owned(),
     };
@@ -150,7 +152,7 @@ fn composition(dominant: &Dominant) -> String {
         fitted(&format!("  z{}: {} ...", latent + 1, parts.join(", ")))
     };
     let largest: String = dominant.iter().enumerate().map(line).collect();
-    format!("largest weights of the encoder\n{largest}\n")
+    format!("largest weights of the encoder, in the units of the equations\n{largest}\n")
 }
 
 fn input_rule(model: &ReducedModel) -> String {
@@ -315,7 +317,7 @@ fn feet_strips(segment: &Segment, stride_s: f64) -> String {
     let lasts_s = (STRIDES_SHOWN * stride_s).min(last - first);
     let start_s = first + 0.5 * (last - first - lasts_s);
     let mut text = format!(
-        "  a stride takes {stride_s:.3} s; segment 0 from {start_s:.2} s to {:.2} s, # a foot is down\n",
+        "  a stride lasts {stride_s:.3} s; segment 0 from {start_s:.2} s to {:.2} s, # a foot is down\n",
         start_s + lasts_s
     );
     for leg in Leg::ALL {

@@ -84,7 +84,7 @@ use crate::report::{
     baseline_table, body_rms, control_figures, control_table, coordinate_table, dynamics_table,
     failed_runs, failures, figure_files, horizon_json, horizon_table, introduction,
     invariance_table, page, phase_table, plan_figures, plan_json, range, reach_figure, run_table,
-    study_figures, template_rms, verdict_lines, walk_reach_figure, without_statistics,
+    study_figures, verdict_lines, walk_reach_figure, without_statistics,
 };
 use crate::robot::{BODY_X, BODY_Z, JOINT_DIM, JOINT_NAMES, Leg, LegMoments, Robot, WrenchFrame};
 use crate::robot_file::{self, RobotEntry, RobotOptions, read_actuators};

@@ -135,12 +135,11 @@ fn walk_answer(arguments: &PlanArguments, goal: &WalkGoal, planned: &WalkPlan) -
         ..
     } = *planned;
     let word = verdict.word();
-    let mut text = format!(
+    let text = format!(
         "{model}: a walk of {speed_m_s} m/s that turns by {yaw_rate_rad_s} rad/s for {duration_s} s: {word}\n\n\
          a stride of {stride_s:.3} s, of which each foot stands {:.0} %, with the body at {height_m:.3} m\n",
         100.0 * duty
     );
-    text += &lines(&format!("{word}: "), verdict.reasons());
     let json = json!({
         "model": model,
         "speed_m_s": speed_m_s,
@@ -184,13 +183,12 @@ fn answer(arguments: &PlanArguments, planned: &Plan) -> Answer {
     }
     let (model, verdict) = (arguments.model.display().to_string(), &planned.verdict);
     let ([distance, apex], word) = (planned.goal_m, verdict.word());
-    let mut text = format!(
+    let text = format!(
         "{model}: a jump of {distance} m with an apex of {apex} m: {word}\n\n{table}\n{}\n{}, {:.0} ms\n",
         margins_table(planned),
         counted(planned.programs, "convex program"),
         planned.solve_ms,
     );
-    text += &lines(&format!("{word}: "), verdict.reasons());
     let mut json = json!({ "model": model });
     extend(&mut json, plan_json(planned));
     json["output"] = json!(shown(&arguments.output));

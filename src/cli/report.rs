@@ -123,7 +123,7 @@ fn summary(folder: &Path) -> Result<Summary> {
     if summary.dimensions.is_empty() {
         let folder = folder.display();
         note(&format!(
-            "{folder}: no training of the study has a model, so that its figures are left out"
+            "{folder}: no training of the study has a model; the report does not contain its plots"
         ));
     }
     Ok(summary)

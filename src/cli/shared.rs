@@ -206,7 +206,7 @@ pub(super) fn read_jump(
     let mut recording = read_for(model, std::slice::from_ref(path), arguments)?.swap_remove(0);
     note_mismatches(&recording, model.robot()?);
     if let found @ 2.. = recording.segments.len() {
-        let message = format!("--plan takes one motion: found {found} segments");
+        let message = format!("found {found} segments, expected one motion for --plan");
         return Err(Error::refused(path, message));
     }
     Ok(recording.segments.swap_remove(0))
@@ -299,7 +299,7 @@ pub(super) fn note_repeated(sets: &[(&str, Vec<&Path>)]) {
         };
         let what = match *other == set {
             true => "and counts twice".to_owned(),
-            false => format!("which is in the {other} set: its {set} figures say too much"),
+            false => format!("which is in the {other} set: its {set} metrics are too optimistic"),
         };
         let (path, earlier) = (path.display(), earlier.display());
         note(&format!("{path}: the same recording as {earlier}, {what}"));

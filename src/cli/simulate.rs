@@ -24,7 +24,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Answer> {
     let unmeasured =
         unmeasured.map(|reason| format!("torques and control are not judged: {reason}"));
     let mut text = format!(
-        "{} over {} of {}\n\n{}\n{}",
+        "{} over {} of {}\n\n{}{}",
         arguments.model.display(),
         counted(assessment.runs.len(), "segment"),
         counted(recordings.len(), "recording"),

@@ -115,7 +115,7 @@ fn plan(
 
 fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary) -> Answer {
     let spread = |Spread { mean, std }: Spread| -> Cell {
-        format!("{} +- {}", significant(mean), significant(std)).into()
+        format!("{} ± {}", significant(mean), significant(std)).into()
     };
     let table = Table::of(&summary.dimensions)
         .column("d", "", |row| row.latent_dim)
@@ -123,8 +123,12 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
         .column("decoder mean square", "", |row| spread(row.decoder_mse))
         .column("active in contact", "", |row| spread(row.active))
         .column("L_mod", "", |row| spread(row.combined_loss))
-        .column("x after 0.1 s", "m", |row| spread(row.prediction_x_m))
-        .column("z after 0.1 s", "m", |row| spread(row.prediction_z_m))
+        .column("error of body x over 0.1 s", "m", |row| {
+            spread(row.prediction_x_m)
+        })
+        .column("error of body z over 0.1 s", "m", |row| {
+            spread(row.prediction_z_m)
+        })
         .column("torque R^2", "", |row| spread(row.torque_r2))
         .table();
     let (missing, total) = (store.missing(), store.plan.cells().len());
@@ -134,7 +138,7 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
     let mut text = format!("{folder}: {finished} of {total} trainings finished\n\n{table}");
     if let Some(best) = best {
         let lambda = summary.lambda;
-        text += &format!("\nleast L_mod = 2 E_dec + 2 * {lambda} * log |Xi| at d = {best}\n");
+        text += &format!("\nleast L_mod = 2 E_dec + 2 * {lambda} * ln |Xi| at d = {best}\n");
     }
     if !missing.is_empty() {
         let missing: Vec<String> = missing.iter().map(id).collect();
@@ -143,7 +147,7 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
     let mut refused = Vec::new();
     for cell in cells {
         if let Outcome::Refused(reason) = &cell.outcome {
-            text += &format!("no model: {}: {reason}\n", id(&cell.id));
+            text += &fitted(&format!("no model: {}: {reason}", id(&cell.id)));
             let CellId { latent_dim, seed } = cell.id;
             refused.push(json!({ "latent_dim": latent_dim, "seed": seed, "reason": reason }));
         }
@@ -156,5 +160,6 @@ fn answer(folder: &Path, store: &Store, cells: &[study::Cell], summary: &Summary
         "missing": missing,
         "refused": refused,
     });
-    Answer::new(text, json)
+    let has_no_model = missing.is_empty() && refused.len() == cells.len();
+    Answer::new(text, json).failed_if(has_no_model)
 }

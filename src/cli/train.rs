@@ -89,7 +89,7 @@ fn origin(arguments: &TrainArguments, command: String, recorded: &RecordedSets) 
     origin
 }
 
-const INTERRUPTED_TEXT: &str = "\ninterrupted by Ctrl-C: the model is the best until then, and the command in its provenance, which says so, does not give it again\n";
+const INTERRUPTED_TEXT: &str = "\ninterrupted by Ctrl-C: the model is the best one until then; its provenance is marked as interrupted, and the command there does not reproduce it\n";
 
 /// Where whole jumps are worse than standing still: of the validation, or else of the training, and of the test.
 fn notes(
@@ -115,7 +115,7 @@ static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 fn marked_as_interrupted(trained: Trained) -> Trained {
     note(
-        "interrupted: this is the best model so far; its provenance says so, its command does not repeat it",
+        "interrupted: this is the best model so far; its provenance is marked as interrupted, and the command there does not reproduce it",
     );
     let mut provenance = trained.model.provenance().clone();
     provenance.insert("interrupted".to_owned(), true.into());
@@ -164,7 +164,7 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
         "{output}: {latent_dim} latent coordinates from {}\n\n{}\n{}{}",
         counted(arguments.recordings.len(), "recording"),
         model_text(&trained.model),
-        metrics_table(report, tested),
+        metrics_table(report, tested, arguments.verbose),
         seed_table(report)
     );
     let json = json!({
@@ -177,7 +177,16 @@ fn answer(arguments: &TrainArguments, trained: &Trained, tested: Option<&SetMetr
     Answer::new(text, json)
 }
 
-fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
+/// A metric with as many decimals as others of its unit.
+fn shown(value: f64, unit: &str) -> Cell {
+    match unit {
+        "mm" => format!("{value:.2}").into(),
+        "" => format!("{value:.3}").into(),
+        _ => value.into(),
+    }
+}
+
+fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>, is_verbose: bool) -> Table {
     let mut sets = vec![
         ("training", Some(&report.training)),
         ("validation", report.validation.as_ref()),
@@ -185,38 +194,53 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>) -> Table {
     sets.extend(tested.map(|tested| ("test", Some(tested))));
     let sets_of = sets.iter().map(|(name, _)| *name);
     let mut table = Table::new(["metric", "unit"].into_iter().chain(sets_of));
-    let mut row = |name: &str, unit: &str, value: &dyn Fn(&SetMetrics) -> Option<f64>| {
-        let cell = |set: &SetMetrics| value(set).map_or("diverged".into(), Cell::from);
-        let cells = (sets.iter()).map(|(_, set)| set.map(cell).unwrap_or_default());
-        table.row([name.into(), unit.into()].into_iter().chain(cells));
-    };
-    let lift = "torque R^2 of the transpose lift";
-    let (short, whole) = ("over 0.1 s", "over the whole motion");
-    row("decoder mean square", "scaled", &|m| Some(m.decoder_mse));
-    row(lift, "", &|m| Some(m.torque_r2));
-    row(&format!("error of body x {short}"), "m", &|m| {
-        Some(m.prediction_x_m)
-    });
-    row(&format!("error of body z {short}"), "m", &|m| {
-        Some(m.prediction_z_m)
-    });
-    row(&format!("error of body x {whole}"), "m", &|m| m.rollout_x_m);
-    row(&format!("error of body z {whole}"), "m", &|m| m.rollout_z_m);
+    let row =
+        |table: &mut Table, name: &str, unit: &str, value: &dyn Fn(&SetMetrics) -> Option<f64>| {
+            let cell =
+                |set: &SetMetrics| value(set).map_or("diverged".into(), |of| shown(of, unit));
+            let cells = (sets.iter()).map(|(_, set)| set.map(cell).unwrap_or_default());
+            table.row([name.into(), unit.into()].into_iter().chain(cells));
+        };
+    type Metric = fn(&SetMetrics) -> Option<f64>;
+    let always: [(&str, &str, Metric); 6] = [
+        ("decoder mean square", "scaled", |m| Some(m.decoder_mse)),
+        ("torque R^2 of the transpose lift", "", |m| {
+            Some(m.torque_r2)
+        }),
+        ("error of body x over 0.1 s", "mm", |m| {
+            Some(1e3 * m.prediction_x_m)
+        }),
+        ("error of body z over 0.1 s", "mm", |m| {
+            Some(1e3 * m.prediction_z_m)
+        }),
+        ("error of body x over the whole motion", "mm", |m| {
+            Some(1e3 * m.rollout_x_m?)
+        }),
+        ("error of body z over the whole motion", "mm", |m| {
+            Some(1e3 * m.rollout_z_m?)
+        }),
+    ];
+    for (name, unit, value) in always {
+        row(&mut table, name, unit, &value);
+    }
+    if let Some(overlap) = report.support_overlap {
+        let name = format!("overlap of supports, {} seeds", report.seeds.len());
+        table.row([name.into(), "".into(), shown(overlap, "")]);
+    }
+    if !is_verbose {
+        return table;
+    }
     for (phase, terms) in report.active_terms.iter().enumerate() {
         let (name, active) = (&terms.phase, terms.active);
         let name = format!("R^2 of smoothed ddz, {name} ({})", counted(active, "term"));
-        row(&name, "", &|m| m.ddz_r2.get(phase).copied());
+        row(&mut table, &name, "", &|m| m.ddz_r2.get(phase).copied());
     }
     let mut of_all = |name: String, value: f64| {
-        table.row([name.into(), "".into(), Cell::from(value)]);
+        table.row([name.into(), "".into(), shown(value, "")]);
     };
     for score in &report.deviations {
         let name = format!("R^2 of deviations of ddz, {}", score.part);
         of_all(name, score.ddz_r2);
-    }
-    if let Some(overlap) = report.support_overlap {
-        let name = format!("overlap of supports, {} seeds", report.seeds.len());
-        of_all(name, overlap);
     }
     table
 }

@@ -163,7 +163,7 @@ impl TrainSettings {
         };
         let found = found.inspect_err(|reason| {
             note(&format!(
-                "torques are those of the motors, as the recordings do not tell the joints' losses: {reason}"
+                "torques are those of the motors, because joint friction and rotor inertia cannot be identified from the recordings: {reason}"
             ));
         });
         options.actuators = found.ok(); // the note states the reason
@@ -297,12 +297,12 @@ impl TrainSettings {
             (
                 given(WINDOW, !has_weight),
                 "set for a loss without weight",
-                "`--bptt-weight` above 0 beside it",
+                "`--bptt-weight` above 0 as well",
             ),
             (
                 given("activation", is_linear),
                 &format!("{activation} without hidden layers"),
-                "`--encoder-layers` or `--decoder-layers` beside it",
+                "`--encoder-layers` or `--decoder-layers` as well",
             ),
             (
                 given("coordinates", is_named && !is_linear),
@@ -330,7 +330,7 @@ impl TrainSettings {
             (
                 given("smooth-rows", self.smooth.is_none()),
                 "set without a filter",
-                "`--smooth` beside it",
+                "`--smooth` as well",
             ),
         ];
         let fault = faults.into_iter().find_map(|(option, found, expected)| {
@@ -378,9 +378,9 @@ impl TrainSettings {
         }
         let has_parts = self.first("degree trigonometric").is_some();
         let fault = if self.terms.is_some() && has_parts {
-            "`terms` stands beside `degree` or `trigonometric`, expected one or the other"
+            "`terms` is set together with `degree` or `trigonometric`, expected one or the other"
         } else if self.phase.is_some() && self.phases.is_some() {
-            "`phase` stands beside `phases`, expected one or the other"
+            "`phase` is set together with `phases`, expected one or the other"
         } else if self.activation == Some(Activation::Linear) {
             "`activation` is linear, expected elu, tanh, sigmoid, relu, gelu, silu or softplus"
         } else {

@@ -222,7 +222,11 @@ impl ImportOptions {
     }
 
     pub(super) fn usual_feet(&self, phase: &str, feet: &FeetRule) -> Option<String> {
-        let note = || format!("phase {phase} holds for feet `{feet}`, the usual rule of its name");
+        let note = || {
+            format!(
+                "phase {phase} is selected by feet `{feet}`, as its name suggests (change with --phase)"
+            )
+        };
         self.given(phase).is_none().then(note)
     }
 }

@@ -8,6 +8,8 @@ use crate::mpc::{Lift, settings_for};
 
 pub(crate) struct Introduction {
     pub headline: String,
+    /// Passed metrics in which a baseline is better.
+    pub beaten: Option<String>,
     pub compared: String,
     /// Why the model fails, where that is known.
     pub cause: Option<String>,
@@ -31,6 +33,7 @@ impl Introduction {
 pub(crate) fn introduction(content: &Content<'_>) -> Result<Introduction> {
     Ok(Introduction {
         headline: headline(content.verdict, !content.assessment.remarks.is_empty()),
+        beaten: beaten(content.verdict),
         compared: compared(content),
         cause: cause(content),
         subject: subject(content)?,
@@ -59,6 +62,16 @@ pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
         true => format!("Do not rely on it here, see the notes. {judged}"),
         false => judged,
     }
+}
+
+fn beaten(verdict: &Verdict) -> Option<String> {
+    let passed = (verdict.rows.iter()).filter(|row| row.is_beaten() && row.passed == Some(true));
+    let words = passed.filter_map(|row| {
+        let (value, best) = (row.value_words(), row.best_baseline_words()?);
+        Some(format!("{} ({value}; {best})", row.name))
+    });
+    let words: Vec<String> = words.collect();
+    (!words.is_empty()).then(|| format!("A baseline is better in: {}.", listed(&words)))
 }
 
 fn cause(content: &Content<'_>) -> Option<String> {

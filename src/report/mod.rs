@@ -28,7 +28,6 @@ pub(crate) use plan::{plan_figures, reach_figure, walk_reach_figure};
 pub(crate) use tables::{
     NamedRun, baseline_table, body_rms, control_table, coordinate_table, dynamics_table,
     failed_runs, failures, horizon_json, horizon_table, invariance_table, phase_table, run_table,
-    template_rms,
 };
 pub use tables::{assessment_json, plan_json, verdict_lines};
 

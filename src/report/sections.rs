@@ -186,7 +186,7 @@ const WORDS: [&[&str]; 7] = [
     &[
         "control",
         "The controller along the recordings",
-        "At each control step the controller gets the recorded state and plans along the recording. Its commands are not applied to a robot. With the recorded input as reference, the commands are the lifted recorded input for any dynamics: the torque figures show the lift. The transpose lift is u = W_e^T u_lat; the consistent lift finds torques whose foot forces give the latent input.",
+        "At each control step the controller gets the recorded state and plans along the recording. Its commands are not applied to a robot. With the recorded input as reference, the commands are the lifted recorded input for any dynamics: the plots of torques show the lift. The transpose lift is u = W_e^T u_lat; the consistent lift finds torques whose foot forces give the latent input.",
         "The tables show three effects of the dynamics. Predictions one stage ahead use the recorded input. Torques are found without the recorded ones. The deviation after a push of 0.1 m/s counts over 0.2 s, with commands that act on a body with the robot's mass and fixed feet.",
         "No dynamics: the same encoder, decoder and controller with ddz = g u, g fitted to this recording. No feedback: the same controller with the recorded state after the push. Replay: the recorded torques again, without a controller. Constant velocity: latent coordinates keep their velocity.",
     ],

@@ -204,7 +204,8 @@ pub(crate) fn dynamics_table(model: &ReducedModel, assessment: &Assessment<'_>) 
         .column("active terms", "", |(phase, ..)| phase.active_count())
         .column("latent acceleration R^2", "", |(.., fit)| r2(*fit))
         .column("largest Re of eigenvalues", "1/s", |row| {
-            row.1?.growth_rate()
+            let rate = row.1?.growth_rate()?;
+            Some(if rate.abs() < ROUNDED { 0.0 } else { rate })
         })
         .column("input gain condition", "", |row| row.1?.input_condition())
         .column("input gain rank", "", |(_, linear, _)| linear.map(rank))
@@ -262,12 +263,12 @@ pub(crate) fn control_table(runs: &[NamedRun]) -> Table {
     Table::of(rows)
         .column("recording", "", |(path, _)| file_name(path))
         .column("controller", "", |(_, row)| row.0)
-        .column("x, one step ahead", "mm", stage(|e| 1e3 * e.body_x_m))
-        .column("z, one step ahead", "mm", stage(|e| 1e3 * e.body_z_m))
-        .column("joints, one step ahead", "rad", stage(|e| e.joints_rad))
+        .column("x, one stage ahead", "mm", stage(|e| 1e3 * e.body_x_m))
+        .column("z, one stage ahead", "mm", stage(|e| 1e3 * e.body_z_m))
+        .column("joints, one stage ahead", "rad", stage(|e| e.joints_rad))
         .column("torque R^2, contact", "", |row| row.1.2.contact)
         .column("torque R^2, flight", "", |(_, row)| row.2.flight)
-        .column("error after a push", "mm", |(_, row)| {
+        .column("deviation after a push", "mm", |(_, row)| {
             row.3.map(|m| 1e3 * m)
         })
         .table()
@@ -305,12 +306,17 @@ pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
     of_runs(runs, Run::failure)
 }
 
-/// The verdict in one line, then a line for each of its rows that is not passed.
+/// The verdict in one line, then a line for each of its rows that is not passed, or that a baseline passes better.
 pub fn verdict_lines(verdict: &Verdict) -> String {
-    let failed = verdict.rows.iter().filter(|row| row.passed == Some(false));
-    let lines = failed.map(|row| match row.counts {
-        true => format!("FAILED {}: {}\n", row.of, row.words()),
-        false => {
+    let rows = verdict.rows.iter();
+    let shown = rows.filter(|row| row.passed == Some(false) || row.is_beaten());
+    let lines = shown.map(|row| match (row.counts, row.best_baseline_words()) {
+        (true, Some(best)) if row.passed == Some(true) => {
+            let (name, value) = (&row.name, row.value_words());
+            format!("passed, but a baseline is better: {name} {value} ({best})\n")
+        }
+        (true, _) => format!("FAILED {}: {}\n", row.of, row.words()),
+        (false, _) => {
             let (name, words) = (row.baseline_name, row.words());
             format!("worse than {name}, does not count: {words}\n")
         }
@@ -338,7 +344,7 @@ pub(crate) fn run_table(runs: &[NamedRun]) -> Table {
         .column("beyond friction", "", |row| row.1.friction_violations)
         .column("step, median, p99", "us", |(_, run)| {
             // Of one width, so that the layout does not depend on the machine.
-            format!("{:4.0}, {:6.0}", run.step_us.p50, run.step_us.p99)
+            format!("{:5.0}, {:6.0}", run.step_us.p50, run.step_us.p99)
         })
         .table()
 }

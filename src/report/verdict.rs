@@ -60,7 +60,8 @@ impl UseRow {
             (Some(value), Some(row)) => with_unit(value, row.unit),
             _ => "-".to_owned(),
         };
-        let (metric, baseline_name) = row.map_or(("", ""), |row| (&row.name, row.baseline_name));
+        let (metric, baseline_name) =
+            row.map_or(("", ""), |row| (&row.name, row.best_baseline_name));
         Self {
             title,
             metric: metric.to_owned(),
@@ -69,7 +70,7 @@ impl UseRow {
             needed: row.map_or("-".to_owned(), |row| {
                 format!("{} {}", row.bound.words(), shown(Some(row.threshold)))
             }),
-            baseline: shown(row.and_then(|row| row.baseline)),
+            baseline: shown(row.and_then(|row| row.best_baseline)),
             baseline_name,
             baseline_meaning: meaning(&BASELINES, baseline_name),
             light: row.map_or(Light::Open, Light::of),
@@ -81,17 +82,20 @@ impl UseRow {
 const METRICS: [&str; 6] = [
     "error of: root mean square; predicted with the recorded torques",
     "R^2 of torques: of torques found without the recorded ones; 1 is perfect",
-    "error one step ahead: over one stage of the controller's horizon",
+    "error one stage ahead: over one stage of the controller's horizon",
     "deviation after a push: of the body, over 0.2 s after a push of 0.1 m/s",
     "share of steps without a plan: control steps that the solver did not solve",
     "latent directions: rank of the map from inputs to accelerations",
 ];
 
-const BASELINES: [&str; 4] = [
+const BASELINES: [&str; 7] = [
     "constant velocity: the body keeps its velocity",
     "constant latent velocity: latent coordinates keep their velocity",
     "no dynamics: the same controller; inputs alone accelerate",
     "no feedback: the same controller without measurements after the push",
+    "replay: the recorded torques, without a controller",
+    "ASLIP: a spring-loaded pendulum with the recorded forces",
+    "point mass: a body with the recorded forces",
 ];
 
 /// The words about a metric or baseline.
@@ -122,10 +126,11 @@ pub(super) fn verdict_table(verdict: &Verdict) -> Table {
         .column("needed", "", |row| {
             format!("{} {}", row.bound.words(), shown(row, row.threshold))
         })
-        .column("baseline", "", |row| {
+        .column("baseline of the threshold", "", |row| {
             let baseline = row.baseline.map(|value| shown(row, value));
             baseline.map(|baseline| format!("{baseline}, {}", row.baseline_name))
         })
+        .column("best baseline", "", |row| row.best_baseline_words())
         .column("result", "", |row| {
             let [_, _, result] = Light::of(row).parts();
             match row.counts {

@@ -28,7 +28,7 @@ fn equal_files_exit_with_0_and_say_how_far_rounding_reaches() {
     assert_eq!(
         text(&output.stdout),
         "A: a.txt\nB: b.tex\n\nphase contact\n  ddz1: proven equal up to the printed digits \
-         (coefficients differ by at most 6.000e-4)\n\nA and B say the same: 1 equation proven \
+         (coefficients differ by at most 6.000e-4)\n\nA and B are equal: 1 equation proven \
          equal, 1 of them up to the printed digits\n"
     );
     let output = check(folder.path(), &["a.txt", "b.tex", "--exact", "--json"]);
@@ -38,7 +38,7 @@ fn equal_files_exit_with_0_and_say_how_far_rounding_reaches() {
     assert_eq!(value["phases"][0]["equations"][0]["verdict"], "different");
     let output = check(folder.path(), &["a.txt", "a.txt"]);
     assert_eq!(output.status.code(), Some(0));
-    assert!(text(&output.stdout).ends_with("A and B say the same: 1 equation proven equal\n"));
+    assert!(text(&output.stdout).ends_with("A and B are equal: 1 equation proven equal\n"));
 }
 
 #[test]

@@ -220,7 +220,7 @@ fn random_models_are_proven_equal_to_what_romc_prints_of_them() {
         let printed = printed(&model, seed % 10);
         let text = printed.1.clone();
         let comparison = against(&model, seed % 10, printed);
-        assert!(comparison.says_the_same(), "{seed}: {comparison:?}\n{text}");
+        assert!(comparison.is_equal(), "{seed}: {comparison:?}\n{text}");
         let all_exact = comparison
             .verdicts()
             .all(|verdict| *verdict == Verdict::Equal);
@@ -244,7 +244,7 @@ fn phases_that_are_printed_once_are_all_compared() {
         let names = comparison.phases.iter().map(|phase| phase.name.as_str());
         let names: Vec<&str> = names.collect();
         assert_eq!(names, ["fr_rl", "fl_rr", "all", "flight"]);
-        assert!(comparison.says_the_same(), "{kind}: {comparison:?}");
+        assert!(comparison.is_equal(), "{kind}: {comparison:?}");
     }
 }
 

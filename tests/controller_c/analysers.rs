@@ -82,7 +82,7 @@ fn self_tests_pass_without_the_consistent_lift() {
             let built = emitted.program(compiler, &[&without[0], &without[1]], &source);
             let text = Emitted::output(&mut Command::new(built));
             assert!(
-                text.contains("plain lift") && !text.contains("consistent"),
+                text.contains("transpose lift") && !text.contains("consistent"),
                 "{text}"
             );
         }

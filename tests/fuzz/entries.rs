@@ -238,7 +238,7 @@ pub fn import_latex(bytes: &[u8]) {
     if let Ok(side) = Side::from_bytes("fuzz.tex", bytes, &options, &[])
         && bytes.len() < 2048
     {
-        assert!(compare(&side, &side, &options).says_the_same());
+        assert!(compare(&side, &side, &options).is_equal());
     }
 }
 

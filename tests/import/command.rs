@@ -21,11 +21,11 @@ fn command_writes_a_model_and_tells_what_it_read() {
     assert!(first.status.success(), "{}", text(&first.stderr));
     let said = text(&first.stdout);
     assert!(
-        said.contains("note: phase flight holds for feet `none`"),
+        said.contains("note: phase flight is selected by feet `none`"),
         "{said}"
     );
     assert!(said.contains("hopper.json: model `hopper`\n"), "{said}");
-    assert!(said.contains("needs an encoder"), "{said}");
+    assert!(said.contains("Equations only: use `compile`"), "{said}");
     let model = artifact::read(&folder.path().join("hopper.json")).expect("a model file");
     assert_eq!(model.phases()[0].xi.as_slice(), [0.5, -2.0, 1.0]);
 

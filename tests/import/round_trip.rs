@@ -196,7 +196,9 @@ fn import_of_names_of_parts_finds_the_phases_itself() {
     assert!(report.used.iter().all(|used| used.chosen == Chosen::Named));
     assert_eq!(report.unused[0].tensor, "loss_history");
     let notes = [("contact", "any"), ("flight", "none")].map(|(phase, feet)| {
-        format!("phase {phase} holds for feet `{feet}`, the usual rule of its name")
+        format!(
+            "phase {phase} is selected by feet `{feet}`, as its name suggests (change with --phase)"
+        )
     });
     assert_eq!(report.notes, notes);
 }

@@ -50,8 +50,8 @@ class Score(Dict[str, Any]):
     - `fit_for`, `failed`: uses of the model, of `0.1 s` (errors of predictions over that time), `whole motion` (errors
       from the first sample on; of walks `a stride`), `torques` (those that the controller finds itself), `control`;
     - `rows`: the metrics that decide, a dict each: `use`, `name`, `unit`, `value`, `baseline`, `baseline_name`,
-      `threshold`, `bound` (`at most` or `at least`), `passed` (`None` if not measured) and `counts`. Errors are root
-      mean squares in m or rad, on the worst recording for torques and control;
+      `best_baseline` and its name, `threshold`, `bound` (`at most` or `at least`), `passed` (`None` if not measured)
+      and `counts`. Errors are root mean squares in m or rad, on the worst recording for torques and control;
     - `unmeasured`: why torques and control are not judged, or `None`.
     """
 

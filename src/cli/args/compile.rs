@@ -41,9 +41,9 @@ pub(crate) struct CompileArguments {
 /// Units of coordinates and inputs in equations and generated code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum UnitsChoice {
-    /// rad, m, N m, N
+    /// SI units of robot coordinates and inputs; latent coordinates have the factors of the model file
     Si,
-    /// Factors of the model file times SI values
+    /// Factors of the model file for robot coordinates also
     Scaled,
     /// SI units also for latent coordinates and inputs
     Physical,
@@ -86,10 +86,11 @@ pub(crate) struct CodeArguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = EQUATIONS)]
 pub(crate) struct EquationArguments {
-    /// Decimal places of coefficients [default: at least two, more for coefficients that would change by over 5 %]
+    /// Decimal places of coefficients [default: at least two, more for coefficients that would change by over 5 %; none
+    /// with --units physical]
     #[arg(long, value_name = "N", value_parser = count(&DIGITS), conflicts_with = "significant")]
     pub digits: Option<usize>,
-    /// Significant digits of coefficients [default: by decimal places]
+    /// Significant digits of coefficients [default: 3 with --units physical; otherwise by decimal places]
     #[arg(long, value_name = "N", value_parser = count(&SIGNIFICANT))]
     pub significant: Option<usize>,
     /// Another name for a variable, such as z1=x or u2=F_z; can be repeated [default: none]

@@ -160,6 +160,9 @@ pub(crate) struct TrainArguments {
     /// Name of the model [default: the file name of --output]
     #[arg(long, help_heading = OUTPUT)]
     pub name: Option<String>,
+    /// Also print R^2 of accelerations per phase, and R^2 of deviations per part of a jump
+    #[arg(long, help_heading = OUTPUT)]
+    pub verbose: bool,
     /// Replace an existing output file
     #[arg(long, help_heading = OUTPUT, action = ArgAction::SetTrue, value_parser = overwrite())]
     pub force: Overwrite,

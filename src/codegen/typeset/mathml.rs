@@ -21,7 +21,7 @@ pub fn system(system: &EquationSystem, width_em: f64) -> String {
     let tex = &tex_cases(system, width_em);
     let tex = HtmlText(tex);
     let rendered = Lines { rows, tex }.render();
-    rendered.expect("strings take all that is written")
+    rendered.expect("writing to a String cannot fail")
 }
 
 /// Lines of a system with their sides and indentation in em, and its LaTeX.

@@ -210,7 +210,7 @@ impl Table {
     /// A `<table>` with the caption, if there is one.
     pub fn html(&self) -> String {
         let rendered = Html { table: self }.render();
-        rendered.expect("strings take all that is written")
+        rendered.expect("writing to a String cannot fail")
     }
 
     /// Comma-separated values: names of the columns, then the rows; cells with commas, quotes or line ends are quoted.

@@ -71,7 +71,7 @@ pub fn feet(rule: &FeetRule) -> String {
     match rule {
         FeetRule::Any => "at least one foot on the ground".to_owned(),
         FeetRule::None => "no foot on the ground".to_owned(),
-        FeetRule::Patterns(_) if rule.is_always() => "whatever the feet do".to_owned(),
+        FeetRule::Patterns(_) if rule.is_always() => "any feet on the ground or none".to_owned(),
         FeetRule::Patterns(patterns) => format!("{} on the ground", pairs(patterns)),
     }
 }

@@ -125,4 +125,4 @@ pub fn write_to(
     Ok(())
 }
 
-const ANY_TEXT: &str = "a String takes any text";
+const ANY_TEXT: &str = "writing to a String cannot fail";

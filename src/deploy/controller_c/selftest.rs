@@ -38,7 +38,7 @@ pub(super) fn text(
     jump: &PlannedJump,
     precision: Precision,
 ) -> Result<String, EmitError> {
-    let plain = MpcSettings {
+    let transpose = MpcSettings {
         solver: Solver::Riccati,
         missing_input: match facts.has_given_state {
             true => MissingInput::Estimate,
@@ -51,18 +51,18 @@ pub(super) fn text(
     };
     let supervised = MpcSettings {
         bounds: jump.settings.bounds,
-        ..plain
+        ..transpose
     };
     let consistent = MpcSettings {
         lift: Lift::Consistent,
-        ..plain
+        ..transpose
     };
     let about_plan = MpcSettings {
         linearisation: Linearisation::LastPlan,
-        ..plain
+        ..transpose
     };
     let runs = [
-        commands(model, jump, plain, true)?,
+        commands(model, jump, transpose, true)?,
         commands(model, jump, consistent, true)?,
         commands(model, jump, about_plan, false)?,
         commands(model, jump, supervised, true)?,

@@ -18,7 +18,7 @@ const TORQUES: &str = "torques";
 const CONTROL: &str = "control";
 const TORQUES_IN_CONTACT: &str = "R^2 of torques in contact";
 const AFTER_A_PUSH: &str = "deviation after a push";
-const ONE_STAGE: &str = "error one step ahead, share of the baseline's";
+const ONE_STAGE: &str = "error one stage ahead, share of the baseline's";
 const CONSTANT_VELOCITY: &str = "constant velocity";
 const CONSTANT_LATENT_VELOCITY: &str = "constant latent velocity";
 const NO_DYNAMICS: &str = "no dynamics";
@@ -38,6 +38,14 @@ impl Bound {
             Self::AtLeast => "at least",
         }
     }
+
+    /// Whether a value is better than another one.
+    fn prefers(self, value: f64, other: f64) -> bool {
+        match self {
+            Self::AtMost => value < other,
+            Self::AtLeast => value > other,
+        }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -50,6 +58,9 @@ pub struct VerdictRow {
     pub value: Option<f64>,
     pub baseline: Option<f64>,
     pub baseline_name: &'static str,
+    /// Of all baselines with this metric, also of those that the threshold does not depend on.
+    pub best_baseline: Option<f64>,
+    pub best_baseline_name: &'static str,
     pub threshold: f64,
     pub bound: Bound,
     pub passed: Option<bool>,
@@ -74,11 +85,33 @@ impl VerdictRow {
             value,
             baseline,
             baseline_name,
+            best_baseline: baseline,
+            best_baseline_name: baseline_name,
             threshold,
             bound,
             passed: value.map(passes),
             counts: true,
         }
+    }
+
+    /// Other baselines of this metric, by name.
+    fn with_baselines(
+        mut self,
+        others: impl IntoIterator<Item = (&'static str, Option<f64>)>,
+    ) -> Self {
+        for (name, other) in others {
+            let is_better = |best| other.is_some_and(|other| self.bound.prefers(other, best));
+            if self.best_baseline.map_or(other.is_some(), is_better) {
+                (self.best_baseline, self.best_baseline_name) = (other, name);
+            }
+        }
+        self
+    }
+
+    /// Whether a baseline is better than the model.
+    pub fn is_beaten(&self) -> bool {
+        let pair = self.value.zip(self.best_baseline);
+        self.counts && pair.is_some_and(|(value, best)| self.bound.prefers(best, value))
     }
 
     pub(crate) fn is_failed(&self) -> bool {
@@ -102,6 +135,12 @@ impl VerdictRow {
     pub fn value_words(&self) -> String {
         let shown = |value| with_unit(value, self.unit);
         self.value.map_or("not measured".to_owned(), shown)
+    }
+
+    /// `ASLIP (fitted constants): 0.7 mm`.
+    pub fn best_baseline_words(&self) -> Option<String> {
+        let best = with_unit(self.best_baseline?, self.unit);
+        Some(format!("{}: {best}", self.best_baseline_name))
     }
 
     /// `deviation after a push 12.3 mm, at most 11.9 mm (no feedback: 12.1 mm)`.
@@ -244,7 +283,20 @@ fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> 
             let name = format!("error of {name} over {the}{of}");
             let against = (name_of, Some(baseline));
             let bound = (Bound::AtMost, limit(baseline));
-            Some(VerdictRow::new((of, &name, unit), value, against, bound))
+            let templates = assessment.baselines.iter().filter_map(|template| {
+                let sums = match of {
+                    STRIDE => return None,
+                    WHOLE => &template.full,
+                    _ => &template.restarted,
+                };
+                let axis = ["body.x", "body.z"]
+                    .iter()
+                    .position(|body| names == [*body])?;
+                let rms = [&sums.x, &sums.z][axis].fit().map(|fit| fit.rms);
+                Some((template.name, rms))
+            });
+            let row = VerdictRow::new((of, &name, unit), value, against, bound);
+            Some(row.with_baselines(templates))
         };
         let limit = |baseline: f64| (of_own * baseline).min(of_both * x.hypot(z));
         let body = ["body.x", "body.z"].map(|name| row(name, &[name], "m", &limit));
@@ -337,7 +389,11 @@ fn control_rows(metrics: &ControlMetrics) -> [VerdictRow; 5] {
         metrics.recovery_rms_m.filter(|_| off.is_some()),
         ("no feedback", off),
         (Bound::AtMost, NO_BETTER * off.unwrap_or(0.0)),
-    );
+    )
+    .with_baselines([
+        (NO_DYNAMICS, blind.recovery_rms_m),
+        ("replay", baseline.replay.recovery_rms_m),
+    ]);
     let unplanned = VerdictRow::new(
         (CONTROL, "share of steps without a plan", ""),
         Some(metrics.unplanned_share),

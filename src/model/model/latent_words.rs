@@ -10,6 +10,7 @@ const BODY: [(&str, &str); 6] = [
     ("rotation about the centre of mass, pitch", "rad"),
     ("rotation about the centre of mass, yaw", "rad"),
 ];
+const KINDS: [&str; LEG_JOINT_DIM] = ["abductions", "flexions", "knees"];
 const TRUNK: [&str; 6] = ["body x", "body y", "body z", "roll", "pitch", "yaw"];
 const PAIRS: [(&str, [Leg; 2]); 2] = [
     ("front", [Leg::FrontRight, Leg::FrontLeft]),
@@ -102,7 +103,13 @@ impl Words {
 }
 
 fn words(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
-    let together = || Words("joints and body together".to_owned(), None);
+    let together = || {
+        let largest = largest(row);
+        Words(
+            format!("mainly {largest}, with other joints and the body"),
+            None,
+        )
+    };
     let is_in = |i: &usize| row[*i].abs() > NONE;
     let body: Vec<usize> = (BODY_X..STATE_DIM).filter(is_in).collect();
     let has_joints = (0..JOINT_DIM).any(|i| is_in(&i));
@@ -120,6 +127,25 @@ fn words(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
         }
         _ => together(),
     }
+}
+
+/// The angles with the largest weights: a joint of both front or both rear legs, or a rotation of the trunk.
+fn largest(row: &DVector<f64>) -> String {
+    let joints = PAIRS.into_iter().flat_map(|(pair, legs)| {
+        KINDS.into_iter().enumerate().map(move |(kind, name)| {
+            let weights = legs.map(|leg| row[LEG_JOINT_DIM * leg.index() + kind]);
+            (format!("{pair} {name}"), weights[0].hypot(weights[1]))
+        })
+    });
+    let rotations = (ROLL..STATE_DIM).map(|i| (TRUNK[i - BODY_X].to_owned(), row[i].abs()));
+    // Of equal weights the first, so that the name does not depend on rounding.
+    let first = (String::new(), -1.0);
+    let all = joints.chain(rotations);
+    let (name, _) = all.fold(first, |best, other| match other.1 > best.1 + NONE {
+        true => other,
+        false => best,
+    });
+    name
 }
 
 fn joints(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
@@ -148,5 +174,6 @@ fn joints(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
         }
         return Words(format!("joints of the {pair} legs"), Some("rad"));
     }
-    Words("joints of all legs".to_owned(), Some("rad"))
+    let largest = largest(row);
+    Words(format!("mainly {largest}, with other joints"), Some("rad"))
 }

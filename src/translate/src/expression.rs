@@ -218,12 +218,12 @@ impl Writer<'_> {
         let base = self.value(here, &field.base)?;
         let (Type::Named(of), syn::Member::Named(name)) = (base.ty.referent(), &field.member)
         else {
-            return Err(self.outside(here, field, "a field of what is no struct"));
+            return Err(self.outside(here, field, "a field of a value that is not a struct"));
         };
         let name = name.to_string();
         let items = self.items;
         let Some(found) = items.fields(of).iter().find(|field| field.name == name) else {
-            return Err(self.outside(here, field, "a field of what is no struct"));
+            return Err(self.outside(here, field, "a field that the struct does not have"));
         };
         let ty = self.resolve(&found.ty, &BTreeMap::new());
         let is_pointer = matches!(base.ty, Type::Ref(..));
@@ -236,7 +236,7 @@ impl Writer<'_> {
     fn index(&mut self, here: &mut Instance<'_>, index: &syn::ExprIndex) -> Found {
         let base = self.value(here, &index.expr)?;
         let Some(element) = base.ty.element().cloned() else {
-            return Err(self.outside(here, index, "an index of what is no array"));
+            return Err(self.outside(here, index, "an index of a value that is not an array"));
         };
         if let Expr::Range(range) = index.index.as_ref() {
             let slice = Type::Slice(Box::new(element));
@@ -283,7 +283,7 @@ impl Writer<'_> {
             return Err(self.outside(here, binary, "this operator"));
         };
         if !left.ty.is_scalar() && !matches!(left.ty, Type::Named(_)) {
-            return Err(self.outside(here, binary, "an operator on what is no number"));
+            return Err(self.outside(here, binary, "an operator on a value that is not a number"));
         }
         let ty = match (is_condition, &left.ty) {
             (true, _) => Type::Bool,

@@ -60,7 +60,7 @@ pub fn emit(system: &Equations<'_>, options: &PrintOptions) -> Emitted {
         (system.introduction.as_str(), identifier)
     });
     let preview = Document::Preview {
-        header: header.short("A document of its own; the files beside it are for \\input."),
+        header: header.short("A complete document; the other .tex files are for \\input."),
         model,
         phases: phases.collect(),
         units: remark,

@@ -27,7 +27,7 @@ pub(super) fn columns(recording: &Recording, robot: &Robot) -> Found {
     let least_m = best_m - LEAST_GAIN.0.max(LEAST_GAIN.1 * best_m.abs());
     let breach = outside(recorded_m, least_m, f64::INFINITY);
     let words = format!(
-        "while some feet are on the ground, those said to be in the air are higher by {:.0} mm in sum over the \
+        "while some feet are on the ground, those recorded in the air are higher by {:.0} mm in sum over the \
          samples, and by {:.0} mm if the columns of the feet are of {}: are they exchanged?",
         1e3 * recorded_m,
         1e3 * best_m,

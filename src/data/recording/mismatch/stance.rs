@@ -76,7 +76,7 @@ pub(super) fn best_other_reading(recording: &Recording, robot: &Robot) -> Option
         all.iter()
             .for_each(|stances| stances.add_to(&mut slip, &order));
         let names = order.map(Leg::short_name).join(", ");
-        let words = format!("with the joints of fr, fl, rr, rl taken from {names}");
+        let words = format!("with the joints of fr, fl, rr, rl read from {names}");
         (slip.relative_rms_m(), words)
     });
     let of_signs = SIGNS.map(|reading| {
