@@ -254,8 +254,12 @@ fn seed_table(report: &TrainReport) -> String {
         .column("seed", "", |seed| seed.seed.to_string())
         .column("decoder mean square", "", |seed| seed.judged.decoder_mse)
         .column("torque R^2", "", |seed| seed.judged.torque_r2)
-        .column("x after 0.1 s", "m", |seed| seed.judged.prediction_x_m)
-        .column("z after 0.1 s", "m", |seed| seed.judged.prediction_z_m)
+        .column("error of body x over 0.1 s", "m", |seed| {
+            seed.judged.prediction_x_m
+        })
+        .column("error of body z over 0.1 s", "m", |seed| {
+            seed.judged.prediction_z_m
+        })
         .column("terms", "", |seed| seed.active)
         .column("latents follow", "", |seed| seed.dominant.join(", "))
         .table();

@@ -149,12 +149,16 @@ pub(crate) fn study_figures(summary: &Summary) -> Vec<Figure> {
     let over_dimensions = vec![
         panel(decoder, |row| logarithm(row.decoder_mse)),
         panel("active coefficients in contact", |row| range(row.active)),
-        panel("x after 0.1 s, mm", |row| millimetres(row.prediction_x_m)),
-        panel("z after 0.1 s, mm", |row| millimetres(row.prediction_z_m)),
+        panel("error of body x over 0.1 s, mm", |row| {
+            millimetres(row.prediction_x_m)
+        }),
+        panel("error of body z over 0.1 s, mm", |row| {
+            millimetres(row.prediction_z_m)
+        }),
     ];
     let combined = panel("combined loss", |row| range(row.combined_loss));
     let accuracy = "Accuracy against complexity over the latent dimension (figure 10 of the paper)";
-    let (loss, lambda) = ("Combined loss 2 E_dec + 2 lambda log |Xi|", summary.lambda);
+    let (loss, lambda) = ("Combined loss 2 E_dec + 2 lambda ln |Xi|", summary.lambda);
     let loss = format!("{loss} with lambda = {lambda} (figure 11 of the paper)");
     vec![
         figure("complexity", accuracy, over_dimensions),

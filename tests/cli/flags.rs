@@ -146,7 +146,7 @@ const ELSEWHERE: &str = "json help version force output out-dir \
     decoder-layers activation lift-weight body-weight bptt-weight bptt-window bptt-stride bptt-decay \
     bptt-integrator slack refinements growth body body-equations mirror-images leave-out no-rotation degree trigonometric terms actuators wrench-frame phases phase \
     leave-out-implausible accelerations smooth smooth-rows moving-average mask-std mask-input-share coordinates state-scaling \
-    torque-scaling force-scaling moment-scaling name clock columns \
+    torque-scaling force-scaling moment-scaling name clock columns verbose \
     study: validation latent-dims seeds method paper robot config lambda shard merge";
 
 #[test]

@@ -49,7 +49,7 @@ pub(crate) struct StudyArguments {
     /// Settings of `romc train`, without `latent-dim`, `seed` and `seeds` [default: none]
     #[arg(long, help_heading = STUDY, value_name = "FILE.toml")]
     pub config: Option<PathBuf>,
-    /// Weight lambda of the complexity in the combined loss 2 E_dec + 2 lambda log |Xi|
+    /// Weight lambda of the complexity in the combined loss 2 E_dec + 2 lambda ln |Xi|
     #[arg(long, help_heading = STUDY, default_value_t = crate::evaluate::LAMBDA)]
     #[arg(value_parser = real(&table::LAMBDA))]
     pub lambda: f64,

@@ -161,7 +161,7 @@ pub(crate) struct TrainArguments {
     #[arg(long, help_heading = OUTPUT)]
     pub name: Option<String>,
     /// Also print R^2 of accelerations per phase, and R^2 of deviations per part of a jump
-    #[arg(long, help_heading = OUTPUT)]
+    #[arg(long, help_heading = OUTPUT, conflicts_with = "from")]
     pub verbose: bool,
     /// Replace an existing output file
     #[arg(long, help_heading = OUTPUT, action = ArgAction::SetTrue, value_parser = overwrite())]
