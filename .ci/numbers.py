@@ -379,7 +379,10 @@ def main():
     parser.add_argument("names", nargs="*")
     arguments = parser.parse_args()
     if arguments.action == "mutate":
-        mutate(int(arguments.names[0]) if arguments.names else 1)
+        seed = arguments.names[0] if arguments.names else "1"
+        if not seed.isdecimal():
+            parser.error(f"seed of mutate: found {seed}, expected a whole number")
+        mutate(int(seed))
         return
     unknown = [name for name in arguments.names if name not in entries()]
     if unknown:

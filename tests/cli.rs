@@ -1216,6 +1216,35 @@ fn inspect_tells_findings_of_a_recording_and_parts_of_a_model() {
 }
 
 #[test]
+fn a_learned_coordinate_is_named_by_its_largest_weight_and_by_the_others_in_it() {
+    let folder = folder();
+    let shipped = fs::read_to_string(MODEL).expect("a shipped model");
+    let mut model: Value = serde_json::from_str(&shipped).expect("JSON");
+    let (front, rear, x, pitch) = ([2, 5], [8, 11], 12, 16);
+    let rows = [
+        vec![(x, 0.5)],
+        vec![(x, 0.5), (pitch, 0.4)],
+        vec![(front[0], 0.2), (front[1], 0.2), (pitch, 0.7)],
+        vec![(front[0], 0.1), (rear[0], 0.2), (rear[1], 0.2), (x, 0.1)],
+    ];
+    for (row, weights) in rows.iter().enumerate() {
+        let mut of_row = [0.0; 18];
+        weights.iter().for_each(|(i, weight)| of_row[*i] = *weight);
+        model["encoder"]["weights"][row] = serde_json::json!(of_row);
+    }
+    let changed = path(&folder, "changed.json");
+    fs::write(&changed, model.to_string()).expect("writable");
+    let words = json(&["inspect", &changed])["files"][0]["latent_coordinates"].clone();
+    let expected = [
+        "body x, times a constant",
+        "mainly body x, with other coordinates of the body",
+        "mainly pitch, with joints and other coordinates of the body",
+        "mainly rear knees, with other joints and the body",
+    ];
+    assert_eq!(words, serde_json::json!(expected));
+}
+
+#[test]
 fn inspect_says_what_each_latent_coordinate_is() {
     let words = |model: &str| json(&["inspect", model])["files"][0]["latent_coordinates"].clone();
     let whole = [

@@ -199,8 +199,8 @@ fn verdict_text(verdict: &Verdict) -> String {
             (true, Some(true)) => "passed",
             (true, Some(false)) => "FAILED",
         };
-        let better = row.best_baseline_words().filter(|_| row.is_beaten());
-        let better = better.map(|best| format!("; a baseline is better, {best}"));
+        let better = row.better_baseline();
+        let better = better.map(|better| format!("; a baseline is better, {better}"));
         let words = row.words() + &better.unwrap_or_default();
         for line in wrapped(&words, WORDS_WIDTH) {
             text += &format!("  {outcome:OUTCOME_WIDTH$}  {line}\n");

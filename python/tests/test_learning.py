@@ -118,7 +118,7 @@ def test_ctrl_c_ends_a_training_and_leaves_python_its_signal():
 def test_options_are_those_of_the_command_line(command, options, own, command_line):
     text = command_line.run(command, "--help").stdout
     flags = {flag.replace("-", "_") for flag in re.findall(r"^ +(?:-\w, )?--([a-z-]+)", text, re.MULTILINE)}
-    flags -= {"json", "help", "version", "verbose"}  # what the command line prints
+    flags -= {"json", "help", "version", "verbose"}  # output of the command line alone
     renamed = {"from": "from_", "lambda": "lambda_"}
     assert {renamed.get(flag, flag) for flag in flags} == set(options.__annotations__) | own
 

@@ -101,12 +101,18 @@ fn describe_model(path: &Path, model: &ReducedModel) -> Answer {
         .map(ToString::to_string)
         .collect();
     let dominant = dominant_coordinates(model);
-    let physical = equations.in_physical_units().ok();
-    let shown = dominant_coordinates(physical.as_ref().map_or(model, |of| &of.model));
+    // As the equations above, which are in scaled units where the model has no others.
+    let (shown, units) = match equations.in_physical_units() {
+        Ok(physical) => (
+            dominant_coordinates(&physical.model),
+            "in the units of the equations",
+        ),
+        Err(_) => (dominant_coordinates(model), "in scaled units"),
+    };
     let [encoder, decoder] =
         [model.encoder_map(), model.decoder_map()].map(|map| map.ok().map(StateMap::summary));
     text += &match (&shown, &encoder) {
-        (Some(shown), _) => composition(shown),
+        (Some(shown), _) => composition(shown, units),
         (None, Some(_)) => lines("  encoder ", &encoder) + &lines("  decoder ", &decoder),
         (None, None) => LATENT_ONLY.to_owned(),
     };
@@ -145,14 +151,14 @@ fn phase_table(equations: &Equations<'_>, coefficients: usize) -> Table {
 
 type Dominant = Vec<Vec<(String, f64)>>;
 
-fn composition(dominant: &Dominant) -> String {
+fn composition(dominant: &Dominant, units: &str) -> String {
     let line = |(latent, weights): (usize, &Vec<(String, f64)>)| {
         let part = |(name, weight): &(String, f64)| format!("{} {name}", significant(*weight));
         let parts: Vec<String> = weights.iter().map(part).collect();
         fitted(&format!("  z{}: {} ...", latent + 1, parts.join(", ")))
     };
     let largest: String = dominant.iter().enumerate().map(line).collect();
-    format!("largest weights of the encoder, in the units of the equations\n{largest}\n")
+    format!("largest weights of the encoder, {units}\n{largest}\n")
 }
 
 fn input_rule(model: &ReducedModel) -> String {

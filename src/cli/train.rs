@@ -194,38 +194,39 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>, is_verbose: 
     sets.extend(tested.map(|tested| ("test", Some(tested))));
     let sets_of = sets.iter().map(|(name, _)| *name);
     let mut table = Table::new(["metric", "unit"].into_iter().chain(sets_of));
-    let row =
-        |table: &mut Table, name: &str, unit: &str, value: &dyn Fn(&SetMetrics) -> Option<f64>| {
-            let cell =
-                |set: &SetMetrics| value(set).map_or("diverged".into(), |of| shown(of, unit));
-            let cells = (sets.iter()).map(|(_, set)| set.map(cell).unwrap_or_default());
-            table.row([name.into(), unit.into()].into_iter().chain(cells));
-        };
-    type Metric = fn(&SetMetrics) -> Option<f64>;
-    let always: [(&str, &str, Metric); 6] = [
-        ("decoder mean square", "scaled", |m| Some(m.decoder_mse)),
-        ("torque R^2 of the transpose lift", "", |m| {
-            Some(m.torque_r2)
-        }),
-        ("error of body x over 0.1 s", "mm", |m| {
-            Some(1e3 * m.prediction_x_m)
-        }),
-        ("error of body z over 0.1 s", "mm", |m| {
-            Some(1e3 * m.prediction_z_m)
-        }),
-        ("error of body x over the whole motion", "mm", |m| {
-            Some(1e3 * m.rollout_x_m?)
-        }),
-        ("error of body z over the whole motion", "mm", |m| {
-            Some(1e3 * m.rollout_z_m?)
-        }),
-    ];
-    for (name, unit, value) in always {
-        row(&mut table, name, unit, &value);
-    }
+    let row = |name: &str, unit: &str, value: &dyn Fn(&SetMetrics) -> Option<f64>| {
+        let cell = |set: &SetMetrics| value(set).map_or("diverged".into(), |of| shown(of, unit));
+        // A set that was not given has no cell.
+        let cells = (sets.iter()).map(|(_, set)| set.map_or(Cell::default(), cell));
+        let cells = [name.into(), unit.into()].into_iter().chain(cells);
+        cells.collect::<Vec<Cell>>()
+    };
+    let of_all = |name: String, value: f64| [name.into(), "".into(), shown(value, "")];
+    let (lift, short, whole) = (
+        "torque R^2 of the transpose lift",
+        "over 0.1 s",
+        "over the whole motion",
+    );
+    let error = |axis: &str, over: &str| format!("error of body {axis} {over}");
+    table.row(row("decoder mean square", "scaled", &|m| {
+        Some(m.decoder_mse)
+    }));
+    table.row(row(lift, "", &|m| Some(m.torque_r2)));
+    table.row(row(&error("x", short), "mm", &|m| {
+        Some(1e3 * m.prediction_x_m)
+    }));
+    table.row(row(&error("z", short), "mm", &|m| {
+        Some(1e3 * m.prediction_z_m)
+    }));
+    table.row(row(&error("x", whole), "mm", &|m| {
+        Some(1e3 * m.rollout_x_m?)
+    }));
+    table.row(row(&error("z", whole), "mm", &|m| {
+        Some(1e3 * m.rollout_z_m?)
+    }));
     if let Some(overlap) = report.support_overlap {
         let name = format!("overlap of supports, {} seeds", report.seeds.len());
-        table.row([name.into(), "".into(), shown(overlap, "")]);
+        table.row(of_all(name, overlap));
     }
     if !is_verbose {
         return table;
@@ -233,14 +234,11 @@ fn metrics_table(report: &TrainReport, tested: Option<&SetMetrics>, is_verbose: 
     for (phase, terms) in report.active_terms.iter().enumerate() {
         let (name, active) = (&terms.phase, terms.active);
         let name = format!("R^2 of smoothed ddz, {name} ({})", counted(active, "term"));
-        row(&mut table, &name, "", &|m| m.ddz_r2.get(phase).copied());
+        table.row(row(&name, "", &|m| m.ddz_r2.get(phase).copied()));
     }
-    let mut of_all = |name: String, value: f64| {
-        table.row([name.into(), "".into(), shown(value, "")]);
-    };
     for score in &report.deviations {
         let name = format!("R^2 of deviations of ddz, {}", score.part);
-        of_all(name, score.ddz_r2);
+        table.row(of_all(name, score.ddz_r2));
     }
     table
 }

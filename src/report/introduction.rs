@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use super::tables::template_rms;
 use super::*;
 use crate::mpc::{Lift, settings_for};
 
@@ -65,10 +64,10 @@ pub(crate) fn headline(verdict: &Verdict, is_doubtful: bool) -> String {
 }
 
 fn beaten(verdict: &Verdict) -> Option<String> {
-    let passed = (verdict.rows.iter()).filter(|row| row.is_beaten() && row.passed == Some(true));
+    let passed = verdict.rows.iter().filter(|row| row.passed == Some(true));
     let words = passed.filter_map(|row| {
-        let (value, best) = (row.value_words(), row.best_baseline_words()?);
-        Some(format!("{} ({value}; {best})", row.name))
+        let (value, better) = (row.value_words(), row.better_baseline()?);
+        Some(format!("{} ({value}; {better})", row.name))
     });
     let words: Vec<String> = words.collect();
     (!words.is_empty()).then(|| format!("A baseline is better in: {}.", listed(&words)))
@@ -180,10 +179,7 @@ fn errors(assessment: &Assessment<'_>) -> String {
 fn beside_template(assessment: &Assessment<'_>) -> Option<String> {
     let best = best_template(assessment).filter(|_| assessment.full.diverged == 0)?;
     let best = &assessment.baselines[best];
-    let (own, others) = (
-        body_rms(assessment, &assessment.full),
-        template_rms(&best.full),
-    );
+    let (own, others) = (body_rms(assessment, &assessment.full), best.full.rms());
     let ratio = |axis: usize| Some(others[axis]? / own[axis]?).filter(|ratio| ratio.is_finite());
     let words = |ratio: f64| match ratio {
         1.05.. => format!("{} times smaller", rounded(ratio, 2)),
@@ -199,7 +195,7 @@ fn beside_template(assessment: &Assessment<'_>) -> Option<String> {
 /// The baseline with recorded forces that is closest to the body over whole motions.
 pub(super) fn best_template(assessment: &Assessment<'_>) -> Option<usize> {
     let error = |baseline: &Baseline| {
-        let [x, z] = template_rms(&baseline.full);
+        let [x, z] = baseline.full.rms();
         Some(x?.hypot(z?))
     };
     let errors = assessment.baselines.iter().map(error).enumerate();

@@ -69,10 +69,6 @@ pub(crate) fn body_rms(assessment: &Assessment<'_>, sums: &CoordinateSums) -> [O
     ["body.x", "body.z"].map(|name| rms(assessment.fit(sums, name)))
 }
 
-pub(crate) fn template_rms(sums: &AslipSums) -> [Option<f64>; 2] {
-    [sums.x, sums.z].map(|sums| rms(sums.fit()))
-}
-
 pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     let every = format!("{} s", assessment.restart_every_s);
     let rows = ["body.x", "body.z"].map(|name| ["whole motion", &every].map(|kind| (name, kind)));
@@ -101,7 +97,7 @@ pub(crate) fn baseline_table(assessment: &Assessment<'_>) -> Table {
     }
     for baseline in &assessment.baselines {
         let sums = [&baseline.full, &baseline.restarted];
-        column(baseline.name, sums.map(template_rms));
+        column(baseline.name, sums.map(AslipSums::rms));
     }
     table
 }
@@ -306,21 +302,22 @@ pub(crate) fn failed_runs(runs: &[NamedRun]) -> Vec<String> {
     of_runs(runs, Run::failure)
 }
 
-/// The verdict in one line, then a line for each of its rows that is not passed, or that a baseline passes better.
+/// The verdict in one line, then a line for each row that is not passed, and for each in which a baseline is better.
 pub fn verdict_lines(verdict: &Verdict) -> String {
-    let rows = verdict.rows.iter();
-    let shown = rows.filter(|row| row.passed == Some(false) || row.is_beaten());
-    let lines = shown.map(|row| match (row.counts, row.best_baseline_words()) {
-        (true, Some(best)) if row.passed == Some(true) => {
-            let (name, value) = (&row.name, row.value_words());
-            format!("passed, but a baseline is better: {name} {value} ({best})\n")
-        }
-        (true, _) => format!("FAILED {}: {}\n", row.of, row.words()),
-        (false, _) => {
+    let line = |row: &VerdictRow| match (row.counts, row.passed?) {
+        (true, false) => Some(format!("FAILED {}: {}\n", row.of, row.words())),
+        (false, false) => {
             let (name, words) = (row.baseline_name, row.words());
-            format!("worse than {name}, does not count: {words}\n")
+            Some(format!("worse than {name}, does not count: {words}\n"))
         }
-    });
+        (_, true) => {
+            let (name, value, better) = (&row.name, row.value_words(), row.better_baseline()?);
+            Some(format!(
+                "passed, but a baseline is better: {name} {value} ({better})\n"
+            ))
+        }
+    };
+    let lines = verdict.rows.iter().filter_map(line);
     let headline = format!("verdict: {}\n", headline(verdict, false));
     std::iter::once(headline).chain(lines).collect()
 }
@@ -397,7 +394,7 @@ fn linearised_json(phase: &LinearisedPhase) -> Value {
 }
 
 fn baseline_json(baseline: &Baseline) -> Value {
-    let sums = [&baseline.full, &baseline.restarted].map(template_rms);
+    let sums = [&baseline.full, &baseline.restarted].map(AslipSums::rms);
     let [full, restarted] = sums.map(|[x, z]| json!({ "body.x": x, "body.z": z }));
     json!({
         "name": baseline.name,

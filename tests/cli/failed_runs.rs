@@ -42,6 +42,26 @@ fn mpc_without_a_plan_in_most_steps_ends_with_one_and_the_reason() {
     assert!(text(&output.stdout).replace("\n  ", " ").contains(reason));
 }
 
+#[test]
+fn study_without_a_model_ends_with_one_and_lines_that_fit() {
+    let folder = folder();
+    let study = path(&folder, "study");
+    let arguments = ["study", JUMP, "--seeds", "1", "--out-dir", &study];
+    let refused = romc(&[&arguments[..], &["--latent-dims", "10"]].concat());
+    assert_eq!(refused.status.code(), Some(1));
+    let said = text(&refused.stdout);
+    assert!(said.contains("no model: d = 10 seed 1: "), "{said}");
+    assert!(said.lines().all(|line| line.len() <= 100), "{said}");
+    let some = romc(
+        &[
+            &arguments[..4],
+            &["--out-dir", &path(&folder, "some"), "--latent-dims", "2,10"],
+        ]
+        .concat(),
+    );
+    assert_eq!(some.status.code(), Some(0), "{}", text(&some.stderr));
+}
+
 /// Each command ends with 1 where its own purpose fails, with everything written, and with 0 where another's does.
 #[test]
 fn exit_codes_follow_the_purpose_of_each_command_and_the_verdict_is_the_same_in_all() {

@@ -127,6 +127,11 @@ pub struct AslipSums {
 }
 
 impl AslipSums {
+    /// Root mean square errors of body x and z, m.
+    pub fn rms(&self) -> [Option<f64>; 2] {
+        [&self.x, &self.z].map(|sums| Some(sums.fit()?.rms))
+    }
+
     pub(crate) fn add(&mut self, segment: &Segment, rollout: &[Option<Vector2<f64>>]) {
         for (sample, position) in rollout.iter().enumerate() {
             if let Some(position) = position {

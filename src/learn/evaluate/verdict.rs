@@ -137,6 +137,11 @@ impl VerdictRow {
         self.value.map_or("not measured".to_owned(), shown)
     }
 
+    /// The best baseline, if it is better than the model.
+    pub fn better_baseline(&self) -> Option<String> {
+        self.best_baseline_words().filter(|_| self.is_beaten())
+    }
+
     /// `ASLIP (fitted constants): 0.7 mm`.
     pub fn best_baseline_words(&self) -> Option<String> {
         let best = with_unit(self.best_baseline?, self.unit);
@@ -283,24 +288,23 @@ fn prediction_rows(assessment: &Assessment<'_>, short: &str) -> Vec<VerdictRow> 
             let name = format!("error of {name} over {the}{of}");
             let against = (name_of, Some(baseline));
             let bound = (Bound::AtMost, limit(baseline));
-            let templates = assessment.baselines.iter().filter_map(|template| {
+            Some(VerdictRow::new((of, &name, unit), value, against, bound))
+        };
+        let templates = |axis: usize| {
+            assessment.baselines.iter().filter_map(move |template| {
                 let sums = match of {
                     STRIDE => return None,
                     WHOLE => &template.full,
                     _ => &template.restarted,
                 };
-                let axis = ["body.x", "body.z"]
-                    .iter()
-                    .position(|body| names == [*body])?;
-                let rms = [&sums.x, &sums.z][axis].fit().map(|fit| fit.rms);
-                Some((template.name, rms))
-            });
-            let row = VerdictRow::new((of, &name, unit), value, against, bound);
-            Some(row.with_baselines(templates))
+                Some((template.name, sums.rms()[axis]))
+            })
         };
         let limit = |baseline: f64| (of_own * baseline).min(of_both * x.hypot(z));
-        let body = ["body.x", "body.z"].map(|name| row(name, &[name], "m", &limit));
-        rows.extend(body.into_iter().flatten());
+        let body = ["body.x", "body.z"].into_iter().zip(0..);
+        rows.extend(body.filter_map(|(name, axis)| {
+            Some(row(name, &[name], "m", &limit)?.with_baselines(templates(axis)))
+        }));
         if of != short {
             continue; // in open loop, small differences at take-off determine where pitch and legs end
         }

@@ -103,16 +103,19 @@ impl Words {
 }
 
 fn words(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
-    let together = || {
-        let largest = largest(row);
-        Words(
-            format!("mainly {largest}, with other joints and the body"),
-            None,
-        )
-    };
     let is_in = |i: &usize| row[*i].abs() > NONE;
     let body: Vec<usize> = (BODY_X..STATE_DIM).filter(is_in).collect();
     let has_joints = (0..JOINT_DIM).any(|i| is_in(&i));
+    let together = || {
+        let (largest, is_joint) = largest(row);
+        let others = match (has_joints, is_joint) {
+            (true, true) => ", with other joints and the body",
+            (true, false) => ", with joints and other coordinates of the body",
+            (false, _) if body.len() > 1 => ", with other coordinates of the body",
+            (false, _) => return Words(format!("{largest}, times a constant"), None),
+        };
+        Words(format!("mainly {largest}{others}"), None)
+    };
     match (body.as_slice(), has_joints) {
         ([], _) => joints(row, rest, robot),
         ([one, ..], _) if (row[*one] - 1.0).abs() > NONE => together(),
@@ -129,23 +132,26 @@ fn words(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
     }
 }
 
-/// The angles with the largest weights: a joint of both front or both rear legs, or a rotation of the trunk.
-fn largest(row: &DVector<f64>) -> String {
+/// The coordinate with the largest weight, and whether it is a joint (then named for both front or both rear legs) or a
+/// coordinate of the trunk.
+fn largest(row: &DVector<f64>) -> (String, bool) {
     let joints = PAIRS.into_iter().flat_map(|(pair, legs)| {
         KINDS.into_iter().enumerate().map(move |(kind, name)| {
-            let weights = legs.map(|leg| row[LEG_JOINT_DIM * leg.index() + kind]);
-            (format!("{pair} {name}"), weights[0].hypot(weights[1]))
+            let [one, other] = legs.map(|leg| row[LEG_JOINT_DIM * leg.index() + kind].abs());
+            (one.max(other), format!("{pair} {name}"), true)
         })
     });
-    let rotations = (ROLL..STATE_DIM).map(|i| (TRUNK[i - BODY_X].to_owned(), row[i].abs()));
+    let trunk = (BODY_X..STATE_DIM).zip(TRUNK);
+    let trunk = trunk.map(|(i, name)| (row[i].abs(), name.to_owned(), false));
     // Of equal weights the first, so that the name does not depend on rounding.
-    let first = (String::new(), -1.0);
-    let all = joints.chain(rotations);
-    let (name, _) = all.fold(first, |best, other| match other.1 > best.1 + NONE {
-        true => other,
-        false => best,
-    });
-    name
+    let found = joints
+        .chain(trunk)
+        .reduce(|best, other| match other.0 > best.0 + NONE {
+            true => other,
+            false => best,
+        });
+    let (_, name, is_joint) = found.expect("a robot has joints");
+    (name, is_joint)
 }
 
 fn joints(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
@@ -174,6 +180,6 @@ fn joints(row: &DVector<f64>, rest: &DVector<f64>, robot: &Robot) -> Words {
         }
         return Words(format!("joints of the {pair} legs"), Some("rad"));
     }
-    let largest = largest(row);
+    let (largest, _) = largest(row);
     Words(format!("mainly {largest}, with other joints"), Some("rad"))
 }
