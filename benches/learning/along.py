@@ -32,18 +32,41 @@ LIFT = [
     ("lift R^2, flight", ("lift", "torque_r2", "flight"), 1.0, 2),
     ("inconsistency", ("lift", "inconsistency"), 1.0, 2),
 ]
+COMPARED = [
+    "deviation as a share of that without feedback",
+    "smaller than without dynamics by, mm",
+    "gain of torque R^2, contact",
+    "gain of torque R^2, flight",
+]
+
+
+def found(value, path):
+    """The number of a run at a path, None where the run does not have it."""
+    for key in path:
+        value = value.get(key) if value else None
+    return value
 
 
 def cell(runs, path, factor, decimals):
     """The range of a number over runs; empty where they do not have it."""
-    values = []
-    for value in runs:
-        for key in path:
-            value = value.get(key) if value else None
-        if value is None:
-            return ""
-        values.append(factor * value)
-    return span(values, decimals)
+    values = [found(run, path) for run in runs]
+    return "" if None in values else span([factor * value for value in values], decimals)
+
+
+def compared(title, runs):
+    """The row of each run compared with its own baselines."""
+
+    def of(path, baseline=None):
+        return [found(run["baseline"][baseline] if baseline else run, path) for run in runs]
+
+    deviation = of(("recovery_rms_m",))
+    shares = [own / without for own, without in zip(deviation, of(("recovery_rms_m",), "feedback_off"))]
+    smaller = [1e3 * (without - own) for own, without in zip(deviation, of(("recovery_rms_m",), "no_dynamics"))]
+    cells = [span(shares, 2), span(smaller, 1)]
+    for feet in ("contact", "flight"):
+        path = ("torque_r2", feet)
+        cells.append(span([own - without for own, without in zip(of(path), of(path, "no_dynamics"))], 2))
+    return "| " + " | ".join([title, *cells]) + " |"
 
 
 def row(title, runs, columns):
@@ -54,7 +77,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--romc", type=pathlib.Path, default=ROOT / "target/release/romc", help="the compiler")
     romc = parser.parse_args().romc.resolve()
-    along, lift = [], []
+    along, lift, effects = [], [], []
     for model in MODELS:
         for name in SETS:
             runs = answer(romc, "mpc", ROOT / f"models/{model}.json", *jumps(name, SETS[name]))["runs"]
@@ -62,10 +85,12 @@ def main():
             along.append(row(f"{title} | model", runs, COLUMNS))
             for baseline, key in BASELINES.items():
                 along.append(row(f"{title} | {baseline}", [run["baseline"][key] for run in runs], COLUMNS))
+            effects.append(compared(title, runs))
             if name == "go1":
                 lift.append(row(f"`{model}`", runs, LIFT))
     print("\n".join(["| model, jumps | controller | " + " | ".join(column[0] for column in COLUMNS) + " |", *along]))
     print("\n".join(["", "| model | " + " | ".join(column[0] for column in LIFT) + " |", *lift]))
+    print("\n".join(["", "| model, jumps | " + " | ".join(COMPARED) + " |", *effects]))
 
 
 if __name__ == "__main__":
