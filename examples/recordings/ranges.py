@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Prints the ranges of the consistency metrics of `romc inspect` over the recordings of each folder.
 
-    examples/recordings/ranges.py [--romc target/release/romc]
+    examples/recordings/ranges.py [--romc target/release/romc]                      the folders of this one
+    examples/recordings/ranges.py [--romc target/release/romc] --robot a1 FILE ...  other recordings, as one row
 """
 import argparse
 import json
@@ -27,10 +28,15 @@ def of(figures):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--romc", default="romc")
-    romc = parser.parse_args().romc
-    for folder in FOLDERS:
-        paths = sorted(map(str, (HERE / folder).glob("*.csv.gz")))
-        command = [romc, "inspect", "--json", "--robot", folder[:3], *paths]
+    parser.add_argument("--robot", help="robot of the recordings FILE ...")
+    parser.add_argument("files", nargs="*", metavar="FILE")
+    arguments = parser.parse_args()
+    if bool(arguments.files) != bool(arguments.robot):
+        parser.error("--robot and recordings belong together")
+    of_folders = [(name, name[:3], sorted(map(str, (HERE / name).glob("*.csv.gz")))) for name in FOLDERS]
+    title = f"{arguments.robot} from {len(arguments.files)} recordings"
+    for folder, robot, paths in [(title, arguments.robot, arguments.files)] if arguments.files else of_folders:
+        command = [arguments.romc, "inspect", "--json", "--robot", robot, *paths]
         files = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)["files"]
         ranges = {}
         for file in files:
@@ -39,6 +45,7 @@ def main():
         print(folder)
         for (name, digits), values in ranges.items():
             print(f"{name}: {min(values):.{digits}f} to {max(values):.{digits}f}" if values else f"{name}: -")
+        print()
 
 
 if __name__ == "__main__":

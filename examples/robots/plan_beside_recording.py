@@ -85,6 +85,8 @@ def planned(arguments, jump, training):
         arguments.latent_dim,
         "--actuators",
         arguments.actuators,
+        "--wrench-frame",
+        arguments.wrench_frame,
     ]
     romc(arguments, "train", *files, *words, "--output", out / "model.json", "--force")
     distance, apex = jump.goal
@@ -192,6 +194,7 @@ def main():
     parser.add_argument("--phases", default="contact-flight")
     parser.add_argument("--latent-dim", type=int, default=6)
     parser.add_argument("--actuators", default="identify", help="as of romc train")
+    parser.add_argument("--wrench-frame", default="ground", help="as of romc train")
     parser.add_argument(
         "--shorter-than", type=float, default=np.inf, help="distance of training jumps, m"
     )

@@ -20,7 +20,7 @@ class CommandLine:
     def __init__(self, folder):
         self.folder = folder
         binary = os.environ.get("ROMC_BINARY")
-        self.start = [binary] if binary else [sys.executable, "-m", "romc"]
+        self.start = [os.path.abspath(binary)] if binary else [sys.executable, "-m", "romc"]
 
     def run(self, *arguments):
         """The finished process."""

@@ -247,10 +247,27 @@ proptest! {
         let (z, dz, u) = (point(2, 0.0), point(2, 0.3), point(2, 0.6));
         let expected = library.evaluate(&z, &dz, &u).unwrap()[0];
         prop_assume!(expected.is_finite() && expected.abs() < 1e12);
-        let printed = expression(library.pool(), library.terms()[0].expr, &SymbolTable::default());
+        let printed = expression(library.pool(), library.terms()[0].expr, &SymbolTable::default(), Rounding::default());
         let found = value_of(&printed.into_math(), &latent_values(&z, &dz, &u));
         // Cancellation inside the term amplifies rounding.
         let error = (found - expected).abs();
         prop_assert!(error <= 1e-6 * expected.abs().max(1.0), "{text}: {found} for {expected}");
+    }
+}
+
+#[test]
+fn factors_in_arguments_have_the_digits_that_are_asked_for() {
+    let text = "sin(0.31492584974745974*z1)*z1".to_owned();
+    let library = Library::from_terms(1, &[text]).unwrap();
+    let (z, zero) = (point(1, 0.0), point(1, 0.3));
+    for (rounding, factor) in [
+        (Rounding::Significant(3), 0.315),
+        (Rounding::Exact, 0.31492584974745974),
+        (Rounding::Decimals(2), 0.31492584974745974),
+    ] {
+        let (pool, term) = (library.pool(), library.terms()[0].expr);
+        let printed = expression(pool, term, &SymbolTable::default(), rounding);
+        let found = value_of(&printed.into_math(), &latent_values(&z, &zero, &zero));
+        assert_eq!(found, (factor * z[0]).sin() * z[0], "{rounding:?}");
     }
 }

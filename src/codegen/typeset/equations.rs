@@ -52,7 +52,7 @@ pub struct Typeset {
 impl Typeset {
     /// Lays out the equations of each phase, terms in their order, coefficients rounded by `rounding`.
     pub fn new(system: &Equations<'_>, symbols: &SymbolTable, rounding: Rounding) -> Self {
-        let terms = terms(system, symbols);
+        let terms = terms(system, symbols, rounding);
         let output = |output| (symbols.acceleration(output), format!("ddz{}", output + 1));
         let outputs: Vec<(Symbol, String)> = (0..system.latent_dim()).map(output).collect();
         let mut rounder = Rounder::new(rounding, coefficients(system));

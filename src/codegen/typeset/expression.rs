@@ -2,19 +2,31 @@
 
 use super::*;
 
-/// Lays out an expression over the variables of a latent model.
+/// Lays out an expression over the variables of a latent model. [`Rounding::Significant`] also rounds the factors in
+/// arguments of functions, which units leave there; other roundings are of coefficients alone.
 ///
 /// # Panics
 /// If it has a symbol that is no such variable; libraries of models refuse these.
-pub(crate) fn expression(pool: &ExprPool, expr: ExprId, symbols: &SymbolTable) -> Signed {
-    Layout { pool, symbols }.signed(expr)
+pub(crate) fn expression(
+    pool: &ExprPool,
+    expr: ExprId,
+    symbols: &SymbolTable,
+    rounding: Rounding,
+) -> Signed {
+    let layout = Layout {
+        pool,
+        symbols,
+        rounding,
+    };
+    layout.signed(expr)
 }
 
 pub(super) fn terms<'e>(
     equations: &'e Equations<'_>,
     symbols: &SymbolTable,
+    rounding: Rounding,
 ) -> Vec<(&'e str, Signed)> {
-    let layout = |expr| expression(&equations.pool, expr, symbols);
+    let layout = |expr| expression(&equations.pool, expr, symbols, rounding);
     let terms = equations.terms.iter();
     terms
         .map(|term| (term.text.as_str(), layout(term.expr)))
@@ -44,6 +56,7 @@ pub(super) fn with_coefficient(coefficient: &Decimal, is_omitted: bool, term: Si
 struct Layout<'a> {
     pool: &'a ExprPool,
     symbols: &'a SymbolTable,
+    rounding: Rounding,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -69,6 +82,14 @@ impl Layout<'_> {
 
     fn boxed(&self, expr: ExprId) -> Box<Math> {
         Box::new(self.signed(expr).into_math())
+    }
+
+    /// A positive number that is no fraction of integers.
+    fn number(&self, size: f64) -> Decimal {
+        match self.rounding {
+            rounding @ Rounding::Significant(_) => Decimal::rounded(size, rounding),
+            Rounding::Adaptive | Rounding::Decimals(_) | Rounding::Exact => Decimal::exact(size),
+        }
     }
 
     /// Constants first, then monomials by degree and variables, then the rest in the pool's order.
@@ -113,7 +134,7 @@ impl Layout<'_> {
                     let size = number.abs();
                     let (over, under) = match size.as_rational() {
                         Some((over, under)) => (integer(over), integer(under)),
-                        None => (Math::Number(Decimal::exact(size.to_f64())), integer(1)),
+                        None => (Math::Number(self.number(size.to_f64())), integer(1)),
                     };
                     numbers.extend(Some(over).filter(|over| !is_one(over)));
                     let under = Some(under).filter(|under| !is_one(under));

@@ -56,7 +56,7 @@ impl RobotTypeset {
         };
         let decoder = decoder.weights();
         let coordinates = coordinate_symbols(&state.names);
-        let terms = terms(system, symbols);
+        let terms = terms(system, symbols, rounding);
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding, coefficients(system));
         let mut systems = Vec::new();
