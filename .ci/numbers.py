@@ -10,8 +10,9 @@
 docs/numbers/commands.toml has an entry per NAME: `command` (run by bash in the root of the repository), `inputs` (files and
 patterns whose digests are stored with the output), `files` for pictures that the command makes, `kept` with the reason why
 the output is not made anew here, `slow` with the time of a command that runs only by its name (PYTHON is then an interpreter
-with the packages of examples/mujoco), and `known` for constants that a table shows next to the output. docs/numbers/NAME.txt
-is the stored output. Pages refer to it by a line above a table, a block of code or a paragraph:
+with the packages of examples/mujoco, FOLDER has the recordings of docs/evaluation/hardware.md), and `known` for constants
+that a table shows next to the output. docs/numbers/NAME.txt is the stored output. Pages refer to it by a line above a table,
+a block of code or a paragraph:
 
     <!-- numbers: NAME -->              Rows of the table are lines of the output, or columns of its tables, in the same order,
                                         each with all its numbers in their order. `NAME; 3 lines`: a row is in three lines.
@@ -82,7 +83,7 @@ def machine():
 def write(name, entry, output, how):
     head = [f"{how} on {datetime.date.today()}, {machine()}", "$ " + entry["command"].strip().replace("\n", "\n$ ")]
     head += [f"{value}  {path}" for path, value in digests(entry).items()]
-    (STORE / f"{name}.txt").write_text("\n".join(head) + "\n---\n" + output.rstrip() + "\n", encoding="utf-8")
+    (STORE / f"{name}.txt").write_text("\n".join(head) + "\n---\n" + output.rstrip().replace(f"{ROOT}/", "") + "\n", encoding="utf-8")
 
 
 @functools.cache
@@ -254,7 +255,7 @@ def table_faults(block, output, every, constants):
         names.append(" ".join(line[:labels]))
         row = []
         for cell, column in zip(line, head):
-            unit = next((text for text in (cell, column, names[-1] + block.introduction) if UNIT.search(text)), "")
+            unit = next((text for text in (cell, column, names[-1] + " " + block.introduction) if UNIT.search(text)), "")
             found = list(numbers(cell, unit))
             row.append([] if all(number.value in constants for number in found) else found)
         rows.append(row)
@@ -352,16 +353,20 @@ def mutate(seed):
 
 def update(names):
     (ROOT / "target" / "numbers").mkdir(parents=True, exist_ok=True)  # of models that commands make
+    outputs = {}  # entries with equal commands share one run
     for name, entry in entries().items():
         if (names and name not in names) or (not names and (entry.get("kept") or entry.get("slow"))):
             continue
         print(f"{name} ...", flush=True)
-        # Scripts that run for minutes print their progress to stderr.
-        notes = subprocess.PIPE if entry.get("slow") else subprocess.STDOUT
-        run = subprocess.run(["bash", "-e", "-o", "pipefail", "-c", entry["command"]], cwd=ROOT, stdout=subprocess.PIPE, stderr=notes, text=True)
-        if run.returncode:
-            raise SystemExit(f"{name}: {run.stdout}{run.stderr or ''}")
-        write(name, entry, run.stdout, "run")
+        command = entry["command"]
+        if command not in outputs:
+            # Scripts that run for minutes print their progress to stderr.
+            notes = subprocess.PIPE if entry.get("slow") else subprocess.STDOUT
+            run = subprocess.run(["bash", "-e", "-o", "pipefail", "-c", command], cwd=ROOT, stdout=subprocess.PIPE, stderr=notes, text=True)
+            if run.returncode:
+                raise SystemExit(f"{name}: {run.stdout}{run.stderr or ''}")
+            outputs[command] = run.stdout
+        write(name, entry, outputs[command], "run")
 
 
 def keep(names):
