@@ -314,6 +314,33 @@ fn rounding_to_zero_is_told_with_the_term() {
 }
 
 #[test]
+fn rounded_factors_in_arguments_are_printed_and_told() {
+    let library = Library::from_terms(1, &["sin(1.00012345678901*z1)".into()]).unwrap();
+    let model = ReducedModel::builder("small", library)
+        .phase(Phase {
+            name: "contact".into(),
+            feet: FeetRule::Any,
+            xi: DMatrix::from_element(1, 1, 2.0),
+        })
+        .build()
+        .unwrap();
+    let told = "Factors in arguments of functions have as many digits";
+    for (rounding, factor, is_told) in [
+        (Rounding::Significant(3), "1.00", true),
+        (Rounding::Exact, "1.00012345678901", false),
+    ] {
+        let options = PrintOptions {
+            rounding,
+            ..PrintOptions::default()
+        };
+        let files = latex::emit(&Equations::of(&model), &options).unwrap();
+        let text = equations(&files, "small.tex");
+        assert!(text.contains(&format!(r"\sin({factor}z_1)")), "{text}");
+        assert_eq!(text.contains(told), is_told, "{text}");
+    }
+}
+
+#[test]
 fn coefficient_of_one_is_left_out_only_when_it_is_exactly_one() {
     for (coefficient, expected) in [(1.0, "z_1"), (1.0000001, "1.00z_1"), (-1.0, "-z_1")] {
         let library = Library::from_terms(1, &["z1".into()]).unwrap();

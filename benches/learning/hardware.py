@@ -3,8 +3,8 @@
     cargo build --release && python3 benches/learning/hardware.py FOLDER
 
 FOLDER holds `go1_hardware_jump.csv`, `go1_hardware_flights.csv.gz` and `a1/a1_01.csv.gz` to `a1_24.csv.gz`, which are not
-part of romc (docs/evaluation/hardware.md names their sources). No model is judged on the recordings that refined it. Under a minute on two
-cores; needs Python alone.
+part of romc (docs/evaluation/hardware.md names their sources). No model is judged on the recordings that refined it. One
+to two minutes; needs Python alone.
 """
 
 import argparse

@@ -36,7 +36,10 @@ def main():
         description=__doc__, epilog=EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("model", type=pathlib.Path, help="with rows of roll and yaw (train --body all)")
-    model = json.loads(parser.parse_args().model.read_text(encoding="utf-8"))
+    path = parser.parse_args().model
+    model = json.loads(path.read_text(encoding="utf-8"))
+    if model.get("robot") != "go1":
+        raise SystemExit(f"{path}: the recordings and the simulated robot are of a Go1, the model is not")
     jumps = [read_jump(path) for path in sorted((ROOT / "examples/recordings/go1").glob("train_*.csv.gz"))]
     flights = np.concatenate([jump.x[~jump.feet.any(axis=1)] for jump in jumps])
     posture = flights.mean(axis=0)
@@ -47,6 +50,8 @@ def main():
     for axis, turn in ((0, "roll"), (2, "yaw")):
         column = names.index(f"body.{turn}")
         row = max(model["encoder"]["weights"], key=lambda weights: abs(weights[column]))
+        if row[column] == 0.0:
+            raise SystemExit(f"{path}: no latent coordinate has body.{turn}; train it with --body all")
         for source, of in (("learned", lambda j: row[names.index(j)] / row[column]),
                            ("mass matrix", lambda j: simulated[axis, JOINTS.index(j)])):
             print(f"{turn:<6}{source:<13}" + "".join(f"{of(name):>8.3f}" for name in JOINTS if name[1] == "r"))

@@ -35,6 +35,8 @@ def main():
         statuses = collections.Counter(answer.get("status", "no plan") for answer in of_place)
         print(f"goals {place}: {len(of_place)}; " + ", ".join(f"{n} {name}" for name, n in statuses.items()))
     plans = [answer for of_place in answers.values() for answer in of_place if answer]
+    if not plans:
+        raise SystemExit("no goal has a plan")
     # Reasons differ in their numbers: the same without them is the same reason.
     reasons = collections.Counter(re.sub(r"\d+(\.\d+)?", "N", text) for plan in plans for text in plan["reasons"])
     for text, count in reasons.items():

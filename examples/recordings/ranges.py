@@ -37,7 +37,10 @@ def main():
     title = f"{arguments.robot} from {len(arguments.files)} recordings"
     for folder, robot, paths in [(title, arguments.robot, arguments.files)] if arguments.files else of_folders:
         command = [arguments.romc, "inspect", "--json", "--robot", robot, *paths]
-        files = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)["files"]
+        answer = subprocess.run(command, capture_output=True, text=True)
+        if answer.returncode != 0:
+            raise SystemExit(answer.stderr)
+        files = json.loads(answer.stdout)["files"]
         ranges = {}
         for file in files:
             for name, values, digits in of(file["figures"]):

@@ -180,7 +180,8 @@ def draw(path, jump, rows):
         axis.set_xlabel(x)
         axis.set_ylabel(y)
         axis.grid(alpha=0.25)
-    axes[0, 0].legend(fontsize=8)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(lines), fontsize=9)
     figure.savefig(path, dpi=110)
 
 

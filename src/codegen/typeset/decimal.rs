@@ -185,6 +185,8 @@ pub struct RoundingReport {
     /// Active terms whose coefficient prints as zero, so that they are left out.
     pub(crate) dropped: Vec<Occurrence>,
     pub active: usize,
+    /// Whether factors inside terms are rounded also; the errors above are those of coefficients alone.
+    pub(crate) are_terms_rounded: bool,
 }
 
 /// Makes equations out of coefficients and terms, and keeps the record.

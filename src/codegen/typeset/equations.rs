@@ -56,6 +56,7 @@ impl Typeset {
         let output = |output| (symbols.acceleration(output), format!("ddz{}", output + 1));
         let outputs: Vec<(Symbol, String)> = (0..system.latent_dim()).map(output).collect();
         let mut rounder = Rounder::new(rounding, coefficients(system));
+        rounder.report.are_terms_rounded = are_rounded(&terms, system, symbols);
         let phases = system.phases.iter().enumerate();
         let phases = phases.map(|(index, phase)| (&phase.name, system.coefficients(index)));
         let phases: Vec<(&String, DMatrix<f64>)> = phases.collect();

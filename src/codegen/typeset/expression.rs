@@ -33,6 +33,15 @@ pub(super) fn terms<'e>(
         .collect()
 }
 
+/// Whether `rounding` changes a factor inside one of these terms.
+pub(super) fn are_rounded(
+    terms: &[(&str, Signed)],
+    equations: &Equations<'_>,
+    symbols: &SymbolTable,
+) -> bool {
+    terms != self::terms(equations, symbols, Rounding::Exact)
+}
+
 /// Puts a coefficient before a term: `0.36` and `sin(dz1)` to `0.36 sin(dz1)`. The coefficient replaces a term or
 /// numerator equal to one; if `is_omitted`, only its sign is printed.
 pub(super) fn with_coefficient(coefficient: &Decimal, is_omitted: bool, term: Signed) -> Signed {
@@ -132,12 +141,13 @@ impl Layout<'_> {
                 Node::Number(number) => {
                     negative ^= number.is_negative();
                     let size = number.abs();
+                    let unless_one = |value: i64| Some(integer(value)).filter(|_| value != 1);
                     let (over, under) = match size.as_rational() {
-                        Some((over, under)) => (integer(over), integer(under)),
-                        None => (Math::Number(self.number(size.to_f64())), integer(1)),
+                        Some((over, under)) => (unless_one(over), unless_one(under)),
+                        // 1.0001 is printed as 1.00, and not left out.
+                        None => (Some(Math::Number(self.number(size.to_f64()))), None),
                     };
-                    numbers.extend(Some(over).filter(|over| !is_one(over)));
-                    let under = Some(under).filter(|under| !is_one(under));
+                    numbers.extend(over);
                     bottom.extend(under.map(|under| (FactorKey::Number, under)));
                 }
                 Node::Power(base, exponent) => match self.pool.as_number(*exponent) {

@@ -31,7 +31,7 @@ use std::fmt;
 
 use askama::Template;
 use decimal::{Rounder, RoundingReport};
-use expression::terms;
+use expression::{are_rounded, terms};
 use latex::tex_cases;
 use nalgebra::{DMatrix, DVector};
 use tree::greek_letter;

@@ -59,6 +59,7 @@ impl RobotTypeset {
         let terms = terms(system, symbols, rounding);
         let (encoder, negligible_weights) = encoder(map, &factors, symbols, &coordinates)?;
         let mut rounder = Rounder::new(rounding, coefficients(system));
+        rounder.report.are_terms_rounded = are_rounded(&terms, system, symbols);
         let mut systems = Vec::new();
         let doubled = coordinates.iter().map(|symbol| Symbol {
             dots: 2,

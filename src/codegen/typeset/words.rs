@@ -161,7 +161,13 @@ pub fn rounding(spelling: &Spelling, rule: Rounding, report: &RoundingReport) ->
             report.active
         ),
     };
-    format!("{rule} {error}{dropped}")
+    let terms = match report.are_terms_rounded {
+        true => {
+            " Factors in arguments of functions have as many digits; these errors do not contain their rounding."
+        }
+        false => "",
+    };
+    format!("{rule} {error}{dropped}{terms}")
 }
 
 /// A coefficient with more digits than are printed, before its term.
